@@ -38,6 +38,16 @@ def test_a_requested_animation_plays_in_every_figure_of_the_file():
     assert [actor.clip for actor in opened(hero, hat, animation="none").actors] == [None, None]
 
 
+def test_characters_that_share_no_animation_play_their_own_first_one():
+    hero = animated_leg()
+    horse = replace(leg(name="horse"), animations=(animation(replace(bow(), name="trot")),))
+    scene = opened(hero, horse)
+    assert [actor.animation for actor in scene.actors] == [0, 0]
+    assert [actor.clip.name for actor in scene.actors] == ["wave", "trot"]
+    # On request, only characters with that animation move.
+    assert [actor.animation for actor in opened(hero, horse, animation="trot").actors] == [-1, 0]
+
+
 @pytest.mark.parametrize(
     ("figure", "key"), [(animated_leg(), "F004.animation"), (leg(), "F004.no-animations")]
 )

@@ -15,6 +15,7 @@ vec4 base_color() {
 #else
 const int BASE_MAP = 0, METALLIC_MAP = 1, ROUGHNESS_MAP = 2;
 const int NORMAL_MAP = 3, OCCLUSION_MAP = 4, EMISSIVE_MAP = 5;
+const int SHADE_MAP = 6;
 
 in vec4 v_other_uvs;            // second and third set of texture coordinates in use
 in vec4 v_tint;                 // vertex colour, linear, and opacity
@@ -24,7 +25,7 @@ uniform bool u_has_base_factor; // otherwise untextured surfaces have v_color
 uniform bool u_has_tint;        // v_tint multiplies the base colour, and replaces v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
-uniform mat3 u_places[6];       // texture coordinates to those of each texture's image
+uniform mat3 u_places[7];       // texture coordinates to those of each texture's image
 uniform int u_uv_sets[6];       // 0: v_uv, 1 and 2: v_other_uvs
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map

@@ -12,12 +12,17 @@ uniform sampler2D u_metallic_map;
 uniform sampler2D u_roughness_map;
 uniform sampler2D u_occlusion_map;
 uniform sampler2D u_emissive_map;
-uniform vec4 u_channels[6];     // which channel of a texel is used
+uniform vec4 u_channels[7];     // which channel of a texel is used
 uniform bool u_has_metallic_map;
 uniform bool u_has_roughness_map;
 uniform bool u_has_emissive_map;
 uniform float u_occlusion_map_strength;  // 0: no map
 uniform vec3 u_emissive;        // linear
+uniform bool u_toon;
+uniform vec3 u_shade_color;     // linear, of the side away from the key light
+uniform vec2 u_shade_range;     // cosines at which the surface is in shade, and lit
+uniform sampler2D u_shade_map;
+uniform bool u_has_shade_map;
 #endif
 
 const float PI = 3.14159265358979;
@@ -79,8 +84,28 @@ vec3 direct(Surface s, vec3 normal, vec3 to_eye, vec3 to_light) {
     return n_l * ((1.0 - fresnel) * s.diffuse + fresnel * (0.5 * lobe / smith));
 }
 
+#ifdef MATERIALS
+// Two colours of a surface, by the angle of incidence of the key light (VRMC_materials_mtoon 1.0).
+vec3 toon(vec3 lit, vec3 position, vec3 normal) {
+    vec3 dark = u_shade_color;
+    if (u_has_shade_map)
+        dark *= texture(u_shade_map, place(SHADE_MAP)).rgb;
+    float cosine = dot(normal, u_light_directions[0]), width = u_shade_range.y - u_shade_range.x;
+    float part = clamp((cosine - u_shade_range.x) / max(width, 1e-4), 0.0, 1.0);
+    part *= visibility(0, position, normal, max(cosine, 0.0));
+    vec3 color = u_emissive;
+    if (u_has_emissive_map)
+        color *= texture(u_emissive_map, place(EMISSIVE_MAP)).rgb;
+    return color + mix(dark, lit, part);
+}
+#endif
+
 vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     vec3 base = base_color().rgb;
+#ifdef MATERIALS
+    if (u_toon)
+        return toon(base, position, normal);
+#endif
     if (u_unlit)
         return base;
     Surface s = surface(base);

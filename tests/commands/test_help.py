@@ -33,7 +33,8 @@ def test_every_option_is_documented(command):
         ),
         (
             "convert",
-            "files, output, writing motions, frames, captures and BVH, shape and pose, skinning",
+            "files, output, writing motions, writing VRM characters, frames, captures and BVH, "
+            "shape and pose, skinning",
         ),
         (
             "view",

@@ -216,10 +216,10 @@ REFUSED = {
         "viewer: --smooth: expected 0 or more iterations, found -3",
     ),
     "suffix": (
-        ["-o", "{tmp}/x.glb"],
+        ["-o", "{tmp}/x.fbx"],
         2,
-        'viewer: a rigged mesh cannot be written as ".glb"; supported: .skel (with .skin, .obj and '
-        "the target's pose as .json), .npz",
+        'viewer: a rigged mesh cannot be written as ".fbx"; supported: .skel (with .skin, .obj and '
+        "the target's pose as .json), .npz, .glb, .gltf, .vrm",
     ),
     "folder": (
         ["-o", "{tmp}/no/x.npz"],

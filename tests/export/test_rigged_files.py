@@ -45,7 +45,7 @@ def test_rigged_file_names():
         files_of(Path("b.fbx"))
     assert str(caught.value) == (
         'a rigged mesh cannot be written as ".fbx"; supported: .skel (with .skin, .obj and '
-        "the target's pose as .json), .npz"
+        "the target's pose as .json), .npz, .glb, .gltf, .vrm"
     )
 
 
@@ -62,7 +62,7 @@ def test_without_correctives_the_pose_matches_the_target(rigged):
 def test_skel_rig_matches_the_target_and_reports_losses(rigged, tmp_path):
     target, found = rigged
     lines = faults.lines(write_rigged(found, tmp_path / "arm.skel"))
-    assert lines[-1].startswith("pose correctives cannot be stored in .skel and .skin: ")
+    assert lines[-1].startswith("pose correctives are not stored: ")
     assert lines[-2].endswith(", the target's pose") and "arm.json" in lines[-2]
     files = [tmp_path / f"arm.{suffix}" for suffix in ("skel", "skin", "json")]
     actor = viewer.load(*files).actors[0]
@@ -78,3 +78,16 @@ def test_npz_keeps_correctives(rigged, tmp_path):
     ]
     again = viewer.load(tmp_path / "arm.npz").actors[0].figure
     assert again.correctives is not None and len(again.fields) == 3
+
+
+def test_gltf_holds_the_figure_at_rest(rigged, tmp_path):
+    _, found = rigged
+    lines = faults.lines(write_rigged(found, tmp_path / "arm.glb"))
+    assert lines[-2] == "the figure is at rest: .npz and .skel also store the target's pose"
+    actor = viewer.load(tmp_path / "arm.glb").actors[0]
+    plain = without_correctives(found)
+    assert actor.figure.require_skeleton().n_joints == plain.skeleton.n_joints
+    wanted = deform(plain, rest_pose(plain.skeleton))[0]
+    # Single precision of the file.
+    assert_allclose(deform(actor.figure, actor.pose)[0], wanted, rtol=0, atol=1e-6)
+    assert files_of(tmp_path / "arm.gltf") == [tmp_path / "arm.gltf", tmp_path / "arm.bin"]

@@ -19,7 +19,9 @@ from viewer.export import EXPORTERS, export
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
 
-SUFFIXES = [kind.suffixes[0] for kind in EXPORTERS.values() if kind.writes_pose]
+# VRM files need a humanoid, and are saved as glTF files are.
+WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
+SUFFIXES = [kind.suffixes[0] for kind in WRITERS if kind.writes_pose]
 # Files that each exporter writes for the figure below, which has two textures.
 SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
 # Existing files, by the suffix of the output.

@@ -174,6 +174,25 @@ def test_unlit_and_emissive_colours_are_shown_as_they_are(furnace):
     assert np.allclose(found[:3], encoded([0.5, 0.25, 0.0]), atol=1)
 
 
+def test_toon_surfaces_mix_two_colours_by_the_angle_of_the_key_light(offscreen):
+    half = texture([(0, 255, 255)])
+    toon = Material(
+        "", None, (0.5, 0.5, 0.5, 1.0), unlit=True, is_physical=True,
+        shade_color=(1.0, 0.25, 0.0), shade_texture=half,
+    )  # fmt: skip
+    # The light comes from 60 degrees to the side of the normal: the cosine is 0.5.
+    off = Light(60.0, 0.0, (1.0, 1.0, 1.0), 0.0)
+    lights = Lights(key=off, rim=off, ambient=0.0, specular=0.0)
+    wanted = {
+        (0.0, 0.4): [0.5, 0.5, 0.5],
+        (0.6, 1.0): [0.0, 0.25, 0.0],
+        (0.25, 0.75): [0.25, 0.375, 0.25],
+    }
+    for limits, color in wanted.items():
+        shown = draw(offscreen, replace(toon, shade_range=limits), lights=lights, shadows=False)
+        assert np.allclose(pixel(shown, 0, 0)[:3], encoded(color), atol=1)
+
+
 def test_maps_multiply_their_factors_by_their_channel(furnace):
     """Black metal reflects almost nothing; occlusion removes the room's light."""
     half = texture([(0, 128, 255)], channel=1)

@@ -267,6 +267,7 @@ ACTIONS = (
     Action("Reset shape", "posing.pose_actions.reset_shape"),
     Action("Random shape", "posing.pose_actions.random_shape"),
     Action("Show all parts", "actors.part_actions.show_all_parts", why="core.reasons.no_parts"),
+    Action("Springs", "actors.springs.toggle_springs", why="actors.springs.no_springs"),
     Action("Reset lights", "view.display_actions.reset_lights"),
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),
     Action("Selection outlines", "view.outlines.toggle_outlines"),

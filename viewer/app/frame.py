@@ -291,7 +291,7 @@ class Frame:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
         up = state.of(Preferences).up
-        settings = MotionSettings(up=up) if up else None
+        settings = MotionSettings(up=up, springs=True)
         state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:

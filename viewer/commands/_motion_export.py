@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.commands._baked_springs import add_spring_argument
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
@@ -73,6 +74,7 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         help="glTF: quantise positions, normals, texture coordinates and weights to 16 bits "
         "(KHR_mesh_quantization); the errors are printed",
     )
+    add_spring_argument(group)
     group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )

@@ -21,5 +21,6 @@ def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list
     ``scene``: the opened scene; if omitted, only the named files are returned.
     """
     model = [] if arguments.model is None else [resolve(arguments.model)]
-    named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *model)]
+    more = [*model, *map(resolve, arguments.motion)]
+    named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *more)]
     return named if scene is None else [*named, *scene.files]

@@ -59,6 +59,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         f"{f' (default: {default})' if default else ''}",
     )
     add_animation_argument(group)
+    parser.set_defaults(springs="off")
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
@@ -79,6 +80,14 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="FIGURE",
         help="body model for captured bodies, or driven by BVH (default: one among FILES; for "
         "captured bodies, otherwise the bundled body)",
+    )
+    group.add_argument(
+        "--motion",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
+        "figure of its own; may be repeated",
     )
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
@@ -134,6 +143,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
+        motions=tuple(Path(resolve(file)) for file in arguments.motion),
+        springs=arguments.springs == "on",
     )
 
 

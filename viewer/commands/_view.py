@@ -117,14 +117,25 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         help="draft: no shadows; normal: shadows; final: soft shadows, ambient occlusion and "
         "smoother edges (default: final for pictures, normal for videos)",
     )
-    for name, text in _SWITCHES:
-        group.add_argument(f"--{name}", action="store_true", help=text)
+    _add_switches(group)
     group.add_argument(
         "--hide-part",
         action="append",
         default=[],
         metavar="NAME|GLOB",
         help="hide parts of meshes or bodies, by name or pattern; may be repeated",
+    )
+
+
+def _add_switches(group: argparse._ArgumentGroup) -> None:
+    for name, text in _SWITCHES:
+        group.add_argument(f"--{name}", action="store_true", help=text)
+    group.add_argument(
+        "--springs",
+        choices=("on", "off"),
+        default="on",
+        help="simulate joints that swing, such as hair in VRM files, while a motion plays "
+        "(default: on)",
     )
 
 

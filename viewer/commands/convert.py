@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from viewer.commands._baked_springs import bake_springs
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -31,6 +32,7 @@ from viewer.commands._scene import (
     open_scene,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
+from viewer.commands._vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
@@ -47,6 +49,8 @@ from viewer.streams import is_stdout, require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
+_OPTIMIZED = (".glb", ".gltf", ".vrm")
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -62,6 +66,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     add_motion_arguments(parser)
+    add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser)
     add_pose_arguments(parser)
@@ -79,10 +84,11 @@ def run(arguments: argparse.Namespace) -> int:
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    notes = write(arguments, scene, output, skinning)
+    notes = [*write(arguments, scene, output, skinning), *baked]
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 
@@ -99,15 +105,11 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
         )
     suffix = output.suffix.lower() or "/"
     kinds = [kind for kind in EXPORTERS.values() if suffix in kind.suffixes]
-    if suffix == ".vrm":
-        raise UnsupportedFormatError(
-            "VRM files cannot be written: use .glb, which omits the humanoid map, expressions and "
-            "meta data"
-        )
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
-    if arguments.optimize and not any(kind.writes_keys for kind in kinds):
+    if arguments.optimize and suffix not in _OPTIMIZED:
         raise ViewerError(f"--optimize: expected .glb or .gltf, found {printable(suffix)}")
+    vrm_meta(arguments, output)
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
@@ -182,13 +184,14 @@ def _write_apart(
     arguments: argparse.Namespace, scene: Scene, skinning: Skinning, places: Mapping[Actor, Path]
 ) -> list[Diagnostic]:
     """Write each actor to a file of its own."""
+    optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
     check_targets(files, inputs_of(arguments, scene), arguments.force)
     notes: list[Diagnostic] = []
     with all_or_none(files):
         for actor, path in places.items():
             with raising():
-                notes += export(upright_actor(scene, actor), path, skinning)
+                notes += export(upright_actor(scene, actor), path, skinning, optimizes, meta)
     return notes
 
 

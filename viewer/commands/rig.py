@@ -25,6 +25,7 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
+from viewer.commands._vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
@@ -62,13 +63,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "other files of the figure or its motion",
     )
     parser.add_argument(
-        "-o", "--output", metavar="FILE", help=".skel (with .skin, .obj, .json), or .npz"
+        "-o",
+        "--output",
+        metavar="FILE",
+        help=".skel (with .skin, .obj, .json), .npz, .glb, .gltf or .vrm",
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
+    add_vrm_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)
     parser.add_argument(
@@ -157,6 +162,7 @@ def _add_alignment_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Rig the mesh, print a report, write it, and show it if requested."""
     output = None if arguments.output is None else Path(arguments.output)
+    meta = vrm_meta(arguments, output)
     inputs = _inputs(arguments)
     if output is not None:
         require_stdout(output)
@@ -181,7 +187,7 @@ def run(arguments: argparse.Namespace) -> int:
     _print_report(rigged, stream)
     if output is not None:
         with all_or_none(files):
-            written = [*write_rigged(rigged, output), *write_clips(rigged, clips)]
+            written = [*write_rigged(rigged, output, meta), *write_clips(rigged, clips)]
         print("\n".join(map(str, written)), file=stream)
     if arguments.view:
         _show(rigged, target)

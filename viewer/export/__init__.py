@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError
 from viewer.export._exporter import Exporter
-from viewer.export._options import MotionOptions
+from viewer.export._options import MotionOptions, VrmMeta
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
@@ -24,6 +25,7 @@ __all__ = [
     "EXPORTERS",
     "Exporter",
     "MotionOptions",
+    "VrmMeta",
     "animation_for",
     "export",
     "export_animation",
@@ -86,6 +88,20 @@ EXPORTERS = {
         writes_keys=True,
         writes_several=True,
     ),
+    "vrm": Exporter(
+        "VRM: humanoid character",
+        (".vrm",),
+        "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
+        "pose, motion, limits of joints, pose correctives",
+    ),
+    "vrma": Exporter(
+        "VRM animation: motion of a humanoid",
+        (".vrma",),
+        "motion of human bones, expressions",
+        "mesh, other joints",
+        writes_pose=False,
+        writes_motion=True,
+    ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
         (".bvh",),
@@ -134,7 +150,11 @@ def exporter_for(path: str | Path) -> str:
 
 
 def export(
-    actor: Actor, path: str | Path, skinning: Skinning | None = None, optimizes: bool = False
+    actor: Actor,
+    path: str | Path,
+    skinning: Skinning | None = None,
+    optimizes: bool = False,
+    meta: VrmMeta | None = None,
 ) -> list[Diagnostic]:
     """Write an actor in its current pose; its placement in the scene is omitted.
 
@@ -147,7 +167,9 @@ def export(
     skinning : Skinning, optional
         Skinning method and options.
     optimizes : bool
-        Quantise vertices, which glTF can.
+        Quantise vertices, which glTF and VRM can.
+    meta : VrmMeta, optional
+        Name, authors and licence of a VRM character; those of its file if omitted.
 
     Returns
     -------
@@ -164,11 +186,13 @@ def export(
     OutputError
         If a file cannot be written.
     """
-    module = import_module(f"{__name__}.{exporter_for(path)}")
-    options = (True,) if optimizes else ()
-    if optimizes and not EXPORTERS[exporter_for(path)].writes_keys:
+    key = exporter_for(path)
+    module = import_module(f"{__name__}.{key}")
+    options: dict[str, Any] = {"meta": meta} if key == "vrm" else {}
+    if optimizes and key not in ("gltf", "vrm"):
         raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
-    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), *options)
+    options |= {"optimizes": True} if optimizes else {}
+    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), **options)
     return notes + _hidden_note([actor])
 
 
@@ -201,12 +225,8 @@ def export_clips(
 
     Raises
     ------
-    UnsupportedFormatError
-        If no exporter writes this suffix.
-    RigError
-        If the figure lacks the data that the format needs, or the keys are invalid.
-    OutputError
-        If a file cannot be written.
+    UnsupportedFormatError, RigError, OutputError
+        As for ``export``, and if the keys are invalid.
     """
     module = import_module(f"{__name__}.{exporter_for(path)}")
     chosen = own_animations(actor) if clips is None else clips
@@ -302,24 +322,13 @@ def export_animation(
     animation : SampledAnimation
         A figure in many poses.
     path : str or Path
-        Existing files are replaced; either all files of an export are written, or none.
+        Either all files of an export are written, or none.
     key : str
         A key of ``EXPORTERS``, see ``motion_exporters``.
     options : MotionOptions
         Options of the export.
 
-    Returns
-    -------
-    list of Diagnostic
-        Notes: the written files, then the data that the format cannot store, with errors. ``str``
-        gives the text of each.
-
-    Raises
-    ------
-    RigError
-        If the figure or motion lacks the data that the format needs.
-    OutputError
-        If a file cannot be written.
+    Returns notes, and raises errors, as ``export`` does.
     """
     module = import_module(f"{__name__}.{key}")
     notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)

@@ -19,6 +19,25 @@ GAPS = {
 _CLOSED = "hold"  # default of formats that do not support missing frames
 
 
+@dataclass(frozen=True, slots=True)
+class VrmMeta:
+    """Meta data of a VRM character; empty values keep those of its file.
+
+    Attributes
+    ----------
+    name : str
+        Name of the character; that of the figure if it has no VRM file.
+    authors : tuple of str
+        At least one for figures from other files.
+    licence : str
+        Address of the licence.
+    """
+
+    name: str = ""
+    authors: tuple[str, ...] = ()
+    licence: str = ""
+
+
 @dataclass(slots=True)
 class MotionOptions:
     """Options for writing a motion.

@@ -1,4 +1,4 @@
-"""Files of a newly rigged mesh: a .skel-style rig with mesh and pose, or one ``.npz``."""
+"""Files of a newly rigged mesh: a .skel-style rig with mesh and pose, ``.npz``, glTF or VRM."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from viewer.autorig.rigged import Rigged
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
-from viewer.export import export
+from viewer.export import VrmMeta, export, files_written
 from viewer.formats import all_or_none
 from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
@@ -20,35 +20,40 @@ from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
 
-RIGGED_SUFFIXES = (".npz", ".skel", ".skin")
-"""Suffixes that ``files_of`` accepts."""
+RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
+"""Suffixes that ``files_of`` accepts without further data; ``.vrm`` needs an author."""
 
 _RIG = (".skel", ".skin", ".obj", ".json")
+_NODES = (".glb", ".gltf", ".vrm")
 
 
 def files_of(output: Path) -> list[Path]:
     """Return all files that belong to one output.
 
-    Raises UnsupportedFormatError if its suffix is not one of ``.skel``, ``.skin`` and ``.npz``.
+    Raises UnsupportedFormatError if it writes no such suffix.
     """
     suffix = output.suffix.lower()
     if suffix == ".npz":
         return [output]
     if suffix in (".skel", ".skin"):
         return [output.with_suffix(each) for each in _RIG]
+    if suffix in _NODES:
+        return files_written(output)
     raise UnsupportedFormatError(
         f'a rigged mesh cannot be written as "{suffix}"; supported: .skel (with .skin, .obj and '
-        "the target's pose as .json), .npz"
+        "the target's pose as .json), .npz, .glb, .gltf, .vrm"
     )
 
 
-def write_rigged(rigged: Rigged, output: Path) -> list[Diagnostic]:
+def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> list[Diagnostic]:
     """Write all files of a rigged mesh, or none.
 
     ``rigged``: the result of the rig transfer.
     ``output``: ``.skel`` or ``.skin``: skeleton and skin at rest, the rest mesh with its texture
       coordinates as ``.obj``, the target's pose as ``.json``; they contain no pose correctives, see
-      ``without_correctives``. ``.npz``: everything in one file.
+      ``without_correctives``. ``.npz``: everything in one file. ``.glb``, ``.gltf``, ``.vrm``: the
+      figure at rest.
+    ``meta``: name, authors and licence of a VRM character.
     Returns: notes about the written files, and about data that the format cannot store.
     Raises RigError if ``.skel`` cannot store the skeleton.
     Raises UnsupportedFormatError as ``files_of``.
@@ -60,9 +65,15 @@ def write_rigged(rigged: Rigged, output: Path) -> list[Diagnostic]:
 
         save(rigged.figure, output, _arrays(rigged))
         return [Diagnostic("X001.rigged", output)]
-    skel, _, obj, json = files
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
+    if output.suffix.lower() in _NODES:
+        notes += export(Actor(figure, figure_pose(figure)), output, meta=meta)
+        notes.append(Diagnostic("X003.rigged-pose"))
+        if rigged.figure.correctives is not None:
+            notes.append(Diagnostic("X003.rigged-correctives"))
+        return notes
+    skel, _, obj, json = files
     with all_or_none(files):
         notes += export(Actor(figure, figure_pose(figure)), skel)
         notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)

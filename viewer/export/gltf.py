@@ -7,7 +7,7 @@ it if it is in another unit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -44,12 +44,21 @@ from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["export", "export_animation", "export_clips", "export_figures"]
 
+Extend = Callable[[Document, Body, Built], list[Diagnostic]]
+
 
 def export(
-    actor: Actor, path: Path, skinning: Skinning, optimizes: bool = False
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    optimizes: bool = False,
+    extend: Extend | None = None,
 ) -> list[Diagnostic]:
-    """Write a figure in its current pose; see ``viewer.export.export``."""
-    return export_figures([actor], path, skinning, [None], optimizes=optimizes)
+    """Write a figure in its current pose; see ``viewer.export.export``.
+
+    ``extend`` adds the extensions of a VRM character, and returns notes about them.
+    """
+    return export_figures([actor], path, skinning, [None], optimizes=optimizes, extend=extend)
 
 
 def export_clips(
@@ -70,10 +79,12 @@ def export_figures(
     clips: Sequence[Sequence[TransformClip] | None],
     scene: Scene | None = None,
     optimizes: bool = False,
+    extend: Extend | None = None,
 ) -> list[Diagnostic]:
     """Write figures and cameras to one file; see ``viewer.export.export_figures``.
 
     Several figures are placed as in their scene; the placement of a single one is omitted.
+    ``extend``: as for ``export``.
     """
     document = Document(actors[0].figure.name)
     together = Clips(document)
@@ -88,8 +99,10 @@ def export_figures(
         to_file = to_file @ np.linalg.inv(first.placement)
     placing = place_figures(document, actors, added, to_file) if len(actors) > 1 else []
     lenses = add_cameras(document, views, to_file)
+    extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
     (data,) = _files([(path, document)])
-    notes = [_written(path, actors, added, len(views), len(data[path])), *_beside(data, path)]
+    notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
+    notes += _beside(data, path)
     file = parsed([*data.values()])
     for node in placing:
         # Errors are measured in the space of each figure.
@@ -97,7 +110,7 @@ def export_figures(
     for actor, each in zip(actors, added, strict=True):
         own_notes = _quantization(path, each.built, actor.figure)
         own_notes += _remarks(each.body, actor.figure.up)
-        own_notes += figure_losses(each, path, file, skinning)
+        own_notes += figure_losses(each, path, file, skinning, is_vrm=extend is not None)
         several = len(actors) > 1
         notes += [_of_figure(actor, note) for note in own_notes] if several else own_notes
     return notes + lenses

@@ -8,7 +8,12 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading.cast import Cast
 from viewer.rig.motion.animation import Animation
-from viewer.rig.motion.animation_choice import chosen_animation, counterpart, play_animation
+from viewer.rig.motion.animation_choice import (
+    chosen_animation,
+    counterpart,
+    own_first,
+    play_animation,
+)
 from viewer.rig.scene import Actor
 
 __all__ = ["animate"]
@@ -58,6 +63,8 @@ def _files(cast: Cast) -> list[list[Actor]]:
 def _start(cast: Cast, actors: list[Actor], chosen: Animation | None, is_requested: bool) -> None:
     for actor in actors:
         index = -1 if chosen is None else counterpart(actor.figure, chosen)
+        if index < 0 and chosen is not None and not is_requested:
+            index = own_first(actor.figure, [other.figure for other in actors])
         try:
             play_animation(actor, index)
         except FormatError as problem:

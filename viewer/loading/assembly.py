@@ -90,6 +90,8 @@ def begin(
     world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
     world_up = world_up or next(iter(cast.ups), "y")
     stand_up(cast, world_up)
+    if settings is not None and settings.springs:
+        _switch_on_springs(cast, world_up)
     place_side_by_side(cast)
     cast.views += placed_views(cast)
     found = (*contents.diagnostics, *cast.diagnostics)
@@ -106,16 +108,42 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         from viewer.loading.driving import drive
 
         drive(contents, cast, settings)
-    if settings.animation or any(actor.figure.animations for actor in cast.actors):
+    # A name selects an animation of the files that are given as motions, if there are any.
+    wanted = "" if settings.motions else settings.animation
+    if settings.drives and _has_bare_motion(cast):
+        from viewer.loading.figure_motions import drive_by_figures
+
+        if drive_by_figures(cast, wanted):
+            wanted = ""
+    if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate
 
-        animate(cast, settings.animation)
+        animate(cast, wanted)
     if any(actor.clip is not None for actor in cast.actors):
         from viewer.rig.motion.evaluation import pose_actor, time_span
 
         start = time_span(cast.actors)[0]
         for actor in cast.actors:
             pose_actor(actor, start)
+
+
+def _has_bare_motion(cast: Cast) -> bool:
+    """Return whether a file has a skeleton with animations, but without a mesh."""
+    return any(a.figure.mesh is None and a.figure.animations for a in cast.actors)
+
+
+def _switch_on_springs(cast: Cast, up: str) -> None:
+    """Simulate the spring joints of all placed figures that have any."""
+    skeletons = [(actor, actor.figure.skeleton) for actor in cast.actors]
+    if not any(skeleton is not None and skeleton.springs for _, skeleton in skeletons):
+        return
+    from viewer.rig.motion.evaluation import pose_actor, time_span
+    from viewer.rig.motion.spring_motion import springs_for
+
+    start = time_span(cast.actors)[0]
+    for actor in cast.actors:
+        actor.springs = springs_for(actor, up)
+        pose_actor(actor, start)
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:

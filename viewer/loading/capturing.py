@@ -11,6 +11,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.loading.carrying import carried_clip
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -20,8 +21,9 @@ from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip, joined
+from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, figure_pose
 
 __all__ = ["Builder", "joined_points", "joined_timing"]
 
@@ -64,6 +66,10 @@ class Builder:
         Whether reading was stopped before the end.
     has_shape, has_expression : bool
         Whether the files have nonzero shapes, and expressions.
+    target : Figure or None
+        Figure with other joints that the bodies move instead of the model.
+    swings : bool
+        Whether joints of later people swing, such as hair.
     """
 
     capture: Capture
@@ -77,6 +83,8 @@ class Builder:
     has_shape: bool = False
     has_expression: bool = False
     path: Path | None = None
+    target: Figure | None = None
+    swings: bool = False
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
@@ -126,6 +134,8 @@ class Builder:
         self.n_read = max(self.n_read, part.stop)
         notes += self._shape_notes()
         for actor in new:
+            if self.swings:
+                actor.springs = springs_for(actor, self.up)
             pose_actor(actor, 0.0)
         fresh = {str(note): note for note in reversed(notes) if str(note) not in self._notes}
         self._notes.update(fresh)
@@ -134,6 +144,7 @@ class Builder:
     def _shape_notes(self) -> list[Diagnostic]:
         """At the end, return a message if bodies have the mean shape because none was given."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
+        lacks = lacks and self.target is None
         if not (self.is_done and self.keeps_shape and lacks):
             return []
         return [Diagnostic("F007.no-shapes", self.path)]
@@ -145,10 +156,14 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)
+        if self.target is not None:
+            clip, more = carried_clip(self.model, clip, self.up, self.target)
+            notes += more
         actor = self._bodies.get(person)
         if actor is None:
-            actor = self._actor(self.model, clip, person)
-            actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
+            actor = self._actor(self.target or self.model, clip, person)
+            if self.target is None:
+                actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
             self._bodies[person] = actor
             new.append(actor)
         else:
@@ -190,6 +205,11 @@ class Builder:
         """All people found so far, bodies first."""
         return [*self._bodies.values(), *self._points.values()]
 
+    @property
+    def has_bodies(self) -> bool:
+        """Whether anybody found so far is more than keypoints."""
+        return bool(self._bodies)
+
     def place(self, up: str) -> None:
         """Rotate all people upright, including later ones, if the up axis is negative.
 
@@ -205,6 +225,28 @@ class Builder:
             self.placement = rotation_transform(0, np.pi)
             for actor in self.actors:
                 actor.placement = self.placement.copy()
+
+    def carry_to(self, target: Figure) -> list[Diagnostic]:
+        """Let the bodies, including later ones, move another figure; ``place`` comes first.
+
+        Returns messages about matched joints. Raises RigError if too few match; nothing changes
+        then.
+        """
+        notes: list[Diagnostic] = []
+        clips: list[tuple[Actor, SampledClip]] = []
+        for actor in self._bodies.values():
+            assert isinstance(actor.clip, SampledClip)  # set when the actor was made
+            clip, said = carried_clip(self.model, actor.clip, self.up, target)
+            clips.append((actor, clip))
+            notes += said
+        self.target = target
+        for actor, clip in clips:
+            actor.figure, actor.clip, actor.color = target, clip, None
+            actor.pose = figure_pose(target)
+            pose_actor(actor, 0.0)
+        fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
+        self._notes.update(str(note) for note in fresh.values())
+        return [*reversed(fresh.values())]
 
     def refusal(self, problem: RigError) -> RigError:
         """Return an error that also names the model that would match."""

@@ -115,6 +115,10 @@ def read_files(
                 called = contents.called.get(source.path.resolve(), source.path.stem)
                 contents.called[path.resolve()] = called
                 sources.append(Source.open(path, max_size))
+    for path in (settings or MotionSettings()).motions:
+        source = Source.open(path, max_size)
+        sources.append(source)
+        _add_motion(source, contents, settings or MotionSettings())
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
@@ -192,6 +196,19 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             images=settings.images,
         )
     return read(source)
+
+
+def _add_motion(source: Source, contents: Contents, settings: MotionSettings) -> None:
+    """Read a file that is given as a motion: a skeleton's, a body's, or a figure's animation."""
+    content = _read(source, settings)
+    kind = type(content).__name__
+    if kind in ("BodyMotion", "Capture", "Clip"):
+        getattr(contents, _LISTS[kind]).append((source.path, content))
+        return
+    from viewer.loading.figure_motions import motion_in
+
+    motion = motion_in(source, content, settings.animation)
+    contents.skeleton_motions.append((source.path, motion))
 
 
 def _is_picture(source: Source) -> bool:

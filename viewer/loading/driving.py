@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
+from viewer.loading.carrying import carried_clip, has_joints
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
@@ -53,11 +55,11 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
-        model, is_bundled = _model(cast, named)
+        model, is_bundled, target = _model(contents, cast, named)
         for path, body in contents.body_motions:
-            _give_body_motion(path, body, cast, settings, model, is_bundled)
+            _give_body_motion(path, body, cast, settings, model, is_bundled, target)
         for path, capture in contents.captures:
-            _begin_capture(path, capture, cast, settings, model, is_bundled)
+            _begin_capture(path, capture, cast, settings, model, is_bundled, target)
     if lone:
         from viewer.loading.skeleton_motions import agree_on_units
 
@@ -102,9 +104,14 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 
 
 def is_body(figure: Figure) -> bool:
-    """Return whether a figure can show captured bodies: it has the family's root and a mesh."""
+    """Return whether a figure can show captured bodies: it has the family's root and a mesh.
+
+    A VRM character is none, whatever its joints are called: its rest pose and origin differ.
+    """
     skeleton = figure.skeleton
-    return skeleton is not None and figure.mesh is not None and skeleton.names[0] in _ROOTS
+    if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
+        return False
+    return skeleton.names[0] in _ROOTS
 
 
 def _named_model(cast: Cast, path: Path | None) -> Figure | None:
@@ -122,20 +129,31 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
     return model
 
 
-def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
+def _model(
+    contents: Contents, cast: Cast, named: Figure | None
+) -> tuple[Figure, bool, Figure | None]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
-    A body model among the files is not shown as an actor of its own.
+    A body model among the files is not shown as an actor of its own. The third result is a figure
+    with other joints that the bodies move: that of ``--model``.
     """
     if named is not None:
-        return named, False
+        moves = [body.joint_names for _, body in contents.body_motions]
+        own = any(has_joints(named, names) for names in moves)
+        if is_body(named) or (own and named.require_skeleton().humanoid is None):
+            return named, False, None
+        return _bundled(), True, named
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
             figure = cast.take(index).figure
-            return figure, _is_bundled(figure)
+            return figure, _is_bundled(figure), None
+    return _bundled(), True, None
+
+
+def _bundled() -> Figure:
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
-    return body, True
+    return body
 
 
 def _is_bundled(figure: Figure) -> bool:
@@ -161,6 +179,7 @@ def _give_body_motion(
     settings: MotionSettings,
     model: Figure,
     is_bundled: bool,
+    target: Figure | None,
 ) -> None:
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
@@ -178,12 +197,30 @@ def _give_body_motion(
         up = _judged_up(path, [actor], cast)
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
+    if target is not None:
+        cast.add(_carried(path, actor, up[-1], target, cast), up[-1], placed=False)
+        return
     if is_bundled and settings.drives and _drives_character(path, motion.name, actor, up, cast):
         return
     if is_bundled:
         _note_bundled(cast, path, *lost)
     cast.diagnostics += [replace(note, path=path) for note in notes]
     cast.add(actor, up[-1], placed=False)
+
+
+def _carried(path: Path, actor: Actor, up: str, target: Figure, cast: Cast) -> Actor:
+    """Return an actor of a figure with other joints that a body moves.
+
+    Raises RigError if too few joints match.
+    """
+    assert isinstance(actor.clip, SampledClip)  # that of a captured body
+    try:
+        clip, notes = carried_clip(actor.figure, actor.clip, up, target)
+    except RigError as problem:
+        values = {"problem": problem.cause}
+        raise RigError(Diagnostic("F004.model", path, values=values)) from None
+    cast.diagnostics += [replace(note, path=path) for note in notes]
+    return Actor(target, clip=clip, placement=actor.placement, called=actor.called)
 
 
 def _drives_character(path: Path, name: str, actor: Actor, up: str, cast: Cast) -> bool:
@@ -217,6 +254,7 @@ def _begin_capture(
     settings: MotionSettings,
     model: Figure,
     is_bundled: bool,
+    target: Figure | None,
 ) -> None:
     """Read a capture until the first person appears; the rest is read later."""
     called = cast.free_title(capture.name)
@@ -227,14 +265,38 @@ def _begin_capture(
             cast.diagnostics += builder.read_some()[1]
         except RigError as problem:
             raise builder.refusal(problem) from None
-    if is_bundled and any(actor.figure is model for actor in builder.actors):
-        _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
+    builder.swings = settings.springs
+    _carry(builder, cast, target, drives=is_bundled and settings.drives)
+    if is_bundled and any(actor.figure is model for actor in builder.actors):
+        _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     to_capture = builder.placement[:3, :3].T
     cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
+
+
+def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) -> None:
+    """Let captured bodies move a figure with other joints: the requested one, or one that is open.
+
+    Raises RigError if too few joints of the requested figure match.
+    """
+    if target is not None:
+        try:
+            cast.diagnostics += builder.carry_to(target)
+        except RigError as problem:
+            values = {"problem": problem.cause}
+            raise RigError(Diagnostic("F004.model", builder.path, values=values)) from None
+        return
+    if not (drives and builder.has_bodies):
+        return
+    for index, actor in enumerate(cast.actors):
+        if actor.clip is None and actor.figure.is_attached:
+            with contextlib.suppress(RigError):
+                cast.diagnostics += builder.carry_to(actor.figure)
+                cast.take(index)
+                return

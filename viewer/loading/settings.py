@@ -39,6 +39,11 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
+    motions : tuple of Path
+        Further files whose motion drives a figure: their first animation, or the one of the name
+        ``animation``.
+    springs : bool
+        Whether joints that swing, such as hair, are simulated while a motion plays.
     """
 
     model: Path | None = None
@@ -51,3 +56,5 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
+    motions: tuple[Path, ...] = ()
+    springs: bool = False

@@ -2,13 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from viewer.rig.arrays import Ints
 
-__all__ = ["FileRecord"]
+__all__ = ["FileRecord", "StoredImage", "StoredTextures", "VrmRecord"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredImage:
+    """An encoded image.
+
+    Attributes
+    ----------
+    name : str
+        Name in the file; may be empty.
+    data : bytes
+        The encoded image.
+    """
+
+    name: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoredTextures:
+    """Textures of a glTF file as it lists them.
+
+    Attributes
+    ----------
+    textures, samplers : tuple
+        As parsed from JSON.
+    image : callable
+        Returns an image by its index; None if it cannot be read.
+    """
+
+    textures: tuple[Any, ...]
+    samplers: tuple[Any, ...]
+    image: Callable[[int], StoredImage | None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VrmRecord:
+    """Extensions of a VRM file as parsed from JSON, and what their indices refer to.
+
+    Attributes
+    ----------
+    version : int
+        0 for the extension ``VRM``, 1 for ``VRMC_vrm``.
+    extensions : mapping
+        Extensions of the root.
+    joints, parts : mapping of int
+        Joint, and part of the mesh, of each node that has one.
+    meshes : mapping of int
+        Mesh of each node in ``parts``.
+    materials : tuple of int
+        Index in the file of each material of the figure's mesh.
+    toon : mapping
+        Extensions ``VRMC_materials_mtoon`` and ``KHR_materials_unlit`` of the file's materials, by
+        index.
+    textures : StoredTextures or None
+        Textures of the file.
+    """
+
+    version: int
+    extensions: Mapping[str, Any]
+    joints: Mapping[int, int]
+    parts: Mapping[int, int]
+    meshes: Mapping[int, int]
+    materials: tuple[int, ...]
+    toon: Mapping[int, Any]
+    textures: StoredTextures | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,6 +96,8 @@ class FileRecord:
         Blend shapes that are the morph targets of each part, in the order of its mesh.
     target_names : tuple of P tuple of str
         Their names in the file, which may repeat between parts or be empty.
+    vrm : VrmRecord or None
+        Properties of a VRM character.
     """
 
     copyright: str = ""
@@ -40,3 +108,4 @@ class FileRecord:
     mesh_names: tuple[str, ...] = ()
     part_shapes: tuple[Ints, ...] = ()
     target_names: tuple[tuple[str, ...], ...] = ()
+    vrm: VrmRecord | None = None

@@ -127,6 +127,12 @@ class Material:
         Whether back faces are drawn: the counter-clockwise side is the front.
     unlit : bool
         Whether the base colour is shown without lighting.
+    shade_color : (r, g, b) or None
+        Linear colour of the side away from the key light in toon shading; None without it.
+    shade_texture : Texture or None
+        Colour that multiplies ``shade_color``, sRGB.
+    shade_range : (float, float)
+        Cosines of the angle of incidence at which the fraction of the base colour is 0 and 1.
     is_physical : bool
         Whether the file describes the surface by metalness and roughness, or as unlit.
     """
@@ -148,6 +154,9 @@ class Material:
     alpha_cutoff: float = 0.5
     double_sided: bool = True
     unlit: bool = False
+    shade_color: tuple[float, float, float] | None = None
+    shade_texture: Texture | None = None
+    shade_range: tuple[float, float] = (-0.1, 0.1)
     is_physical: bool = False
 
     def __post_init__(self) -> None:
@@ -158,6 +167,10 @@ class Material:
         _check_numbers("emissive", self.emissive, count=3)
         if self.base_color is not None:
             _check_numbers("base_color", self.base_color, 1.0, count=4)
+        if self.shade_color is not None:
+            _check_numbers("shade_color", self.shade_color, 1.0, count=3)
+        if not np.isfinite(self.shade_range).all():
+            raise RigError(f"shade_range: expected finite numbers, found {self.shade_range}")
         if not np.isfinite(self.normal_scale):
             raise RigError(f"normal_scale: expected a finite number, found {self.normal_scale}")
 
@@ -193,7 +206,7 @@ class Material:
 
 TEXTURES = (
     *("base_texture", "metallic_texture", "roughness_texture"),
-    *("normal_texture", "occlusion_texture", "emissive_texture"),
+    *("normal_texture", "occlusion_texture", "emissive_texture", "shade_texture"),
 )
 """Fields of a material that contain textures."""
 

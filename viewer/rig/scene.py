@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
 
@@ -23,6 +23,7 @@ __all__ = [
     "Actor",
     "Motion",
     "Scene",
+    "Swinging",
     "actor_points",
     "figure_pose",
     "free_title",
@@ -47,6 +48,13 @@ Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 _OUTLIER_FRACTION = 0.001
 # ... if the box of all points is this many times larger.
 _OUTLIER_RATIO = 100.0
+
+
+class Swinging(Protocol):
+    """Simulation of spring joints; see ``viewer.rig.motion.spring_motion``."""
+
+    def swing(self, actor: Actor, time: float) -> None:
+        """Rotate the spring joints of an actor that its clip has posed for a time, in place."""
 
 
 @dataclass(slots=True, eq=False)
@@ -85,6 +93,8 @@ class Actor:
         Name of the recording opened for this actor; empty to use the figure's name.
     hidden_parts : frozenset of int
         Parts of the mesh that are not drawn, by index.
+    springs : Swinging or None
+        Simulation of its spring joints while its clip plays; None leaves them to the clip.
     """
 
     figure: Figure
@@ -102,6 +112,7 @@ class Actor:
     animation: int = -1
     origin: Path | None = None
     hidden_parts: frozenset[int] = frozenset()
+    springs: Swinging | None = None
 
     @property
     def title(self) -> str:

@@ -12,6 +12,7 @@ from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.humanoid import Humanoid
+from viewer.rig.springs.springs import Springs
 
 __all__ = [
     "DOF_KINDS",
@@ -66,6 +67,8 @@ class Skeleton:
         Joints with the standard names of human bones, if the file states them.
     constraints : tuple of Constraint
         Joints that follow others, in the order of evaluation; at most one per joint.
+    springs : Springs or None
+        Joints that swing while a motion plays.
     """
 
     names: tuple[str, ...]
@@ -81,6 +84,7 @@ class Skeleton:
     auxiliary: Bools | None = None
     humanoid: Humanoid | None = None
     constraints: tuple[Constraint, ...] = ()
+    springs: Springs | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

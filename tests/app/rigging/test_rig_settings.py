@@ -258,11 +258,11 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand.state.of(Files).dialog.enter(tmp_path)
     hand.step(2)
     hand.key("a", "ctrl")
-    hand.type("arm3.glb")
+    hand.type("arm3.fbx")
     hand.step()
     hand.click("Save###Save")
     hand.finish_job()
-    assert hand.state.error.startswith('a rigged mesh cannot be written as ".glb"; supported: ')
+    assert hand.state.error.startswith('a rigged mesh cannot be written as ".fbx"; supported: ')
 
 
 def test_report_is_copied(rigging, texts):

@@ -221,9 +221,3 @@ def test_only_gltf_is_optimised(tmp_path, capsys):
     command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]
     assert run(command) == 2
     assert "--optimize: expected .glb or .gltf, found .bvh" in capsys.readouterr().err
-
-
-def test_vrm_is_refused_with_the_alternative(tmp_path, capsys):
-    export_clips(Actor(two_parts()), tmp_path / "in.glb")
-    assert run(["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.vrm"]) == 2
-    assert "VRM files cannot be written: use .glb" in capsys.readouterr().err

@@ -26,7 +26,7 @@ SHADERS = ["VRM/MToon", "VRM/UnlitTexture", "VRM_USE_GLTFSHADER", 5]
         ({"extensions": {"VRM": {"materialProperties": {}}}}, [False, True, False]),
     ],
 )
-def test_toon_materials_are_unlit_with_a_note(
+def test_toon_materials_ignore_the_studio_with_a_note(
     tmp_path: Path, members: dict[str, Any], unlit: list[bool]
 ) -> None:
     color = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]}
@@ -41,3 +41,41 @@ def test_toon_materials_are_unlit_with_a_note(
     assert found[0].base_color == (0.5, 0.25, 0.125, 1.0)
     (note,) = source.diagnostics
     assert (note.key, note.values["n"]) == ("F007.gltf-toon", 1)
+
+
+def _read(tmp_path: Path, **members: Any) -> Any:
+    path = tmp_path / "hero.gltf"
+    path.write_text(json.dumps({"asset": {"version": "2.0"}, "materials": [{}], **members}))
+    return read_materials(open_document(Source.open(path)))[0]
+
+
+def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) -> None:
+    toon = {"shadeColorFactor": [0.5, 0.25, 0.0], "shadingToonyFactor": 0.75}
+    toon["shadingShiftFactor"] = -0.5
+    material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
+    assert material.shade_color == (0.5, 0.25, 0.0)
+    # From toony - 1 - shift to 1 - toony - shift.
+    assert material.shade_range == (0.25, 0.75)
+    plain = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": {}}}])
+    assert plain.shade_color == (0.0, 0.0, 0.0)
+    assert plain.shade_range == pytest.approx((-0.1, 0.1), abs=1e-12)
+
+
+def test_old_toon_materials_have_srgb_colours_and_other_thresholds(tmp_path: Path) -> None:
+    told = {
+        "shader": "VRM/MToon",
+        "vectorProperties": {"_ShadeColor": [1.0, 0.5, 0.0, 1.0]},
+        "floatProperties": {"_ShadeToony": 0.5, "_ShadeShift": 0.0},
+    }
+    material = _read(tmp_path, extensions={"VRM": {"materialProperties": [told]}})
+    # 0.5 in sRGB: ((0.5 + 0.055) / 1.055) ^ 2.4.
+    assert material.shade_color == pytest.approx((1.0, 0.2140411, 0.0), abs=1e-7)
+    # toony = lerp(0.5, 1, 0.5) = 0.75, shift = -0 - 0.25: lit from 0 to 0.5.
+    assert material.shade_range == pytest.approx((0.0, 0.5), abs=1e-12)
+
+
+def test_invalid_toon_values_are_those_without_shade(tmp_path: Path) -> None:
+    toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
+    material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
+    assert material.unlit and material.shade_color == (1.0, 1.0, 1.0)
+    assert material.shade_range == (0.0, 0.0)

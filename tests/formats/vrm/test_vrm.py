@@ -120,20 +120,6 @@ def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
     assert (found.key, found.pointer) == ("G006.first-person", place)
 
 
-@pytest.mark.parametrize(
-    "extension",
-    [
-        {"VRMC_springBone": {"springs": [{"joints": []}, {"joints": []}]}},
-        {"VRM": {"secondaryAnimation": {"boneGroups": [{"bones": [1]}, {"bones": [2]}]}}},
-    ],
-)
-def test_spring_chains_are_counted(tmp_path: Path, extension: dict[str, Any]) -> None:
-    scene, _ = _loaded(_file(**extension), tmp_path)
-    assert [(found.key, found.values["n"]) for found in scene.diagnostics] == [
-        ("F007.vrm-springs", 2)
-    ]
-
-
 def test_permissions_are_listed_in_the_facts(tmp_path: Path) -> None:
     _, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     facts = dict(figure.facts)

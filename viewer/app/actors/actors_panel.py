@@ -5,6 +5,7 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import Following, start_following, stop_following
+from viewer.app.actors.springs import toggle_springs
 from viewer.app.core.fields import begin_field, drag_float, in_row
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
@@ -18,6 +19,7 @@ from viewer.app.core.widgets import (
 from viewer.phrases import printable
 from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
+from viewer.rig.motion.spring_motion import has_springs
 from viewer.rig.scalars import length_unit
 from viewer.rig.scene import Actor
 
@@ -36,6 +38,7 @@ def draw(state: AppState) -> None:
     actor = state.actor
     imgui.separator()
     _draw_place(state, actor)
+    _draw_springs(state, actor)
     _draw_following(state)
     _draw_motion_paths(state, actor)
     _draw_fit(state, actor)
@@ -100,6 +103,16 @@ def _draw_place(state: AppState, actor: Actor) -> None:
 
     in_row(begin_field("Position"), range(3), draw_axis)
     note_item(state, "Position")
+
+
+def _draw_springs(state: AppState, actor: Actor) -> None:
+    """Draw the switch of joints that swing, if the chosen actor has any."""
+    if not has_springs(actor):
+        return
+    is_on = actor.springs is not None
+    if checkbox(state, "Springs", is_on) != is_on:
+        toggle_springs(state)
+    explain("simulate hair and clothes while a motion plays; exported motions do not include this")
 
 
 def _draw_following(state: AppState) -> None:

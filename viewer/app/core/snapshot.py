@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.pose import Pose, PoseKey, pose_key, pose_of
-from viewer.rig.scene import Actor, Motion, Scene
+from viewer.rig.scene import Actor, Motion, Scene, Swinging
 
 __all__ = [
     "Look",
@@ -36,6 +36,7 @@ class Look:
     placement: bytes
     hidden_parts: frozenset[int]
     animation: int
+    springs: Swinging | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +85,7 @@ def look_of(actor: Actor) -> Look:
     placement = actor.placement.tobytes()
     hidden, number = actor.hidden_parts, actor.animation
     look = actor.clip, actor.offset, actor.visible, actor.color, placement, hidden, number
-    return Look(*look)
+    return Look(*look, actor.springs)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -97,6 +98,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.color == look.color
         and actor.hidden_parts == look.hidden_parts
         and actor.animation == look.animation
+        and actor.springs is look.springs
         and actor.placement.tobytes() == look.placement
     )
 
@@ -143,7 +145,7 @@ def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:
     """Restore the display settings and placements of a snapshot's actors and scene."""
     for actor, look in zip(snapshot.actors, snapshot.looks, strict=True):
         actor.visible, actor.color = look.visible, look.color
-        actor.hidden_parts = look.hidden_parts
+        actor.hidden_parts, actor.springs = look.hidden_parts, look.springs
         actor.placement = np.frombuffer(look.placement).reshape(4, 4).copy()
     kept = copy.deepcopy(snapshot.options)
     for name in DisplayOptions.__slots__:

@@ -31,7 +31,10 @@ def pose_formats() -> dict[str, Exporter]:
 
 def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
     """Draw the list of formats of poses."""
-    draw_formats(state, dialog, pose_formats(), {})
+    record = state.actor.figure.record
+    is_vrm = record is not None and record.vrm is not None
+    why = "other figures need an author and a licence: viewer convert --vrm-author, --vrm-licence"
+    draw_formats(state, dialog, pose_formats(), {} if is_vrm else {".vrm": why})
 
 
 def draw_formats(

@@ -21,6 +21,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import motion_paths
+from viewer.export._vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
 from viewer.rig.captures.points import PointClip
@@ -28,6 +29,7 @@ from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
@@ -72,7 +74,10 @@ def unsuited_formats(actor: Actor) -> dict[str, str]:
     """Return why formats cannot hold the motion of an actor, by suffix."""
     skeleton = actor.figure.skeleton
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
-    return {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
+    found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
+    if skeleton is not None and not is_humanoid(actor.figure):
+        found[".vrma"] = "for humanoids only: some human bones are not found"
+    return found
 
 
 def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
@@ -166,6 +171,13 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change what is written.
         copied = actor.copy()
+        if actor.springs is not None and isinstance(actor.clip, JointMotion):
+            copied.springs = None
+            release_springs(copied)
+            springs = actor.figure.require_skeleton().springs
+            count = 0 if springs is None else springs.n_joints
+            values = {"figure": actor.name, "n": count}
+            notes.append(Diagnostic("X003.springs", values=values))
         is_keyed = isinstance(actor.clip, Clip | TransformClip)
         rate = state.clock.frame_rate if is_keyed else None
         parts.append(_Part(copied, file, frames, rate, number))

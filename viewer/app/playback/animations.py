@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 from viewer.app.core.state import AppState
 from viewer.errors import FormatError
 from viewer.phrases import printable
-from viewer.rig.motion.animation_choice import animation_labels, counterpart, play_animation
+from viewer.rig.motion.animation_choice import (
+    animation_labels,
+    counterpart,
+    own_first,
+    play_animation,
+)
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor
@@ -111,6 +116,8 @@ def _clips(
         number = -1
         if index >= 0:
             number = counterpart(actor.figure, chosen.figure.animations[index])
+            if number < 0 and own_first(actor.figure, [chosen.figure]) == 0:
+                continue  # another character of the file keeps playing its own
         if actor is not chosen and played(actor) == NOT_ONE:
             continue  # the actor has a motion from another file
         clip = None if number < 0 else actor.figure.animations[number].clip()

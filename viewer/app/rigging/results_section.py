@@ -162,7 +162,7 @@ def _ask_where(state: AppState, result: Result) -> None:
         folder_of(state.paths),
         lambda state, paths: save_rigged(state, result, paths[0]),
         "save",
-        "Save rigged mesh: .npz, or .skel with .skin, .obj and .json",
+        "Save rigged mesh: .npz, .glb, or .skel with .skin, .obj and .json",
         RIGGED_SUFFIXES,
         name,
         written=_written,

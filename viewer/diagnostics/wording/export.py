@@ -26,6 +26,9 @@ MESSAGES = {
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
     "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size} bytes",
+    "X001.vrm": "VRM {version}: {parts:all}",
+    "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, {size} "
+    "bytes",
     "X001.gltf-arrays": "array data, {size} bytes",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
@@ -74,8 +77,9 @@ MESSAGES = {
     "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
     "X003.bvh-joint-scales": "BVH cannot animate scales of joints ({low:g} to {high:g}): only the "
     "positions of joints follow them",
-    "X003.rigged-correctives": "pose correctives cannot be stored in .skel and .skin: the rest "
-    "mesh is adjusted to match the target without them",
+    "X003.rigged-correctives": "pose correctives are not stored: the rest mesh is adjusted to "
+    "match the target without them",
+    "X003.rigged-pose": "the figure is at rest: .npz and .skel also store the target's pose",
     "X003.empty-mesh": "the mesh has no vertices and is omitted",
     "X003.absent": "{figure:text}: absent in {frames}, not written",
     "X003.absent-now": "{figure:text}: absent at that time, not written",
@@ -85,6 +89,12 @@ MESSAGES = {
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
     "keypoints3d folder",
+    "X003.springs": "{figure:text}: {n:#joint} that {n:?swings|swing} {n:?has|have} the rotations "
+    "of the clip; viewer convert --bake-springs writes the simulated ones",
+    "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
+    "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
+    "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
+    "X003.vrma-joints": "{n:#joint} that {n:?is|are} no human {n:?bone|bones} {n:?is|are} omitted",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
     "X002.of-figure": "{figure:text}: {remark}",
@@ -121,6 +131,9 @@ MESSAGES = {
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
+    "X005.t-pose": "the rest pose is a T-pose, as VRM requires: joints are rotated by up to "
+    "{degrees:.3g} degrees",
+    "X005.vrm-licence": "programs may refuse a VRM 1.0 file with another licence than {licence}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,
@@ -133,6 +146,8 @@ MESSAGES = {
     "--model for exact translations)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
+    "X005.springs-baked": "{figure:text}: simulated rotations of {n:#joint} that {n:?swings|swing} "
+    "are written",
     "X005.untracked": "{names:all}: not tracked, possibly a different person in each frame",
     "X005.of-person": "{person}: {remark}",
     "X005.of-figure": "{figure:text}: {remark}",
@@ -153,6 +168,17 @@ PHRASES = {
     "written-animations": "{n:#animation}",
     "missing-frame": "{frame}",
     "missing-frames": "{first} to {last}",
+    "vrm-bones": "{n:#human bone}",
+    "vrm-expressions": "{n:#expression}",
+    "vrm-springs": "{n:#spring chain}",
+    "lost-bones": "{n:#human bone}",
+    "lost-annotations": "{n:#first-person setting}",
+    "lost-morph-binds": "{n:#bind} of morph targets",
+    "lost-material-binds": "{n:#bind} of materials",
+    "lost-textures": "{n:#texture}",
+    "lost-colliders": "{n:#collider}",
+    "lost-spring-joints": "{n:#joint} of springs",
+    "lost-centers": "{n:#centre} of springs",
     # Replacements of missing frames
     "pose-held": "the last pose is held",
     "pose-held-and-marked": "the last pose is held, and the frames are marked in present",

@@ -20,6 +20,9 @@ MESSAGES = {
     "G006.constraint": "invalid constraint ignored: expected {expected}",
     "F002.constraint-cycle": "expected constraints without cycles, found a cycle of "
     "nodes {nodes:list12}",
+    "G006.spring": "invalid spring chain ignored: expected nodes, each below the one before, and "
+    "finite numbers",
+    "G006.collider": "invalid collider ignored: expected a node, and a sphere or a capsule",
     "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
     "found {found:quoted}: ignored",
     "F002.vrma-bones": "expected nodes of human bones, found none",
@@ -28,7 +31,6 @@ MESSAGES = {
     "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
     "F007.vrma-look": "gaze direction is not shown",
     "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
-    "F007.vrm-springs": "{n:#spring chain} not simulated: hair and clothes follow their joints",
     "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",

@@ -10,6 +10,7 @@ MESSAGES = {
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
     "F002.no-body-model": "--model: not a body model",
+    "F002.no-motion": "--motion: expected a motion or an animation of a skeleton, found none",
     "F004.animation": "no animation is called {name:quoted}; {hint}",
     "F004.no-animations": "no animation is called {name:quoted}: the files have none",
     "F004.capture": "{problem}; specify the model with --model",
@@ -40,6 +41,11 @@ MESSAGES = {
     "F007.only-morphs": "{figure:text}: without its .skel, only blend shapes deform it",
     "F007.several-pictures": "{n:d} images in the folder: specify the texture to show",
     "F007.stands-alone": "shown separately: {problem}",
+    "F004.vrm-bones": "{figure:text} cannot be written as VRM: {n:#required human bone} not found: "
+    "{names:list12}",
+    "F004.vrm-meta": "{figure:text} cannot be written as VRM without author and licence: add "
+    "--vrm-author NAME and --vrm-licence {licence}, the VRM Public Licence with the strictest "
+    "permissions",
     "F007.unit-taken": "{note}; --unit overrides it",
     "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the others; --unit "
     "overrides it",

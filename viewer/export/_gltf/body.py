@@ -49,6 +49,7 @@ class Built:
     counts: list[Phrase]
     errors: dict[str, float]  # of quantised attributes
     roots: list[int]  # nodes of the scene
+    materials: dict[int, int]  # written material of each material of the mesh
 
 
 def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:
@@ -91,10 +92,11 @@ def add_body(
         add_record(document, record, tree.joints)
     scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
     errors: dict[str, float] = {}
+    materials: dict[int, int] = {}
     if figure.mesh is not None and figure.mesh.n_vertices:
         encoding = _encoding(document, body, optimizes)
         errors = encoding.errors
-        meshes = _add_meshes(encoding, body, tree, color)
+        meshes, materials = _add_meshes(encoding, body, tree, color)
         scene += _place_meshes(document, body, tree, meshes)
         written, before = sum(len(each.part.sources) for each in meshes), figure.mesh.n_vertices
         key = "written-vertices" if written == before else "split-vertices"
@@ -105,7 +107,7 @@ def add_body(
     if "scenes" not in document.root:
         document.root["scene"] = document.add("scenes", {"nodes": []})
     document.root["scenes"][0]["nodes"] += scene
-    return Built(tree, meshes, counts, errors, scene)
+    return Built(tree, meshes, counts, errors, scene, materials)
 
 
 def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
@@ -120,8 +122,10 @@ def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
     return quantized(document, body.figure.require_mesh().positions, offsets)
 
 
-def _add_meshes(encoding: Encoding, body: Body, tree: Tree, color: Color | None) -> list[Placed]:
-    """Add the parts of a figure, each with its node."""
+def _add_meshes(
+    encoding: Encoding, body: Body, tree: Tree, color: Color | None
+) -> tuple[list[Placed], dict[int, int]]:
+    """Add the parts of a figure, each with its node; return also the written materials."""
     figure, meshes, document = body.figure, list[Placed](), encoding.document
     record = figure.record
     materials = Materials(document, figure.require_mesh(), color, record is not None)
@@ -136,7 +140,7 @@ def _add_meshes(encoding: Encoding, body: Body, tree: Tree, color: Color | None)
                 item["extras"] = record.part_extras[part.index]
             node = document.add("nodes", {**item, "mesh": mesh})
         meshes.append(Placed(node, part, encoding.decoding if part.joint < 0 else np.eye(4)))
-    return meshes
+    return meshes, materials.written
 
 
 def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Placed]) -> list[int]:

@@ -46,6 +46,7 @@ class Document:
         self._name = name
         self._parts: list[bytes] = []
         self._size = 0
+        self._pictures: dict[bytes, int] = {}
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
         """Append an item to ``nodes``, ``meshes`` … and return its index."""
@@ -119,10 +120,12 @@ class Document:
         return self.add("accessors", accessor)
 
     def picture(self, data: bytes, name: str) -> int:
-        """Add an image, the bytes of a PNG or JPEG file; return its index in ``images``."""
+        """Add an image, the bytes of a PNG or JPEG file, once; return its index in ``images``."""
         kind = "image/png" if data.startswith(b"\x89PNG") else "image/jpeg"
-        image = {"name": text_of(name), "mimeType": kind, "bufferView": self._view(data, 0)}
-        return self.add("images", image)
+        if data not in self._pictures:
+            image = {"name": text_of(name), "mimeType": kind, "bufferView": self._view(data, 0)}
+            self._pictures[data] = self.add("images", image)
+        return self._pictures[data]
 
     def glb(self) -> bytes:
         """Return everything as one binary file.

@@ -107,8 +107,13 @@ def place_figures(
     return placing
 
 
-def figure_losses(added: Added, path: Path, file: GltfFile, skinning: Skinning) -> list[Diagnostic]:
-    """Return notes with the largest errors of a figure, and about data that is not written."""
+def figure_losses(
+    added: Added, path: Path, file: GltfFile, skinning: Skinning, is_vrm: bool = False
+) -> list[Diagnostic]:
+    """Return notes with the largest errors of a figure, and about data that is not written.
+
+    ``is_vrm``: whether its extensions hold what only VRM has.
+    """
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes
     if added.clips is None:
@@ -127,7 +132,7 @@ def figure_losses(added: Added, path: Path, file: GltfFile, skinning: Skinning) 
             values = {"names": early, "n": len(early)}
             notes.append(Diagnostic("X005.negative-times", values=values))
         notes += _without_effect(added, added.clips)
-    return notes + not_held(figure, body.shape)
+    return notes + not_held(figure, body.shape, is_vrm)
 
 
 def _without_effect(added: Added, clips: Sequence[TransformClip]) -> list[Diagnostic]:

@@ -186,8 +186,11 @@ def _weights_phrase(influences: Influences) -> Phrase:
     return Phrase(key, n=n, negative=negative)
 
 
-def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
-    """Return a note that lists the parts of a figure that the file does not contain."""
+def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
+    """Return a note that lists the parts of a figure that the file does not contain.
+
+    ``is_vrm``: whether its extensions hold what only VRM has.
+    """
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())
     mixed = 0 if shapes is None else sum(shapes.is_expression(row) for row in rows)
@@ -196,14 +199,14 @@ def not_held(figure: Figure, shape: Shape) -> list[Diagnostic]:
         lost.append(Phrase("part-baked-shapes", n=figure.n_shapes))
     elif unused > 0:
         lost.append(Phrase("part-blend-shapes", n=unused))
-    if mixed and shape.baked is None:
+    if mixed and shape.baked is None and not is_vrm:
         lost.append(Phrase("part-expressions", n=mixed))
-    if skeleton is not None and skeleton.humanoid is not None:
+    if skeleton is not None and skeleton.humanoid is not None and not is_vrm:
         lost.append(Phrase("part-humanoid"))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)
-    if skeleton is not None and skeleton.constraints:
+    if skeleton is not None and skeleton.constraints and not is_vrm:
         lost.append(Phrase("part-constraints", n=len(skeleton.constraints)))
     if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))

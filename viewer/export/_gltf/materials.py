@@ -47,6 +47,11 @@ class Materials:
         self._textures: dict[tuple[int, int], int] = {}
         self._samplers: dict[tuple[Any, ...], int] = {}
 
+    @property
+    def written(self) -> dict[int, int]:
+        """Index in the document of each material of the mesh that has been added."""
+        return {index: added for index, added in self._added.items() if index >= 0}
+
     def plain(self, name: str = "plain") -> int:
         """Add a material without textures; return its index."""
         return self._add(name, {"baseColorFactor": [*self._color, 1.0], **_MATTE})

@@ -32,10 +32,13 @@ from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
 from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._gltf_materials.stored import stored_textures, stored_toon
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._source import Source
 
 __all__ = ["read_nodes"]
+
+_VRM = {"VRM", "VRMC_vrm"}
 
 
 def read_nodes(source: Source) -> NodeFile:
@@ -63,7 +66,8 @@ def read_nodes(source: Source) -> NodeFile:
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
         meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
         materials = (*materials, DEFAULT_MATERIAL)
-    root = document.root
+    root, extensions = document.root, _object(document, "extensions")
+    is_vrm = not _VRM.isdisjoint(extensions)
     return NodeFile(
         name=source.path.stem,
         tree=tree,
@@ -73,10 +77,12 @@ def read_nodes(source: Source) -> NodeFile:
         materials=materials,
         animations=read_animations(document, Targets(tree, meshes)),
         cameras=read_cameras(document),
-        extensions=_object(document, "extensions"),
+        extensions=extensions,
         extras=root.values.get("extras"),
         asset=_object(document, "asset"),
         has_pointers=True,
+        toon=stored_toon(document) if is_vrm else {},
+        textures=stored_textures(document) if is_vrm else None,
     )
 
 

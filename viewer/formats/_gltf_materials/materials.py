@@ -20,7 +20,7 @@ from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossines
 from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
 from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.textures import Slot, read_slot
-from viewer.formats._gltf_materials.toon import MTOON, unlit_by_vrm
+from viewer.formats._gltf_materials.toon import MTOON, Toon, read_toon
 from viewer.rig.material import ALPHA_MODES, Material
 
 __all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "read_materials"]
@@ -90,8 +90,8 @@ def read_materials(document: Document) -> tuple[Material, ...]:
         lenient(document.source, partial(table.__getitem__, index), neutral)
         for index in range(len(table))
     ]
-    unlit = unlit_by_vrm(document, elements)
-    stated = [_stated(document, each, index in unlit) for index, each in enumerate(elements)]
+    toon = read_toon(document, elements)
+    stated = [_stated(document, each, toon.get(index)) for index, each in enumerate(elements)]
     _report(document, elements, stated)
     used = [slot for one in stated for slot in _slots(one)]
     images = decoded_images(document, (slot.image for slot in used if slot.image >= 0))
@@ -105,8 +105,8 @@ def _slots(stated: _Stated) -> list[Slot]:
     return [slot for slot in (*stated.slots.values(), *more) if slot is not None]
 
 
-def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
-    """Return the properties of a material; ``is_unlit``: whether VRM declares it unlit."""
+def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
+    """Return the properties of a material; ``toon``: if VRM declares it toon-shaded or unlit."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
@@ -124,9 +124,10 @@ def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
         "alpha_mode": _MODES[chosen(element, "alphaMode", tuple(_MODES), "OPAQUE")],
         "alpha_cutoff": bounded(element, "alphaCutoff", 0.5, 0.0, _LARGEST),
         "double_sided": lenient(source, lambda: element.flag("doubleSided"), False),
-        "unlit": is_unlit
+        "unlit": toon is not None
         or lenient(source, lambda: element.extension("KHR_materials_unlit"), None) is not None,
         "is_physical": True,
+        **({} if toon is None else toon.values),
     }
     slots = {
         "base_texture": read_slot(document, surface, "baseColorTexture"),
@@ -134,6 +135,7 @@ def _stated(document: Document, element: Element, is_unlit: bool) -> _Stated:
         "normal_texture": read_slot(document, element, "normalTexture"),
         "occlusion_texture": read_slot(document, element, "occlusionTexture"),
         "emissive_texture": read_slot(document, element, "emissiveTexture"),
+        "shade_texture": None if toon is None else toon.shade,
     }
     normal, occlusion = (element.part(name) if slots[field] else None for name, field in _FACTORED)
     if normal is not None:

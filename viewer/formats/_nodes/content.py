@@ -15,9 +15,11 @@ import numpy as np
 from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
+from viewer.rig.file_record import StoredTextures
 from viewer.rig.material import Material
 from viewer.rig.mesh import PartView
 from viewer.rig.motion.transform_clip import Interpolation, TransformPath
+from viewer.rig.springs.springs import Springs
 
 __all__ = [
     "NodeAnimation",
@@ -300,6 +302,14 @@ class NodeFile:
         Nodes (instead of joints) that follow others, in the order of evaluation.
     part_views : dict of PartView
         The views in which the meshes of some nodes are drawn.
+    springs : Springs or None
+        Nodes (instead of joints) that swing.
+    named_nodes : frozenset of int
+        Further nodes that must become joints, because extensions refer to them.
+    toon : dict
+        Toon and unlit extensions of materials by index, as parsed from JSON.
+    textures : StoredTextures or None
+        Textures as the file lists them.
     facts : tuple of (str, str)
         Further properties for ``viewer info``, each a heading and a text.
     has_pointers : bool
@@ -323,5 +333,9 @@ class NodeFile:
     expressions: tuple[NodeExpression, ...] = ()
     constraints: tuple[Constraint, ...] = ()
     part_views: Mapping[int, PartView] = field(default_factory=dict)
+    springs: Springs | None = None
+    named_nodes: frozenset[int] = frozenset()
+    toon: Mapping[int, Any] = field(default_factory=dict)
+    textures: StoredTextures | None = None
     facts: tuple[tuple[str, str], ...] = ()
     has_pointers: bool = False

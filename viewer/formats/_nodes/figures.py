@@ -72,14 +72,14 @@ def _figure(
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
-        skeleton=skeleton_of(joints, file.humanoid, file.constraints),
+        skeleton=skeleton_of(joints, file.humanoid, file.constraints, file.springs),
         skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
         up=file.up,
         unit=file.unit,
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
         facts=facts_of(file, pieces),
         animations=animations_of(file.animations, readers, joints.own, columns),
-        record=record_of(file, joints, members.meshes, columns),
+        record=record_of(file, joints, members.meshes, columns, pieces),
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)
     return figure, pieces

@@ -80,7 +80,7 @@ class _Grouping:
         self.meshes: list[int] = file.tree.meshes.tolist()
         self.roots = _roots(file.tree)
         self.is_identity = _identities(file.tree)
-        self.moved = set(file.humanoid.values())
+        self.moved = set(file.humanoid.values()) | file.named_nodes
         self.moved.update(*(animation.nodes for animation in file.animations))
         for constraint in file.constraints:
             self.moved.update((constraint.joint, constraint.source))

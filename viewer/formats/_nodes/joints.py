@@ -14,10 +14,12 @@ from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_mat
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.springs.springs import Colliders, Springs
 
 __all__ = ["Joints", "make_joints", "rest_worlds", "sheared", "skeleton_of"]
 
 _NO_ROTATION = np.array([0.0, 0.0, 0.0, 1.0])
+_BY_SPRING = ("tails", "stiffness", "drags", "gravities", "radii")
 
 
 @dataclass(slots=True, eq=False)
@@ -151,6 +153,7 @@ def skeleton_of(
     joints: Joints,
     humanoid: Mapping[str, int] | None = None,
     constraints: Iterable[Constraint] = (),
+    springs: Springs | None = None,
 ) -> Skeleton:
     """Return the skeleton: every joint of the file is a ball joint about its rest pose.
 
@@ -162,6 +165,8 @@ def skeleton_of(
         Node of each human bone; nodes that are not joints of this figure are ignored.
     constraints : iterable of Constraint
         Constraints between nodes; constraints of other figures are ignored.
+    springs : Springs, optional
+        Nodes that swing; those of other figures are ignored.
 
     Returns
     -------
@@ -195,4 +200,30 @@ def skeleton_of(
         auxiliary=is_auxiliary if is_auxiliary.any() else None,
         humanoid=Humanoid(bones) if bones else None,
         constraints=followers,
+        springs=None if springs is None else _springs_of(springs, joints.own),
+    )
+
+
+def _springs_of(springs: Springs, own: Mapping[int, int]) -> Springs | None:
+    """Return the spring joints of one figure, whose joints are not nodes; None without any."""
+    rows = [row for row, node in enumerate(springs.joints.tolist()) if node in own]
+    if not rows:
+        return None
+    shapes = springs.colliders
+    kept = [index for index, node in enumerate(shapes.joints.tolist()) if node in own]
+    places = {index: place for place, index in enumerate(kept)}
+    chosen = np.array(rows)
+    return replace(
+        springs,
+        **{name: getattr(springs, name)[chosen] for name in _BY_SPRING},
+        joints=np.array([own[int(springs.joints[row])] for row in rows]),
+        centers=np.array([own.get(int(springs.centers[row]), -1) for row in rows]),
+        colliders=Colliders(
+            np.array([own[int(shapes.joints[index])] for index in kept], np.int32),
+            *(values[kept] for values in (shapes.offsets, shapes.tails, shapes.radii)),
+        ),
+        obstacles=tuple(
+            tuple(places[index] for index in springs.obstacles[row] if index in places)
+            for row in rows
+        ),
     )

@@ -8,14 +8,19 @@ import numpy as np
 
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._nodes.joints import Joints
+from viewer.formats._nodes.surfaces import Piece, used_materials
 from viewer.rig.arrays import Ints
-from viewer.rig.file_record import FileRecord
+from viewer.rig.file_record import FileRecord, VrmRecord
 
 __all__ = ["record_of"]
 
 
 def record_of(
-    file: NodeFile, joints: Joints, nodes: list[int], columns: Mapping[int, Ints]
+    file: NodeFile,
+    joints: Joints,
+    nodes: list[int],
+    columns: Mapping[int, Ints],
+    pieces: list[Piece],
 ) -> FileRecord:
     """Return the record of one figure.
 
@@ -29,6 +34,8 @@ def record_of(
         Nodes with a mesh, one per part.
     columns : mapping of (S,) int32
         Blend shapes of each node's morph targets.
+    pieces : list of Piece
+        The primitives of the figure.
     """
     extras = file.tree.extras
     meshes = [file.meshes[int(file.tree.meshes[node])] for node in nodes]
@@ -48,4 +55,24 @@ def record_of(
         mesh_names=tuple(mesh.name for mesh in meshes),
         part_shapes=tuple(columns.get(node, none) for node in nodes),
         target_names=tuple(mesh.target_names for mesh in meshes),
+        vrm=_vrm_record(file, joints, nodes, pieces),
+    )
+
+
+def _vrm_record(
+    file: NodeFile, joints: Joints, nodes: list[int], pieces: list[Piece]
+) -> VrmRecord | None:
+    """Return the VRM properties of the figure that has the humanoid; None for others."""
+    versions = [n for n, name in ((1, "VRMC_vrm"), (0, "VRM")) if name in file.extensions]
+    if not versions or not any(node in joints.own for node in file.humanoid.values()):
+        return None
+    return VrmRecord(
+        version=versions[0],
+        extensions=file.extensions,
+        joints=joints.own,
+        parts={node: part for part, node in enumerate(nodes)},
+        meshes={node: int(file.tree.meshes[node]) for node in nodes},
+        materials=tuple(used_materials(pieces)),
+        toon=file.toon,
+        textures=file.textures,
     )

@@ -125,7 +125,7 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
     starts = zip(pieces, firsts, strict=False)
     triangles = np.concatenate([piece.triangles + first for piece, first in starts])
     counts = [len(piece.triangles) for piece in pieces]
-    used = sorted({piece.primitive.material for piece in pieces} - {-1})
+    used = used_materials(pieces)
     slots = {material: slot for slot, material in enumerate(used)} | {-1: -1}
     uvs = _uv_sets(pieces)
     return Mesh(
@@ -141,6 +141,11 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
         triangle_parts=np.repeat([piece.part for piece in pieces], counts),
         part_views=_part_views(file, nodes),
     )
+
+
+def used_materials(pieces: list[Piece]) -> list[int]:
+    """Return the materials of a figure, as indices into those of its file."""
+    return sorted({piece.primitive.material for piece in pieces} - {-1})
 
 
 def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:

@@ -20,8 +20,10 @@ from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, part
-from viewer.formats._vrm.springs import note_springs
+from viewer.formats._vrm.references import named_nodes
+from viewer.formats._vrm.springs import read_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
+from viewer.rig.springs.springs import Springs
 
 __all__ = ["with_vrm"]
 
@@ -64,8 +66,12 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
     FormatError
         If constraints of nodes depend on each other.
     """
-    file = replace(file, constraints=read_constraints(file.tree, source))
-    note_springs(file, source)
+    file = replace(
+        file,
+        constraints=read_constraints(file.tree, source),
+        springs=read_springs(file, source),
+        named_nodes=named_nodes(file.extensions, file.tree.n_nodes),
+    )
     for key, version in (("VRMC_vrm", 1), ("VRM", 0)):
         told = file.extensions.get(key)
         if isinstance(told, dict):
@@ -93,7 +99,18 @@ def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
         "constraints",
         ", ".join(f"{names[c.joint]} by {names[c.source]} ({c.kind})" for c in file.constraints),
     ))  # fmt: skip
+    if file.springs is not None:
+        facts.append(("springs", _springs(file.springs)))
     return tuple((heading, _shortened(text)) for heading, text in facts if text)
+
+
+def _springs(springs: Springs) -> str:
+    parts = (
+        (springs.n_chains, "chain"),
+        (springs.n_joints, "joint"),
+        (springs.colliders.n_colliders, "collider"),
+    )
+    return ", ".join(f"{count} {word}{'s' * (count != 1)}" for count, word in parts if count)
 
 
 def _shortened(text: str) -> str:
@@ -106,7 +123,8 @@ def _expressions(
     """Return the expressions that bind morph targets; report those that only change materials."""
     if version == 0:
         groups = part(told, "blendShapeMaster", "blendShapeGroups")
-        named = [(each.get("name"), each) for each in groups or () if isinstance(each, dict)]
+        listed = groups if isinstance(groups, list) else []
+        named = [(each.get("name"), each) for each in listed if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
         kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]

@@ -25,12 +25,13 @@ SAMPLERS = {
     "u_normal_map": 10,
     "u_occlusion_map": 11,
     "u_emissive_map": 12,
+    "u_shade_map": 16,
 }
-"""Texture unit of each entry of ``TEXTURES``; the skinning shader uses lower units."""
+"""Texture unit of each entry of ``TEXTURES``; skinning and effects use the other units."""
 
 _UNITS = tuple(SAMPLERS.values())
 _MOST_SETS = 3  # sets of texture coordinates that one figure's textures may use
-_COLORS = ("base_texture", "emissive_texture")  # sRGB
+_COLORS = ("base_texture", "emissive_texture", "shade_texture")  # sRGB
 _UNTEXTURED: dict[str, Any] = {
     "u_textured": False,
     "u_has_metallic_map": False,
@@ -38,6 +39,7 @@ _UNTEXTURED: dict[str, Any] = {
     "u_normal_scale": 0.0,
     "u_occlusion_map_strength": 0.0,
     "u_has_emissive_map": False,
+    "u_has_shade_map": False,
 }
 
 
@@ -215,6 +217,10 @@ def _uniforms(
         "u_has_emissive_map": "emissive_texture" in textures,
         "u_emissive": material.emissive,
         "u_unlit": material.unlit,
+        "u_toon": material.shade_color is not None,
+        "u_shade_color": material.shade_color or (1.0, 1.0, 1.0),
+        "u_shade_range": material.shade_range,
+        "u_has_shade_map": "shade_texture" in textures,
     }
     if material.is_physical:
         values |= {"u_metallic": material.metallic, "u_roughness": material.roughness}

@@ -14,7 +14,14 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 
-__all__ = ["NONE", "animation_labels", "chosen_animation", "counterpart", "play_animation"]
+__all__ = [
+    "NONE",
+    "animation_labels",
+    "chosen_animation",
+    "counterpart",
+    "own_first",
+    "play_animation",
+]
 
 NONE = "none"
 """Name that selects no animation."""
@@ -97,6 +104,28 @@ def counterpart(figure: Figure, animation: Animation) -> int:
         if other is animation or other.name == animation.name
     ]
     return min(found)[-1] if found else -1
+
+
+def own_first(figure: Figure, others: Sequence[Figure]) -> int:
+    """Return 0 if a figure shares no animation with the others of its file, else -1.
+
+    Such a figure is a character of its own, which plays its first animation whatever the others do.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with animations.
+    others : sequence of Figure
+        Figures of the same file, which may include it.
+    """
+    mine = figure.animations
+    shared = any(
+        counterpart(other, animation) >= 0
+        for other in others
+        if other is not figure
+        for animation in mine
+    )
+    return 0 if mine and not shared else -1
 
 
 def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:

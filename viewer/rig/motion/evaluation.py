@@ -148,6 +148,8 @@ def pose_actor(actor: Actor, time: float, interpolate: bool = False) -> None:
         sample(clip, skeleton, own, out=actor.pose)
     elif isinstance(clip, TransformClip) and skeleton is not None and actor.pose is not None:
         apply_transforms(sample_transforms(clip, np.array([own])), 0, skeleton, actor.pose)
+    if actor.springs is not None and actor.is_present:
+        actor.springs.swing(actor, own)
 
 
 def _apply(rows: SampledRows, row: int, skeleton: Skeleton, pose: Pose) -> None:

@@ -76,6 +76,10 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
         else:
             for actor in group:
                 pose_actor(actor, time, interpolate)
+            continue
+        for actor in group:
+            if actor.springs is not None and actor.is_present:
+                actor.springs.swing(actor, time - actor.offset)
 
 
 def _is_unrestricted(skeleton: Skeleton) -> bool:

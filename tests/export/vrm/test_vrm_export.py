@@ -1,0 +1,269 @@
+"""VRM characters written back: every reference points at the same thing as in the original."""
+
+from __future__ import annotations
+
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formats.gltf.files import File
+from formats.synthetic_smpl import model
+from formats.vrm.swinging import BONES, HAIR, META, png, swinging
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.cli import run
+from viewer.errors import RigError
+from viewer.export import VrmMeta, export
+from viewer.loading import load
+from viewer.rig.figure import Figure
+from viewer.rig.scene import figure_pose
+from viewer.rig.shape import shaped
+
+LICENCE = "https://vrm.dev/licenses/1.0/"
+ME = VrmMeta("", ("Me",), LICENCE)
+
+
+class Written:
+    """JSON and binary chunk of a written file."""
+
+    def __init__(self, path: Path) -> None:
+        data = path.read_bytes()
+        (length,) = struct.unpack_from("<I", data, 12)
+        self.root = json.loads(data[20 : 20 + length])
+        self.binary = data[20 + length + 8 :]
+
+    def name(self, node: int) -> str:
+        return self.root["nodes"][node]["name"]
+
+    def image(self, index: int) -> bytes:
+        view = self.root["bufferViews"][self.root["images"][index]["bufferView"]]
+        return self.binary[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+
+    def texture(self, index: int) -> bytes:
+        return self.image(self.root["textures"][index]["source"])
+
+
+def convert(file: File, folder: Path, **meta: Any) -> tuple[Written, list[str]]:
+    """Write the only figure of a file as VRM; return the file and the keys of the notes."""
+    path, out = folder / "ada.vrm", folder / "out.vrm"
+    path.write_bytes(file.glb())
+    actor = load(path).actors[0]
+    notes = export(actor, out, meta=VrmMeta(**meta))
+    return Written(out), [note.key for note in notes]
+
+
+@pytest.fixture(scope="module")
+def modern(tmp_path_factory: pytest.TempPathFactory) -> tuple[Written, list[str], Path]:
+    folder = tmp_path_factory.mktemp("modern")
+    return *convert(swinging(), folder), folder
+
+
+@pytest.fixture(scope="module")
+def old(tmp_path_factory: pytest.TempPathFactory) -> tuple[Written, list[str], Path]:
+    folder = tmp_path_factory.mktemp("old")
+    return *convert(swinging(0), folder), folder
+
+
+def test_nothing_is_lost(modern: Any, old: Any) -> None:
+    for _, keys, _ in (modern, old):
+        assert keys == ["X001.gltf", "X001.vrm", "X005.morph-targets", "X003.vrm-motions"]
+
+
+def test_bones_views_and_meta_are_those_of_the_file(modern: Any) -> None:
+    written = modern[0]
+    vrm = written.root["extensions"]["VRMC_vrm"]
+    bones = vrm["humanoid"]["humanBones"]
+    assert {bone: written.name(each["node"]) for bone, each in bones.items()} == {
+        bone: bone for bone in BONES
+    }
+    thumbnail = vrm["meta"].pop("thumbnailImage")
+    assert written.image(thumbnail) == png((90, 90, 200))
+    assert vrm["meta"] == {k: value for k, value in META.items() if k != "thumbnailImage"}
+    (note,) = vrm["firstPerson"]["meshAnnotations"]
+    assert (written.name(note["node"]), note["type"]) == ("hat", "thirdPersonOnly")
+    original = swinging().root["extensions"]["VRMC_vrm"]
+    assert vrm["lookAt"] == original["lookAt"]
+
+
+def test_expressions_bind_the_same_targets_and_materials(modern: Any) -> None:
+    written = modern[0]
+    told = written.root["extensions"]["VRMC_vrm"]["expressions"]
+    happy, blink, angry = (told["preset"][name] for name in ("happy", "blink", "angry"))
+    assert happy["overrideBlink"] == "block" and blink["isBinary"] is True
+    for each, target, weight in ((happy, "up", 1.0), (blink, "forward", 0.5)):
+        (bind,) = each["morphTargetBinds"]
+        node = written.root["nodes"][bind["node"]]
+        names = written.root["meshes"][node["mesh"]]["extras"]["targetNames"]
+        assert (node["name"], names[bind["index"]], bind["weight"]) == ("body", target, weight)
+    materials = written.root["materials"]
+    assert materials[angry["materialColorBinds"][0]["material"]]["name"] == "cloth"
+    assert materials[angry["textureTransformBinds"][0]["material"]]["name"] == "skin"
+    assert [*told["custom"]] == ["proud"]
+
+
+def test_springs_colliders_and_constraints_refer_to_the_same_nodes(modern: Any) -> None:
+    written = modern[0]
+    springs = written.root["extensions"]["VRMC_springBone"]
+    original = swinging().root["extensions"]["VRMC_springBone"]
+    (chain,) = springs["springs"]
+    assert [written.name(joint["node"]) for joint in chain["joints"]] == [*HAIR]
+    assert (
+        chain["colliderGroups"] == [0] and springs["colliderGroups"] == original["colliderGroups"]
+    )
+    assert [written.name(each["node"]) for each in springs["colliders"]] == ["head", "spine"]
+    assert springs["colliders"][1]["shape"] == original["colliders"][1]["shape"]
+    (constrained,) = [n for n in written.root["nodes"] if "extensions" in n]
+    told = constrained["extensions"]["VRMC_node_constraint"]["constraint"]["roll"]
+    assert constrained["name"] == "rightHand" and written.name(told["source"]) == "leftHand"
+    assert (told["rollAxis"], told["weight"]) == ("X", 0.5)
+
+
+def test_toon_shading_keeps_its_values_and_textures(modern: Any) -> None:
+    written = modern[0]
+    (skin,) = [m for m in written.root["materials"] if m["name"] == "skin"]
+    toon = skin["extensions"]["VRMC_materials_mtoon"]
+    assert [*skin["extensions"]] == ["VRMC_materials_mtoon"]
+    assert toon["shadeColorFactor"] == [0.5, 0.3, 0.3]
+    assert written.texture(toon["shadeMultiplyTexture"]["index"]) == png((40, 30, 30))
+    assert "KHR_materials_unlit" not in written.root["extensionsUsed"]
+
+
+def test_version_0_stays_version_0(old: Any) -> None:
+    written = old[0]
+    vrm = written.root["extensions"]["VRM"]
+    bones = {each["bone"]: written.name(each["node"]) for each in vrm["humanoid"]["humanBones"]}
+    assert bones == {bone: bone for bone in BONES}
+    assert written.texture(vrm["meta"]["texture"]) == png((90, 90, 200))
+    first = vrm["firstPerson"]
+    assert written.name(first["firstPersonBone"]) == "head"
+    (note,) = first["meshAnnotations"]
+    meshes = [n.get("name") for n in written.root["nodes"] if n.get("mesh") == note["mesh"]]
+    assert meshes == ["hat"]
+    joy, blush = vrm["blendShapeMaster"]["blendShapeGroups"]
+    assert joy["binds"][0]["weight"] == 100 and blush["materialValues"]
+    (group,) = vrm["secondaryAnimation"]["boneGroups"]
+    assert [written.name(bone) for bone in group["bones"]] == ["hair1"]
+    (collider,) = vrm["secondaryAnimation"]["colliderGroups"]
+    assert written.name(collider["node"]) == "head"
+    properties = vrm["materialProperties"]
+    assert [p["name"] for p in properties] == [m["name"] for m in written.root["materials"]]
+    (skin,) = [p for p in properties if p["name"] == "skin"]
+    assert written.texture(skin["textureProperties"]["_ShadeTexture"]) == png((40, 30, 30))
+
+
+@pytest.mark.parametrize("version", [0, 1])
+def test_the_viewer_reads_the_same_character_back(modern: Any, old: Any, version: int) -> None:
+    folder = (old, modern)[version][2]
+    before, after = (load(folder / name).actors[0].figure for name in ("ada.vrm", "out.vrm"))
+    facts = {key: value for key, value in before.facts if key != "version"}
+    assert {key: value for key, value in after.facts if key in facts} == facts
+    skeletons = before.require_skeleton(), after.require_skeleton()
+
+    def named(skeleton: Any) -> dict[str, str]:
+        return {bone: skeleton.names[joint] for bone, joint in skeleton.humanoid.joints.items()}
+
+    assert named(skeletons[0]) == named(skeletons[1])
+    assert len(skeletons[1].constraints) == len(skeletons[0].constraints)
+    springs = [skeleton.springs for skeleton in skeletons]
+    for name in ("tails", "stiffness", "gravities", "radii"):
+        found = [getattr(each, name) for each in springs]
+        assert_allclose(found[1], found[0], rtol=0, atol=1e-12)
+    assert springs[0].obstacles == springs[1].obstacles
+    assert before.blend_shapes.names == after.blend_shapes.names
+    weights = np.linspace(0.2, 1.0, before.n_shapes)
+    shapes = [shaped(each, weights).require_mesh().positions for each in (before, after)]
+    # Vertices may be reordered by material only within a part; there is one material per part.
+    assert_allclose(shapes[1], shapes[0], rtol=0, atol=1e-6)
+
+
+def test_requested_meta_replaces_that_of_the_file(tmp_path: Path) -> None:
+    written, _ = convert(swinging(), tmp_path, name="Bea", authors=("C",))
+    meta = written.root["extensions"]["VRMC_vrm"]["meta"]
+    assert (meta["name"], meta["authors"], meta["version"]) == ("Bea", ["C"], "2")
+
+
+def test_lost_references_are_counted(tmp_path: Path) -> None:
+    file = swinging()
+    vrm = file.root["extensions"]["VRMC_vrm"]
+    vrm["meta"] = {**META, "thumbnailImage": 9}
+    vrm["firstPerson"]["meshAnnotations"].append({"node": 0, "type": "auto"})
+    path = tmp_path / "ada.vrm"
+    path.write_bytes(file.glb())
+    notes = export(load(path).actors[0], tmp_path / "out.vrm")
+    (lost,) = [str(note) for note in notes if note.key == "X003.vrm-lost"]
+    assert lost.endswith("1 first-person setting, 1 texture") or lost.endswith(
+        "1 first-person setting and 1 texture"
+    )
+
+
+@pytest.mark.parametrize(
+    ("version", "place", "value"),
+    [
+        (1, ("VRMC_vrm", "expressions"), [1]),
+        (1, ("VRMC_vrm", "expressions", "preset"), "x"),
+        (1, ("VRMC_vrm", "firstPerson"), 5),
+        (1, ("VRMC_springBone", "springs"), {"joints": 3}),
+        (1, ("VRMC_springBone", "colliderGroups"), [{"colliders": [[1], None, 0]}]),
+        (0, ("VRM", "blendShapeMaster"), True),
+        (0, ("VRM", "blendShapeMaster", "blendShapeGroups"), 1.5),
+        (0, ("VRM", "secondaryAnimation", "boneGroups"), [None, 7, {"bones": 1}]),
+        (0, ("VRM", "materialProperties"), {"a": 1}),
+    ],
+)
+def test_data_of_another_structure_does_not_prevent_writing(
+    tmp_path: Path, version: int, place: tuple[str, ...], value: Any
+) -> None:
+    file = swinging(version)
+    told: Any = file.root["extensions"]
+    for name in place[:-1]:
+        told = told[name]
+    told[place[-1]] = value
+    written, _ = convert(file, tmp_path)
+    assert written.root["extensions"]
+    assert load(tmp_path / "out.vrm").actors[0].figure.require_skeleton().humanoid is not None
+
+
+@pytest.fixture(scope="module")
+def body(tmp_path_factory: pytest.TempPathFactory) -> Figure:
+    path = tmp_path_factory.mktemp("body") / "SMPL.npz"
+    np.savez(path, **model("smpl"))
+    return load(path).actors[0].figure
+
+
+def test_other_humanoids_become_version_1_in_a_t_pose(body: Figure, tmp_path: Path) -> None:
+    out = tmp_path / "out.vrm"
+    notes = export(viewer.Actor(body), out, meta=ME)
+    assert "X005.t-pose" in [note.key for note in notes]
+    written = Written(out)
+    vrm = written.root["extensions"]["VRMC_vrm"]
+    assert vrm["meta"] == {"name": body.name, "authors": ["Me"], "licenseUrl": LICENCE}
+    figure = load(out).actors[0].figure
+    skeleton = figure.require_skeleton()
+    matrices = viewer.joint_matrices(figure, figure_pose(figure))
+    joints = skeleton.humanoid.joints
+    places = {bone: matrices[joint, :3, 3] for bone, joint in joints.items()}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        arm = places[f"{side}Hand"] - places[f"{side}UpperArm"]
+        leg = places[f"{side}Foot"] - places[f"{side}UpperLeg"]
+        # Single precision of the file.
+        assert_allclose(arm / np.linalg.norm(arm), [sign, 0, 0], rtol=0, atol=1e-6)
+        assert_allclose(leg / np.linalg.norm(leg), [0, -1, 0], rtol=0, atol=1e-6)
+    assert_allclose(figure.require_mesh().positions[:, 1].min(), 0.0, rtol=0, atol=1e-6)
+
+
+def test_authors_licence_and_bones_are_required(
+    body: Figure, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "out.vrm"
+    with pytest.raises(RigError, match="--vrm-author NAME and --vrm-licence"):
+        export(viewer.Actor(body), out)
+    assert run(["convert", "-o", str(out)]) == 2  # the fox
+    assert "required human bones not found" in capsys.readouterr().err
+    glb = str(tmp_path / "out.glb")
+    assert run(["convert", "-o", glb, "--vrm-name", "A"]) == 2
+    assert "--vrm-name: expected an output with .vrm" in capsys.readouterr().err
+    assert not [*tmp_path.iterdir()]

@@ -1,0 +1,81 @@
+"""Motions of humanoids as VRM animations, read back onto a character."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats.vrm.swinging import swinging
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.cli import run
+from viewer.loading import MotionSettings, load
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.scene import Actor
+
+LIMBS = (("leftUpperArm", "leftLowerArm"), ("rightUpperLeg", "rightLowerLeg"), ("hips", "head"))
+TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
+
+
+def joints(actor: Actor, time: float) -> dict[str, np.ndarray]:
+    pose_actor(actor, time)
+    matrices = viewer.joint_matrices(actor.figure, actor.pose)
+    humanoid = actor.figure.require_skeleton().humanoid
+    return {bone: matrices[joint, :3, 3] for bone, joint in humanoid.joints.items()}
+
+
+def directions(actor: Actor, time: float) -> np.ndarray:
+    places = joints(actor, time)
+    away = np.array([places[end] - places[start] for start, end in LIMBS])
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("version", [0, 1])
+def test_a_character_moves_as_before(tmp_path: Path, version: int) -> None:
+    path, still, out = (tmp_path / name for name in ("ada.vrm", "still.vrm", "out.vrma"))
+    path.write_bytes(swinging(version).glb())
+    still.write_bytes(swinging(turn=False).glb())
+    assert run(["convert", str(path), "-o", str(out)]) == 0
+    (plain,), (found,) = load(path).actors, load(out, still).actors
+    # Version 0.x faces -z, version 1.0 +z: the character turns around.
+    facing = np.diag([1.0, 1.0, 1.0] if version else [-1.0, 1.0, -1.0])
+    for time in (0.5, 1.0):
+        before, after = joints(plain, time), joints(found, time)
+        for bone in ("leftHand", "rightFoot", "head", "hips"):
+            # Single precision of the file.
+            assert_allclose(after[bone], facing @ before[bone], rtol=0, atol=1e-6)
+
+
+def test_motions_of_worlds_with_z_up_are_turned(tmp_path: Path) -> None:
+    amass, hero, out = (tmp_path / name for name in ("walk.npz", "hero.vrm", "out.vrma"))
+    poses = np.zeros((4, 156))
+    poses[:, 0], poses[:, 3], poses[:, 50] = np.pi / 2, np.linspace(0.0, 0.6, 4), -1.0
+    moves = np.linspace([0, 0, 0.9], [0.1, -1, 0.9], 4)
+    np.savez(amass, poses=poses, trans=moves, mocap_framerate=30.0, gender="neutral")
+    hero.write_bytes(swinging(turn=False).glb())
+    assert run(["convert", str(amass), "--model", str(hero), "-o", str(out)]) == 0
+    (plain,) = load(amass, motion=MotionSettings(model=hero)).actors
+    (found,) = load(out, hero).actors
+    for time in (0.0, 0.1):
+        assert_allclose(
+            directions(found, time), directions(plain, time) @ TO_Y.T, rtol=0, atol=1e-6
+        )
+    steps = [joints(each, 0.1)["hips"] - joints(each, 0.0)["hips"] for each in (plain, found)]
+    assert_allclose(steps[1], TO_Y @ steps[0], rtol=0, atol=1e-6)
+
+
+def test_expressions_are_written_and_other_figures_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, out = tmp_path / "ada.vrm", tmp_path / "out.vrma"
+    path.write_bytes(swinging().glb())
+    assert run(["convert", str(path), "--shape", "happy=0.5", "-o", str(out)]) == 0
+    assert "17 human bones, 1 expression, 46 frames" in capsys.readouterr().out
+    (found,) = load(out, path).actors
+    pose_actor(found, 0.5)
+    names = found.figure.blend_shapes.names
+    assert_allclose(found.pose.shape_weights[names.index("happy")], 0.5, rtol=0, atol=1e-6)
+    assert run(["convert", "-o", str(tmp_path / "fox.vrma")]) == 2
+    assert "required human bones not found" in capsys.readouterr().err

@@ -1,0 +1,198 @@
+"""Spring joints against closed forms and an independent implementation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from rig.springs.reference_springs import Reference, turn
+
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.skeleton import Skeleton, ball_skeleton
+from viewer.rig.springs.simulation import STEPS_PER_SECOND, Simulation
+from viewer.rig.springs.springs import Colliders, Springs
+
+STEP = 1.0 / STEPS_PER_SECOND
+
+
+def skeleton_of(springs, parents=(-1, 0), places=((0, 1, 0), (1, 0, 0)), turns=None) -> Skeleton:
+    names = tuple(f"j{index}" for index in range(len(parents)))
+    made = ball_skeleton(names, np.array(parents), np.array(places, float))
+    rests = made.rest_rotations if turns is None else np.array(turns, float)
+    moves = np.array(places, float)
+    return replace(made, rest_translations=moves, rest_rotations=rests, springs=springs)
+
+
+def springs_of(joints, tails, **values) -> Springs:
+    count = len(joints)
+    given = {"stiffness": 0.0, "drags": 0.0, "radii": 0.0} | values
+    scalars = {name: np.full(count, given.pop(name)) for name in ("stiffness", "drags", "radii")}
+    gravities = np.tile(given.pop("gravity", (0.0, 0.0, 0.0)), (count, 1))
+    centers = np.full(count, given.pop("center", -1))
+    return Springs(
+        np.array(joints),
+        np.array(tails, float),
+        **scalars,
+        gravities=gravities,
+        centers=centers,
+        **given,
+    )
+
+
+def pose_of(skeleton: Skeleton, turns=None, shift=(0, 0, 0)):
+    """Return the joints of one pose: world and local matrices, scales and placement."""
+    local = np.tile(np.eye(4), (skeleton.n_joints, 1, 1))
+    rotations = skeleton.rest_rotations if turns is None else turns
+    local[:, :3, :3] = quaternion_to_matrix(rotations)
+    local[:, :3, 3] = skeleton.rest_translations
+    local[0, :3, 3] += shift
+    scales = np.ones((skeleton.n_joints, 3))
+    return forward_kinematics(skeleton.parents, local), local, scales, np.eye(4)
+
+
+def run(skeleton: Skeleton, n_steps: int, tails=None):
+    """Return the points and rotations after some steps in the rest pose."""
+    simulation, pose = Simulation(skeleton), pose_of(skeleton)
+    tails = simulation.start(*pose) if tails is None else tails
+    rotations = simulation.rests
+    for _ in range(n_steps):
+        tails, rotations = simulation.step(tails, *pose)
+    return tails, rotations
+
+
+def test_a_spring_without_forces_stays_at_rest() -> None:
+    tails, rotations = run(skeleton_of(springs_of([0], [[0, -2, 0]])), 10)
+    assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-12)
+    assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-12)
+
+
+def test_a_pendulum_comes_to_rest_along_gravity() -> None:
+    springs = springs_of([0], [[2, 0, 0]], gravity=(0, -3, 0), drags=0.2)
+    tails, rotations = run(skeleton_of(springs), 600)
+    assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-6)
+    # From +x to -y is -90 degrees about z.
+    half = np.sqrt(0.5)
+    assert_allclose(rotations, [[0, 0, -half, half]], rtol=0, atol=1e-6)
+
+
+def test_stiffness_and_gravity_balance_along_their_sum() -> None:
+    # At rest, the point lies along stiffness * axis + gravity: 3 x - 4 y.
+    springs = springs_of([0], [[1, 0, 0]], gravity=(0, -4, 0), stiffness=3.0, drags=0.5)
+    tails, _ = run(skeleton_of(springs), 600)
+    assert_allclose(tails.now, [[0.6, 1.0 - 0.8, 0]], rtol=0, atol=1e-9)
+
+
+def test_stiffness_alone_returns_to_the_rest_direction() -> None:
+    springs = springs_of([0], [[1, 0, 0]], stiffness=2.0, drags=0.6)
+    skeleton = skeleton_of(springs)
+    simulation = Simulation(skeleton)
+    start = simulation.start(*pose_of(skeleton))
+    moved = type(start)(np.array([[0.0, 2.0, 0.0]]), np.array([[0.0, 2.0, 0.0]]))
+    tails, rotations = run(skeleton, 600, moved)
+    assert_allclose(tails.now, start.now, rtol=0, atol=1e-9)
+    assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-9)
+
+
+def test_the_first_step_moves_by_the_force_times_the_step() -> None:
+    springs = springs_of([0], [[1, 0, 0]], gravity=(0, -3, 0))
+    tails, _ = run(skeleton_of(springs), 1)
+    wanted = np.array([1.0, -3.0 * STEP, 0.0])
+    assert_allclose(tails.now[0] - [0, 1, 0], wanted / np.linalg.norm(wanted), rtol=0, atol=1e-12)
+
+
+def test_a_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
+    # The sphere is below the pivot, on the way of a pendulum that swings down from +x.
+    shape = Colliders(
+        np.array([1]), np.array([[0, -1, 0]]), np.array([[0, -1, 0]]), np.array([0.5])
+    )
+    springs = springs_of(
+        [0],
+        [[1, 0, 0]],
+        gravity=(0, -1, 0),
+        drags=0.3,
+        radii=0.25,
+        colliders=shape,
+        obstacles=((0,),),
+    )
+    # Joint 1 is a second root at the same place, which does not swing.
+    skeleton = skeleton_of(springs, (-1, -1), ((0, 1, 0), (0, 1, 0)))
+    tails, _ = run(skeleton, 600)
+    # The constant length pulls it back into the sphere, by less than gravity moves it in a step.
+    assert_allclose(np.linalg.norm(tails.now[0] - [0, 0, 0]), 0.75, rtol=0, atol=STEP / 2)
+    assert_allclose(np.linalg.norm(tails.now[0] - [0, 1, 0]), 1.0, rtol=0, atol=1e-12)
+    assert tails.now[0, 0] > 0.0
+
+
+@pytest.mark.parametrize("center", [-1, 0])
+def test_inertia_is_relative_to_the_center(center: int) -> None:
+    springs = springs_of([1], [[0, -1, 0]], drags=0.0, center=center)
+    skeleton = skeleton_of(springs, places=((0, 1, 0), (0, 0, 0)))
+    simulation = Simulation(skeleton)
+    tails = simulation.start(*pose_of(skeleton))
+    shifted = pose_of(skeleton, shift=(1, 0, 0))
+    _, rotations = simulation.step(tails, *shifted)
+    tilt = abs(rotations[0, 2])
+    # The point follows its centre, or stays behind: pulled from (0, -1) to (-1, -1) / sqrt(2).
+    assert_allclose(tilt, 0.0 if center == 0 else np.sin(np.pi / 8), rtol=0, atol=1e-12)
+
+
+def _random_figure(rng: np.random.Generator) -> Skeleton:
+    parents = (-1, 0, 1, 2, 3, 1, 5, 0)
+    places = rng.normal(size=(8, 3)) * 0.3
+    turns = rng.normal(size=(8, 4))
+    shapes = Colliders(
+        np.array([0, 7]),
+        rng.normal(size=(2, 3)) * 0.2,
+        rng.normal(size=(2, 3)) * 0.2,
+        np.array([0.3, 0.2]),
+    )
+    # Joint 3 hangs between spring joints, but does not swing itself.
+    springs = Springs(
+        np.array([2, 4, 5, 6]),
+        rng.normal(size=(4, 3)) * 0.3,
+        rng.uniform(0, 4, 4),
+        rng.uniform(0, 1, 4),
+        rng.normal(size=(4, 3)),
+        rng.uniform(0, 0.1, 4),
+        np.array([-1, -1, 1, 0]),
+        shapes,
+        ((0, 1), (1,), (), (1, 0)),
+    )
+    turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+    return skeleton_of(springs, parents, places, turns)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_chains_agree_with_the_pseudocode_of_the_specification(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    skeleton = _random_figure(rng)
+    simulation, turns = Simulation(skeleton), skeleton.rest_rotations.copy()
+    world, local, scales, place = pose_of(skeleton)
+    reference = Reference(skeleton, local)
+    tails = simulation.start(world, local, scales, place)
+    for _ in range(40):
+        turns = turns + 0.05 * rng.normal(size=turns.shape)
+        turns /= np.linalg.norm(turns, axis=1, keepdims=True)
+        world, local, _, _ = pose_of(skeleton, turns)
+        tails, rotations = simulation.step(tails, world, local, scales, place)
+        wanted = reference.step(local, world)
+        for row, joint in enumerate(skeleton.springs.joints.tolist()):
+            # 40 steps of 1e-16 relative rounding, amplified by inertia.
+            assert_allclose(turn(rotations[row]), wanted[joint], rtol=0, atol=1e-9)
+
+
+def test_joints_hidden_by_a_scale_of_zero_do_not_swing() -> None:
+    springs = springs_of([1], [[0, -1, 0]], gravity=(1, 0, 0), center=0)
+    skeleton = skeleton_of(springs)
+    world, local, scales, place = pose_of(skeleton)
+    scales[0] = 0.0
+    world = forward_kinematics(skeleton.parents, local * np.array([0.0, 0.0, 0.0, 1.0]))
+    simulation = Simulation(skeleton)
+    tails = simulation.start(world, local, scales, place)
+    for _ in range(3):
+        tails, rotations = simulation.step(tails, world, local, scales, place)
+    assert np.isfinite(tails.now).all()
+    assert_allclose(np.linalg.norm(rotations, axis=1), 1.0, rtol=0, atol=1e-12)

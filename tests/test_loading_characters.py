@@ -1,0 +1,169 @@
+"""Motions of bodies and of other figures on characters with joints of their own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from formats.capture_files import body, write_frames
+from formats.vrm.swinging import swinging
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.cli import run
+from viewer.errors import RigError
+from viewer.loading import MotionSettings, load
+from viewer.rig.motion.evaluation import pose_actor
+
+LIMBS = {
+    "leftUpperArm": "leftLowerArm",
+    "rightLowerArm": "rightHand",
+    "leftUpperLeg": "leftLowerLeg",
+    "rightLowerLeg": "rightFoot",
+}
+NAMES = {
+    **{"leftUpperArm": "left_shoulder", "leftLowerArm": "left_elbow", "rightHand": "right_wrist"},
+    **{"rightLowerArm": "right_elbow", "leftUpperLeg": "left_hip", "leftLowerLeg": "left_knee"},
+    **{"rightLowerLeg": "right_knee", "rightFoot": "right_ankle"},
+}
+SPRINGS = MotionSettings(springs=True)
+
+
+@pytest.fixture(scope="module")
+def hero(tmp_path_factory):
+    path = tmp_path_factory.mktemp("hero") / "hero.vrm"
+    path.write_bytes(swinging(turn=False).glb())
+    return path
+
+
+@pytest.fixture(scope="module")
+def capture(tmp_path_factory):
+    """A folder of two people who stand along z."""
+    folder = tmp_path_factory.mktemp("take") / "take"
+    upright = {"Rh": [[np.pi / 2, 0.0, 0.0]]}
+    frames = {
+        f: [body(0, seed=f, Th=[[0.0, 0.1 * f, 1.0]], **upright), body(1, seed=9 + f, **upright)]
+        for f in range(4)
+    }
+    write_frames(folder / "smpl", frames)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def amass(tmp_path_factory):
+    path = tmp_path_factory.mktemp("amass") / "walk.npz"
+    poses = np.zeros((5, 156))
+    poses[:, 0], poses[:, 3] = np.pi / 2, np.linspace(0.0, 0.5, 5)
+    moves = np.linspace([0, 0, 0.9], [0, -1, 0.9], 5)
+    np.savez(path, poses=poses, trans=moves, mocap_framerate=30.0, gender="neutral")
+    return path
+
+
+def directions(actor, time, names=None):
+    """Return the directions of some limbs in the scene."""
+    pose_actor(actor, time)
+    skeleton = actor.figure.require_skeleton()
+    matrices = actor.placement @ viewer.joint_matrices(actor.figure, actor.pose)
+    joints = skeleton.humanoid.joints if names is None else {
+        bone: skeleton.names.index(name) for bone, name in names.items()
+    }  # fmt: skip
+    ends = [(matrices[joints[a], :3, 3], matrices[joints[b], :3, 3]) for a, b in LIMBS.items()]
+    away = np.array([end - start for start, end in ends])
+    return away / np.linalg.norm(away, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_captured_people_are_shown_as_the_character(capture, hero, is_named):
+    plain = load(capture)
+    files = [capture] if is_named else [capture, hero]
+    scene = load(*files, motion=MotionSettings(model=hero if is_named else None))
+    assert [actor.person for actor in scene.actors] == [0, 1]
+    assert {actor.figure.name for actor in scene.actors} == {"hero"} and scene.up == "z"
+    for before, after in zip(plain.actors, scene.actors, strict=True):
+        for frame in (0, 3):
+            time = frame / 30
+            # The rest pose of the body is a T-pose within some degrees, which limbs make up for.
+            found = directions(after, time)
+            assert_allclose(found, directions(before, time, NAMES), rtol=0, atol=1e-6)
+
+
+def test_the_path_of_a_capture_is_scaled_in_its_own_world(capture, hero):
+    actors = [load(capture).actors[0], load(capture, hero).actors[0]]
+    moves = []
+    for actor in actors:
+        places = []
+        for frame in (0, 3):
+            pose_actor(actor, frame / 30)
+            places.append(viewer.joint_matrices(actor.figure, actor.pose)[0, :3, 3])
+        moves.append(places[1] - places[0])
+    assert_allclose(moves[0][1], 0.3, rtol=0, atol=0.1)
+    # One factor applies to all axes: the ratio of leg lengths.
+    factor = moves[1][1] / moves[0][1]
+    assert 0.5 < factor < 2.0
+    assert_allclose(moves[1], factor * moves[0], rtol=0, atol=1e-9)
+
+
+def test_amass_moves_the_figure_of_the_model_option(amass, hero):
+    (plain,) = load(amass).actors
+    (found,) = load(amass, motion=MotionSettings(model=hero)).actors
+    assert found.figure.name == "hero" and found.title == "walk"
+    assert_allclose(directions(found, 0.1), directions(plain, 0.1, NAMES), rtol=0, atol=1e-6)
+
+
+def test_gravity_points_down_in_the_world_of_the_motion(amass, hero):
+    (found,) = load(amass, motion=MotionSettings(model=hero, springs=True)).actors
+    skeleton = found.springs.skeleton_of(found.figure)
+    assert_allclose(skeleton.springs.gravities, [[0, 0, -0.6]] * 3, rtol=0, atol=1e-12)
+    (still,) = load(hero, motion=SPRINGS).actors
+    assert still.springs.skeleton_of(still.figure) is still.figure.skeleton
+
+
+def test_a_model_that_is_no_humanoid_is_refused(capture, tmp_path):
+    path = tmp_path / "box.skel"
+    path.write_text("balljoint root { balljoint tip { offset 0 1 0 } }")
+    (tmp_path / "box.skin").write_text(
+        "positions 3 { 0 0 0 1 0 0 0 1 0 } normals 3 { 0 0 1 0 0 1 0 0 1 } "
+        "skinweights 3 { 1 0 1 1 0 1 1 1 1 } triangles 1 { 0 1 2 } bindings 2 { "
+        "matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } matrix { 1 0 0 0 1 0 0 0 1 0 1 0 } }"
+    )
+    out = tmp_path / "box.glb"
+    assert run(["convert", str(path), str(path.with_suffix(".skin")), "-o", str(out)]) == 0
+    with pytest.raises(RigError, match="--model selects the model"):
+        load(capture, motion=MotionSettings(model=out))
+
+
+def test_an_animation_of_another_figure_moves_a_character(hero, tmp_path):
+    dancer = tmp_path / "dancer.vrm"
+    dancer.write_bytes(swinging().glb())
+    (found,) = load(hero, motion=MotionSettings(motions=(dancer,), animation="turn")).actors
+    (plain,) = load(dancer).actors
+    assert found.figure.name == "hero"
+    for time in (0.25, 0.75):
+        assert_allclose(directions(found, time), directions(plain, time), rtol=0, atol=1e-9)
+    with pytest.raises(RigError, match='no animation is called "jump"'):
+        load(hero, motion=MotionSettings(motions=(dancer,), animation="jump"))
+
+
+def test_a_skeleton_with_animations_moves_a_character_beside_it(hero, tmp_path):
+    file = swinging()
+    file.root["nodes"] = file.root["nodes"][:-2]
+    del file.root["meshes"], file.root["materials"], file.root["extensions"]["VRMC_springBone"]
+    file.root["extensionsUsed"].remove("VRMC_materials_mtoon")
+    del file.root["extensions"]["VRMC_vrm"]["expressions"]
+    del file.root["extensions"]["VRMC_vrm"]["firstPerson"]
+    file.root["scenes"] = [{"nodes": [0]}]
+    bare = tmp_path / "bare.glb"
+    bare.write_bytes(file.glb())
+    (found,) = load(bare, hero).actors
+    assert found.figure.name == "hero" and found.clip is not None
+    beside = load(bare, hero, motion=MotionSettings(drives=False)).actors
+    assert [actor.figure.name for actor in beside] == ["bare", "hero"]
+    assert beside[1].clip is None
+
+
+def test_a_file_without_motion_is_refused(hero, capsys):
+    assert run(["info", str(hero)]) == 0
+    capsys.readouterr()
+    out = str(hero.with_suffix(".png"))
+    assert run(["render", str(hero), "--motion", str(hero), "-o", out]) == 2
+    said = capsys.readouterr().err
+    assert "--motion: expected a motion or an animation of a skeleton, found none" in said

@@ -1,0 +1,44 @@
+"""Option that writes the simulated rotations of joints that swing."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import ViewerError
+from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
+from viewer.rig.scene import Scene
+
+
+def add_spring_argument(group: argparse._ArgumentGroup) -> None:
+    """Add ``--bake-springs``."""
+    group.add_argument(
+        "--bake-springs",
+        dest="springs",
+        action="store_const",
+        const="on",
+        default="off",
+        help="write the simulated rotations of joints that swing, such as hair in VRM files",
+    )
+
+
+def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
+    """Replace motions of figures with joints that swing by frames, if requested; return notes."""
+    holds_motion = output.suffix.lower() not in (".vrm", ".vrma")
+    actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
+    actors = actors if holds_motion else []
+    bakes = arguments.springs == "on"
+    if bakes and not actors:
+        raise ViewerError("--bake-springs: no figure with a motion has joints that swing")
+    notes = []
+    for actor in actors:
+        springs = actor.figure.require_skeleton().springs
+        count = 0 if springs is None else springs.n_joints
+        if bakes:
+            actor.clip = with_baked_springs(actor, arguments.fps)
+            actor.springs, actor.animation = None, -1
+        key = "X005.springs-baked" if bakes else "X003.springs"
+        notes.append(Diagnostic(key, values={"figure": actor.name, "n": count}))
+    return notes

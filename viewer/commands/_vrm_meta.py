@@ -1,0 +1,47 @@
+"""Options for the meta data of written VRM characters."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from viewer.errors import ViewerError
+from viewer.export import VrmMeta
+from viewer.phrases import printable
+
+
+def add_vrm_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the options that name a character, its authors and its licence."""
+    group = parser.add_argument_group("writing VRM characters")
+    group.add_argument("--vrm-name", metavar="NAME", help="name of the character")
+    group.add_argument(
+        "--vrm-author",
+        action="append",
+        default=[],
+        metavar="NAME",
+        help="an author; may be repeated; needed for figures from other formats",
+    )
+    group.add_argument(
+        "--vrm-licence",
+        metavar="URL",
+        help="address of the licence; needed for figures from other formats",
+    )
+
+
+def vrm_meta(arguments: argparse.Namespace, output: Path | None) -> VrmMeta:
+    """Return the requested meta data.
+
+    Raises ViewerError if there are any, but the output is no VRM file.
+    """
+    given = {
+        "--vrm-name": arguments.vrm_name,
+        "--vrm-author": arguments.vrm_author,
+        "--vrm-licence": arguments.vrm_licence,
+    }
+    named = next((option for option, value in given.items() if value), "")
+    if named and (output is None or output.suffix.lower() != ".vrm"):
+        suffix = printable(output.suffix) if output is not None and output.suffix else "no suffix"
+        raise ViewerError(f"{named}: expected an output with .vrm, found {suffix}")
+    return VrmMeta(
+        arguments.vrm_name or "", tuple(arguments.vrm_author), arguments.vrm_licence or ""
+    )

@@ -1,0 +1,1 @@
+"""Extensions of VRM characters in glTF files."""

@@ -1,0 +1,133 @@
+"""Extension of a VRM 0.x file, with the indices of the file that is written.
+
+Version 0.x binds expressions to meshes, which become one mesh per node here: such binds are
+repeated. Its materials are parallel to those of the file.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from viewer.export._vrm.maps import Maps
+from viewer.formats._vrm.json_parts import part
+
+__all__ = ["kept_old"]
+
+_PLAIN = {
+    "shader": "VRM_USE_GLTFSHADER",
+    "renderQueue": -1,
+    "floatProperties": {},
+    "vectorProperties": {},
+    "textureProperties": {},
+    "keywordMap": {},
+    "tagMap": {},
+}
+
+
+def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
+    """Return the root extension ``VRM`` of a character.
+
+    ``names``: names of the written materials.
+    """
+    told = maps.record.extensions["VRM"]
+    result = dict(told)
+    bones = _list(told, "humanoid", "humanBones")
+    result["humanoid"] = {
+        **(told["humanoid"] if isinstance(told.get("humanoid"), dict) else {}),
+        "humanBones": _nodes(bones, maps, "bones"),
+    }
+    meta = dict(told["meta"]) if isinstance(told.get("meta"), dict) else {}
+    if meta.get("texture", -1) != -1:
+        texture = maps.texture(meta.pop("texture"), "textures")
+        meta |= {} if texture is None else {"texture": texture}
+    result["meta"] = meta
+    if isinstance(told.get("firstPerson"), dict):
+        result["firstPerson"] = _first_person(told["firstPerson"], maps)
+    groups = _list(told, "blendShapeMaster", "blendShapeGroups")
+    if groups:
+        result["blendShapeMaster"] = {
+            **told["blendShapeMaster"],
+            "blendShapeGroups": [
+                {**each, "binds": _of_meshes(each.get("binds"), maps, "morph-binds")}
+                for each in groups
+                if isinstance(each, dict)
+            ],
+        }
+    if isinstance(told.get("secondaryAnimation"), dict):
+        result["secondaryAnimation"] = _springs(told["secondaryAnimation"], maps)
+    result["materialProperties"] = _materials(_list(told, "materialProperties"), maps, names)
+    return {"VRM": result}
+
+
+def _list(told: Any, *names: str) -> list[Any]:
+    found = part(told, *names)
+    return found if isinstance(found, list) else []
+
+
+def _nodes(rows: list[Any], maps: Maps, kind: str) -> list[Any]:
+    return [
+        {**each, "node": node}
+        for each in rows
+        if isinstance(each, dict) and (node := maps.joint(each.get("node"), kind)) is not None
+    ]
+
+
+def _of_meshes(rows: Any, maps: Maps, kind: str) -> list[Any]:
+    """Return objects with translated meshes, one for each mesh that is written."""
+    given = rows if isinstance(rows, list) else []
+    return [
+        {**each, "mesh": mesh}
+        for each in given
+        if isinstance(each, dict)
+        for mesh in maps.meshes(each.get("mesh"), kind)
+    ]
+
+
+def _first_person(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    result = dict(told)
+    if told.get("firstPersonBone", -1) != -1:
+        bone = maps.joint(told["firstPersonBone"], "bones")
+        result["firstPersonBone"] = -1 if bone is None else bone
+    notes = _of_meshes(told.get("meshAnnotations"), maps, "annotations")
+    return {**result, "meshAnnotations": notes}
+
+
+def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the springs; groups of colliders keep their places, because springs index them."""
+    groups = []
+    for each in _list(told, "boneGroups"):
+        if not isinstance(each, dict):
+            continue
+        listed = _list(each, "bones")
+        bones = [maps.joint(bone, "spring-joints") for bone in listed]
+        group = {**each, "bones": [bone for bone in bones if bone is not None]}
+        if part(each, "center") not in (None, -1):
+            center = maps.joint(each["center"], "centers")
+            group["center"] = -1 if center is None else center
+        groups.append(group)
+    colliders = []
+    for each in _list(told, "colliderGroups"):
+        node = maps.joint(part(each, "node"), "colliders")
+        # A group without a joint would be invalid: it moves to the first joint, without colliders.
+        empty = {"node": next(iter(maps.record.joints), 0), "colliders": []}
+        is_kept = node is not None and isinstance(each, dict)
+        colliders.append({**each, "node": node} if is_kept else empty)
+    return {**told, "boneGroups": groups, "colliderGroups": colliders}
+
+
+def _materials(told: list[Any], maps: Maps, names: list[str]) -> list[Any]:
+    """Return the properties of each written material, in their order."""
+    result: list[Any] = [{"name": name, **_PLAIN} for name in names]
+    for own, written in maps.materials.items():
+        if own >= len(told) or not isinstance(told[own], dict):
+            continue
+        each = dict(told[own])
+        textures = part(each, "textureProperties")
+        given = textures.items() if isinstance(textures, dict) else ()
+        each["textureProperties"] = {
+            name: texture
+            for name, index in given
+            if (texture := maps.texture(index, "textures")) is not None
+        }
+        result[written] = each
+    return result

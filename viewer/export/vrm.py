@@ -1,0 +1,208 @@
+"""Exporter of VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
+
+A figure from a VRM file keeps its version and all data of its extensions. Any other figure with the
+required human bones becomes VRM 1.0: at rest in a T-pose, in metres, facing +z. Specification:
+``github.com/vrm-c/vrm-specification``.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.export import gltf
+from viewer.export._gltf.body import Body, Built
+from viewer.export._gltf.document import Document
+from viewer.export._options import VrmMeta
+from viewer.export._vrm.constraints import constraint_items
+from viewer.export._vrm.humanoid import human_bones
+from viewer.export._vrm.kept_modern import kept_modern, kept_toon
+from viewer.export._vrm.kept_old import kept_old
+from viewer.export._vrm.made import made_character
+from viewer.export._vrm.maps import Maps
+from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
+from viewer.export._vrm.standing import in_t_pose, standing
+from viewer.formats._vrm.json_parts import part
+from viewer.rig.figure import Figure
+from viewer.rig.file_record import VrmRecord
+from viewer.rig.pose import pose_key
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skinning import Skinning
+from viewer.rig.units import METRES, UNIT_NAMES
+
+__all__ = ["export"]
+
+_STRAIGHT = 1e-4  # radians
+_CONSTRAINT = "VRMC_node_constraint"
+_TOON = "VRMC_materials_mtoon"
+_UNLIT = "KHR_materials_unlit"
+
+
+def export(
+    actor: Actor,
+    path: Path,
+    skinning: Skinning,
+    optimizes: bool = False,
+    meta: VrmMeta | None = None,
+) -> list[Diagnostic]:
+    """Write a figure in its rest pose; see ``viewer.export.export``.
+
+    Parameters
+    ----------
+    actor : Actor
+        Figure; its pose is not written.
+    path : Path
+        The file.
+    skinning : Skinning
+        Selects influences.
+    optimizes : bool
+        Whether vertex attributes are quantised.
+    meta : VrmMeta, optional
+        Name, authors and licence; those of the file if omitted or empty.
+
+    Raises
+    ------
+    RigError
+        If the figure lacks a required bone, or its authors or licence are unknown.
+    OutputError
+        If the file cannot be written.
+    """
+    figure, given = actor.figure, meta or VrmMeta()
+    bones = human_bones(figure)
+    record = None if figure.record is None else figure.record.vrm
+    notes = _left_out(actor)
+    still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    if record is not None:
+        extend = partial(_add_kept, record, given)
+        return gltf.export(still, path, skinning, optimizes, extend) + notes
+    told = checked_meta(given, figure.name)
+    pose = figure_pose(figure)
+    pose.shape_weights = actor.require_pose().shape_weights.copy()
+    figure, angle = in_t_pose(standing(figure, pose, bones), bones)
+    still = replace(still, figure=figure, pose=figure_pose(figure))
+    if angle > _STRAIGHT:
+        notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
+    notes += _unit_notes(actor.figure)
+    extend = partial(_add_made, bones, told)
+    return gltf.export(still, path, skinning, optimizes, extend) + notes
+
+
+def _unit_notes(figure: Figure) -> list[Diagnostic]:
+    """Return a note about lengths that are converted, or whose unit is unknown."""
+    if figure.unit not in METRES:
+        return [Diagnostic("X005.unit-unknown-metres", values={"figure": figure.name})]
+    if METRES[figure.unit] != 1.0:
+        return [Diagnostic("X005.unit-converted", values={"unit": UNIT_NAMES[figure.unit]})]
+    return []
+
+
+def _left_out(actor: Actor) -> list[Diagnostic]:
+    """Return notes about pose and motions, which are not part of a VRM character."""
+    notes, figure = [], actor.figure
+    if actor.clip is not None or figure.animations:
+        n = max(len(figure.animations), 1)
+        notes.append(Diagnostic("X003.vrm-motions", values={"n": n}))
+    elif actor.pose is not None:
+        own = figure_pose(figure)
+        own.shape_weights = actor.pose.shape_weights
+        if pose_key(own) != pose_key(actor.pose):
+            notes.append(Diagnostic("X003.vrm-pose"))
+    return notes
+
+
+def _add_kept(
+    record: VrmRecord, meta: VrmMeta, document: Document, body: Body, built: Built
+) -> list[Diagnostic]:
+    """Add the extensions of the figure's own file; return notes about lost references."""
+    maps = Maps(record, document, built)
+    if record.version == 0:
+        names = [str(item.get("name", "")) for item in document.root.get("materials", ())]
+        extensions = kept_old(maps, names)
+    else:
+        extensions = kept_modern(maps)
+    _keep_shading(record, document, maps)
+    told = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
+    told["meta"] = changed_meta(told["meta"], meta, record.version)
+    _add(document, body, built, extensions)
+    return [_written(told, extensions, record.version), *_lost(maps.lost)]
+
+
+def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
+    """Give materials the toon and unlit extensions of the file, and no others of these."""
+    for own, written in maps.materials.items():
+        given = record.toon.get(own, {})
+        item = document.root["materials"][written].setdefault("extensions", {})
+        if _UNLIT not in given:
+            item.pop(_UNLIT, None)
+        if _TOON in given:
+            item[_TOON] = kept_toon(given[_TOON], maps)
+            _declare(document, _TOON)
+        if not item:
+            del document.root["materials"][written]["extensions"]
+    is_used = any(_UNLIT in item.get("extensions", {}) for item in document.root["materials"])
+    used = document.root.get("extensionsUsed", [])
+    if _UNLIT in used and not is_used:
+        used.remove(_UNLIT)
+
+
+def _add_made(
+    bones: Mapping[str, int], meta: dict[str, Any], document: Document, body: Body, built: Built
+) -> list[Diagnostic]:
+    """Add the extension of a figure from another format."""
+    extensions = {"VRMC_vrm": made_character(body, built, bones, meta)}
+    _add(document, body, built, extensions)
+    notes = [_written(extensions["VRMC_vrm"], extensions, 1)]
+    if meta["licenseUrl"] != LICENCE:
+        notes.append(Diagnostic("X005.vrm-licence", values={"licence": LICENCE}))
+    return notes
+
+
+def _add(document: Document, body: Body, built: Built, extensions: Mapping[str, Any]) -> None:
+    """Add root extensions, and the constraints of nodes."""
+    document.root["extensions"] = dict(extensions)
+    _declare(document, *extensions)
+    skeleton = body.figure.require_skeleton()
+    for node, item in constraint_items(skeleton.constraints, built.tree.joints).items():
+        document.root["nodes"][node].setdefault("extensions", {})[_CONSTRAINT] = item
+        _declare(document, _CONSTRAINT)
+
+
+def _declare(document: Document, *names: str) -> None:
+    used: list[str] = document.root.setdefault("extensionsUsed", [])
+    used += [name for name in names if name not in used]
+
+
+def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
+    """Return a note that counts the contents of the extensions."""
+    bones = told["humanoid"]["humanBones"]
+    if version == 0:
+        n_expressions = _size(part(told, "blendShapeMaster", "blendShapeGroups"))
+        groups = part(told, "secondaryAnimation", "boneGroups")
+        chains = groups if isinstance(groups, list) else []
+        n_chains = sum(_size(part(each, "bones")) for each in chains)
+    else:
+        kinds = ("preset", "custom")
+        n_expressions = sum(_size(part(told, "expressions", kind)) for kind in kinds)
+        n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
+    parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
+    parts.append(Phrase("vrm-springs", n=n_chains))
+    values = {"version": "0.x" if version == 0 else "1.0", "parts": parts}
+    return Diagnostic("X001.vrm", values=values)
+
+
+def _size(told: Any) -> int:
+    """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
+    return len(told) if isinstance(told, list | dict) else 0
+
+
+def _lost(lost: Counter[str]) -> list[Diagnostic]:
+    """Return a note about references that could not be kept, if there are any."""
+    parts = [Phrase(f"lost-{kind}", n=count) for kind, count in sorted(lost.items()) if count]
+    return [Diagnostic("X003.vrm-lost", values={"parts": parts})] if parts else []

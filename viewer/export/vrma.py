@@ -1,0 +1,234 @@
+"""Exporter of motions of humanoids, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
+
+The file has a node for each human bone in a T-pose, without rest rotations, in metres, y up, facing
++z. With the rotation W(f) of a joint in the world of the motion, its rotation T in the T-pose, and
+the rotations A and B from the axes of the motion's world and of the figure to those of VRM, the
+node has the world rotation A W(f) T^-1 B^-1. Lengths are the figure's; other characters scale the
+path.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
+from viewer.export._gaps import filled, frames_phrase, gaps_note
+from viewer.export._gltf.document import Document, text_of
+from viewer.export._options import MotionOptions
+from viewer.export._vrm.humanoid import bone_above, human_bones
+from viewer.export._vrm.made import PRESETS
+from viewer.export._vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
+from viewer.formats import save_bytes
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.motion.evaluation import Frames, world_frames
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.scene import figure_pose
+from viewer.rig.units import METRES
+
+__all__ = ["export_animation"]
+
+_EXTENSION = "VRMC_vrm_animation"
+
+
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
+    """Write the motion of a humanoid; see ``viewer.export.export_animation``.
+
+    Parameters
+    ----------
+    animation : SampledAnimation
+        A figure in many poses.
+    path : Path
+        The file.
+    options : MotionOptions
+        Handling of gaps, and up axis of the world.
+
+    Raises
+    ------
+    RigError
+        If the figure lacks a required bone, no frame is present, or gaps are to be split.
+    OutputError
+        If the file cannot be written.
+    """
+    if options.closing == "split":
+        raise RigError("gaps of .vrma: expected hold or interpolate, found split")
+    if not animation.frames.present.any():
+        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+    bones = human_bones(animation.figure)
+    frames = filled(animation.frames, options.closing == "interpolate")
+    document = Document(animation.name)
+    weights = _fill(document, animation, frames, options.world_up, bones)
+    data = document.glb()
+    save_bytes(path, data)
+    values = {
+        "bones": len(bones),
+        "expressions": sum(len(group) for group in weights.values()),
+        "frames": frames_phrase(animation.first_frame, frames.n_frames),
+        "rate": animation.frame_rate,
+        "size": len(data),
+    }
+    notes = [Diagnostic("X001.vrma", path, values=values)]
+    notes += gaps_note(animation.frames.present, animation.first_frame, options.closing)
+    others = animation.figure.require_skeleton().n_joints - len(bones)
+    if others:
+        notes.append(Diagnostic("X003.vrma-joints", values={"n": others}))
+    return notes
+
+
+def _fill(
+    document: Document,
+    animation: SampledAnimation,
+    frames: Frames,
+    world_up: str,
+    bones: dict[str, int],
+) -> dict[str, dict[str, Any]]:
+    """Add nodes, keys and the extension; return the expressions."""
+    figure = animation.figure
+    above = {bone: _parent(bone, bones) for bone in bones}
+    order = sorted(bones, key=lambda bone: _depth(bone, above))
+    places, rotations = _rest(figure, bones)
+    nodes = _add_nodes(document, order, above, places)
+    turns, hips = _moved(figure, frames, world_up, bones, rotations)
+    keys = _Keys(document, np.arange(frames.n_frames) / animation.frame_rate)
+    for bone in order:
+        local = turns[bone]
+        if above[bone]:
+            local = np.swapaxes(turns[above[bone]], -1, -2) @ local
+        keys.add(nodes[bone], "rotation", _continuous(matrix_to_quaternion(local)), "VEC4")
+    keys.add(nodes["hips"], "translation", hips, "VEC3")
+    told: dict[str, Any] = {
+        "specVersion": "1.0",
+        "humanoid": {"humanBones": {bone: {"node": nodes[bone]} for bone in order}},
+    }
+    weights = _add_expressions(document, keys, figure, frames)
+    if weights:
+        told["expressions"] = weights
+    keys.finish(animation.motion.name or animation.name)
+    document.root["extensions"] = {_EXTENSION: told}
+    document.root["extensionsUsed"] = [_EXTENSION]
+    return weights
+
+
+def _parent(bone: str, bones: dict[str, int]) -> str:
+    """Return the nearest bone above one; empty for the hips."""
+    above = bone_above(bone)
+    if bone in ("neck", "head") or bone.endswith(("Shoulder", "UpperArm")):
+        spine = ("upperChest", "chest", "spine")
+        chain = {"head": ("neck", *spine)}.get(bone, spine)
+        if bone.endswith("UpperArm"):
+            chain = (bone.replace("UpperArm", "Shoulder"), *spine)
+        above = next(each for each in chain if each in bones)
+    return above
+
+
+def _depth(bone: str, above: dict[str, str]) -> int:
+    return 0 if not above[bone] else 1 + _depth(above[bone], above)
+
+
+def _rest(figure: Figure, bones: dict[str, int]) -> tuple[dict[str, Floats], dict[str, Floats]]:
+    """Return positions and rotations of the bones in a T-pose, in VRM's axes, on the ground."""
+    still, _ = in_t_pose(standing(figure, figure_pose(figure), bones), bones)
+    world = world_matrices(still.require_skeleton(), figure_pose(still))
+    places = {bone: world[joint, :3, 3] for bone, joint in bones.items()}
+    return places, {bone: unit_rotation(world[joint]) for bone, joint in bones.items()}
+
+
+def _add_nodes(
+    document: Document, order: list[str], above: dict[str, str], places: dict[str, Floats]
+) -> dict[str, int]:
+    nodes: dict[str, int] = {}
+    for bone in order:
+        start = places[above[bone]] if above[bone] else np.zeros(3)
+        item = {"name": bone, "translation": (places[bone] - start).tolist()}
+        nodes[bone] = document.add("nodes", item)
+        if above[bone]:
+            parent = document.root["nodes"][nodes[above[bone]]]
+            parent.setdefault("children", []).append(nodes[bone])
+    document.root["scene"] = document.add("scenes", {"nodes": [nodes["hips"]]})
+    return nodes
+
+
+def _moved(
+    figure: Figure,
+    frames: Frames,
+    world_up: str,
+    bones: dict[str, int],
+    rotations: dict[str, Floats],
+) -> tuple[dict[str, Floats], Floats]:
+    """Return the world rotations of the nodes (F, 3, 3), and the positions of the hips (F, 3)."""
+    own = vrm_axes(figure, figure_pose(figure), bones)
+    axes = own
+    if world_up != figure.up:
+        quarter = np.asarray(-np.pi / 2 if world_up == "z" else 0.0)
+        axes = axis_rotations(0, quarter)
+    world = world_frames(figure, frames)
+    turns = {}
+    for bone, joint in bones.items():
+        linear = world[:, joint, :3, :3]
+        turned = linear / np.linalg.norm(linear, axis=1, keepdims=True)
+        # The T-pose is in VRM's axes already: its rotation is B T.
+        turns[bone] = axes @ turned @ rotations[bone].T
+    scale = METRES.get(figure.unit, 1.0)
+    return turns, scale * world[:, bones["hips"], :3, 3] @ axes.T
+
+
+def _add_expressions(
+    document: Document, keys: _Keys, figure: Figure, frames: Frames
+) -> dict[str, dict[str, Any]]:
+    """Add a node for each expression that is used; return the members of the extension."""
+    shapes, weights = figure.blend_shapes, frames.shape_weights
+    found: dict[str, dict[str, Any]] = {}
+    for row, name in enumerate(shapes.names if shapes is not None else ()):
+        is_used = row < weights.shape[1] and weights[:, row].any()
+        if shapes is None or not shapes.is_expression(row) or not is_used:
+            continue
+        node = document.add("nodes", {"name": text_of(name)})
+        document.root["scenes"][0]["nodes"].append(node)
+        places = np.zeros((frames.n_frames, 3))
+        places[:, 0] = np.clip(weights[:, row], 0.0, 1.0)
+        keys.add(node, "translation", places, "VEC3")
+        kind = "preset" if name in PRESETS else "custom"
+        found.setdefault(kind, {})[text_of(name)] = {"node": node}
+    return found
+
+
+def _continuous(rotations: Floats) -> Floats:
+    """Return quaternions (F, 4), each with the sign nearest to the previous one."""
+    cosines = np.einsum("fa,fa->f", rotations[1:], rotations[:-1])
+    signs = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0))
+    rotations[1:] *= signs[:, None]
+    return rotations
+
+
+class _Keys:
+    """Samplers and channels of the animation, with a key per frame.
+
+    ``times`` (F,): seconds.
+    """
+
+    def __init__(self, document: Document, times: Floats) -> None:
+        self._document = document
+        self._times = document.array(times, "SCALAR", bounds=True)
+        self._samplers: list[dict[str, Any]] = []
+        self._channels: list[dict[str, Any]] = []
+
+    def add(self, node: int, path: str, values: Floats, kind: str) -> None:
+        """Add one property of a node."""
+        output = self._document.array(values, kind)
+        target = {"node": node, "path": path}
+        self._channels.append({"sampler": len(self._samplers), "target": target})
+        sampler = {"input": self._times, "output": output, "interpolation": "LINEAR"}
+        self._samplers.append(sampler)
+
+    def finish(self, name: str) -> None:
+        """Add the animation to the document."""
+        item = {"name": text_of(name), "samplers": self._samplers, "channels": self._channels}
+        self._document.add("animations", item)

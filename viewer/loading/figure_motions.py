@@ -1,0 +1,88 @@
+"""Animations of one figure's file on another figure."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.formats import Source
+from viewer.loading.cast import Cast
+from viewer.loading.skeleton_motions import drive_somebody
+from viewer.rig.figure import Figure
+from viewer.rig.figure_group import FigureGroup
+from viewer.rig.motion.animation_choice import chosen_animation
+from viewer.rig.motion.baking import baked
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+
+if TYPE_CHECKING:
+    from viewer.formats import Content
+
+__all__ = ["drive_by_figures", "motion_in"]
+
+
+def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
+    """Return the motion of a file that is given as a motion.
+
+    Parameters
+    ----------
+    source : Source
+        The file.
+    content : Content
+        What was read from it.
+    wanted : str
+        The animation, see ``chosen_animation``.
+
+    Raises
+    ------
+    FormatError
+        If it has no motion of a skeleton.
+    RigError
+        If there is no such animation.
+    """
+    if isinstance(content, SkeletonMotion):
+        return content
+    figures = content.figures if isinstance(content, FigureGroup) else (content,)
+    for figure in figures:
+        if isinstance(figure, Figure) and figure.skeleton is not None and figure.animations:
+            return _motion_of(figure, wanted)
+    raise source.fault("F002.no-motion")
+
+
+def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
+    """Return an animation of a figure as the motion of its skeleton, sampled at its own rate."""
+    chosen = chosen_animation([figure], wanted) or figure.animations[0]
+    clip = baked(figure, chosen.clip())
+    bare = Figure(figure.name, skeleton=figure.skeleton, up=figure.up, unit=figure.unit)
+    return SkeletonMotion(bare, clip)
+
+
+def drive_by_figures(cast: Cast, wanted: str) -> bool:
+    """Let skeletons with animations, but without a mesh, move figures that have no motion.
+
+    A skeleton that moves another figure is not shown itself. Returns whether there is one.
+
+    Parameters
+    ----------
+    cast : Cast
+        The actors before they play animations.
+    wanted : str
+        The animation, see ``chosen_animation``.
+    """
+    found = False
+    for actor in [*cast.actors]:
+        figure = actor.figure
+        if figure.mesh is not None or actor.clip is not None or not figure.animations:
+            continue
+        if not any(other.figure.is_attached and other.clip is None for other in cast.actors):
+            break
+        try:
+            motion = _motion_of(figure, wanted)
+        except RigError:
+            continue  # reported when the animations are started
+        if drive_somebody(actor.origin or Path(figure.name), motion, cast, np.eye(4))[0]:
+            cast.take(next(n for n, other in enumerate(cast.actors) if other is actor))
+            found = True
+    return found

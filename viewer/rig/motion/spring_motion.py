@@ -1,0 +1,228 @@
+"""Playback of spring joints: an actor's pose and baked frames follow the simulation."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.evaluation import (
+    JointMotion,
+    frame_rate,
+    frames_of,
+    rest_translations_of,
+    world_frames,
+)
+from viewer.rig.motion.own_animations import still_pose
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose, PoseKey, pose_key
+from viewer.rig.posing.pose_vector import set_joint_rotations
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.springs.simulation import STEPS_PER_SECOND
+from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.track import PosedJoints, SpringTrack
+
+__all__ = [
+    "SpringMotion",
+    "has_springs",
+    "release_springs",
+    "springs_for",
+    "with_baked_springs",
+]
+
+_MOST_TRACKS = 4
+_ON_FRAME = 1e-6  # fraction of a frame
+
+
+class SpringMotion:
+    """Simulation of an actor's spring joints; ``Actor.springs`` holds it while it is on.
+
+    Copies of an actor may share it. Results are kept until the clip changes, or the part of the
+    pose that the clip does not animate.
+
+    Parameters
+    ----------
+    up : (3,), optional
+        The direction that is up in the world of the clip, in figure space: that of the figure if
+        omitted. Gravity is rotated with it.
+    """
+
+    def __init__(self, up: Floats | None = None) -> None:
+        self._up = up
+        self._tracks: dict[tuple[int, PoseKey], tuple[JointMotion, SpringTrack]] = {}
+
+    def swing(self, actor: Actor, time: float) -> None:
+        """Rotate the spring joints of an actor that has just been posed by its clip, in place.
+
+        Parameters
+        ----------
+        actor : Actor
+            Actor with a pose; nothing happens without springs or a motion of joints.
+        time : float
+            Seconds on the clip's own clock.
+        """
+        clip, skeleton = actor.clip, actor.figure.skeleton
+        if not isinstance(clip, JointMotion) or skeleton is None or skeleton.springs is None:
+            return
+        rotations = self.rotations(actor, np.array([time]))[0]
+        matrices = quaternion_to_matrix(rotations)
+        pose = actor.require_pose()
+        set_joint_rotations(skeleton, pose, skeleton.springs.joints, matrices, clamp=False)
+
+    def rotations(self, actor: Actor, times: Floats) -> Floats:
+        """Return the rotations of the spring joints at some times (F,) s: (F, N, 4)."""
+        clip, figure = actor.clip, actor.figure
+        if not isinstance(clip, JointMotion):
+            raise RigError(f"{actor.name} has no motion of joints")
+        base = _still(actor, clip)
+        key = id(clip), pose_key(base)
+        if key not in self._tracks:
+            while len(self._tracks) >= _MOST_TRACKS:
+                del self._tracks[next(iter(self._tracks))]
+            track = SpringTrack(self.skeleton_of(figure), clip.start, clip.end)
+            # The clip is kept alive, so that no other clip gets its id.
+            self._tracks[key] = clip, track
+        track = self._tracks[key][1]
+        return track.rotations(times, lambda at: _posed(figure, clip, at, base))
+
+    def skeleton_of(self, figure: Figure) -> Skeleton:
+        """Return the skeleton with gravity in the world of the clip."""
+        skeleton, own = figure.require_skeleton(), np.zeros(3)
+        own["xyz".index(figure.up)] = 1.0
+        if self._up is None or skeleton.springs is None or np.allclose(own, self._up):
+            return skeleton
+        middle = unit(own + self._up)
+        if not middle.any():
+            middle = np.eye(3)["yzx".index(figure.up)]
+        # Two half turns, about the figure's up axis and about the middle of both.
+        first = 2.0 * np.outer(own, own) - np.eye(3)
+        turn = (2.0 * np.outer(middle, middle) - np.eye(3)) @ first
+        springs = skeleton.springs
+        turned = replace(springs, gravities=springs.gravities @ turn.T)
+        return replace(skeleton, springs=turned)
+
+
+def springs_for(actor: Actor, up: str) -> SpringMotion | None:
+    """Return the simulation of an actor in a scene; None without spring joints.
+
+    Parameters
+    ----------
+    actor : Actor
+        Its placement is that of the scene.
+    up : "y" or "z"
+        Up axis of the scene.
+    """
+    if not has_springs(actor):
+        return None
+    above = np.zeros(3)
+    above["xyz".index(up)] = 1.0
+    return SpringMotion(unit(actor.placement[:3, :3].T @ above))
+
+
+def has_springs(actor: Actor) -> bool:
+    """Return whether an actor's figure has spring joints."""
+    skeleton = actor.figure.skeleton
+    return skeleton is not None and skeleton.springs is not None
+
+
+def release_springs(actor: Actor) -> None:
+    """Return the spring joints of a pose to rest, in place, for instance to switch them off."""
+    skeleton = actor.figure.skeleton
+    if skeleton is not None and skeleton.springs is not None and actor.pose is not None:
+        _rest(actor.figure, skeleton.springs, actor.pose)
+
+
+def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
+    """Return an actor's motion as frames that include the rotations of its spring joints.
+
+    Parameters
+    ----------
+    actor : Actor
+        Actor with spring joints and a motion of joints.
+    rate : float, optional
+        Frames per second; that of the motion if omitted, or that of the simulation for DOF curves.
+
+    Raises
+    ------
+    RigError
+        If the actor has no motion of joints.
+    """
+    clip, skeleton = actor.clip, actor.figure.require_skeleton()
+    if not isinstance(clip, JointMotion) or skeleton.springs is None:
+        raise RigError(f"{actor.name} has no motion of spring joints")
+    if rate is None:
+        rate = STEPS_PER_SECOND if isinstance(clip, Clip) else frame_rate(clip)
+    count = int(np.floor((clip.end - clip.start) * rate + _ON_FRAME)) + 1
+    times = clip.start + np.arange(count) / rate
+    frames = frames_of(actor.figure, clip, times, actor.pose)
+    rotations = frames.rotations.copy()
+    swings = actor.springs if isinstance(actor.springs, SpringMotion) else SpringMotion()
+    rotations[:, skeleton.springs.joints] = swings.rotations(actor, times)
+    rows: Ints = np.arange(count, dtype=np.int32)
+    return SampledClip(
+        clip.name,
+        Timing(rate, np.where(frames.present, rows, -1).astype(np.int32), start=clip.start),
+        rotations,
+        frames.translations if frames.translations.any() else None,
+        frames.figure_translations if frames.figure_translations.any() else None,
+        frames.figure_scales if (frames.figure_scales != 1.0).any() else None,
+        frames.shape_weights if actor.figure.n_shapes else None,
+        frames.scales,
+    )
+
+
+def _still(actor: Actor, clip: JointMotion) -> Pose:
+    """Return the part of an actor's pose that neither its clip nor its springs change."""
+    figure, pose = actor.figure, actor.require_pose()
+    skeleton = figure.require_skeleton()
+    if isinstance(clip, TransformClip):
+        base = still_pose(actor)
+    elif isinstance(clip, Clip):
+        base = pose.copy()
+        targets = [channel.target for channel in clip.channels]
+        base.dofs[targets] = figure_pose(figure).dofs[targets]
+    else:
+        base = figure_pose(figure)
+        if clip.scales is None:
+            base.scales[:] = pose.scales
+        if clip.figure_scales is None:
+            base.figure_scale = pose.figure_scale
+        if clip.figure_translations is None:
+            base.figure_translation = pose.figure_translation.copy()
+        if clip.shape_weights is None:
+            base.shape_weights = pose.shape_weights.copy()
+    if skeleton.springs is not None:
+        _rest(figure, skeleton.springs, base)
+    return base
+
+
+def _rest(figure: Figure, springs: Springs, pose: Pose) -> None:
+    """Return spring joints to their rest rotation, in place."""
+    own, skeleton = figure_pose(figure), figure.require_skeleton()
+    pose.rotations[springs.joints] = own.rotations[springs.joints]
+    chosen = np.isin(skeleton.dof_joints, springs.joints) & (skeleton.dof_kinds >= 3)
+    np.copyto(pose.dofs, own.dofs, where=chosen)
+
+
+def _posed(figure: Figure, clip: JointMotion, times: Floats, base: Pose) -> PosedJoints:
+    """Return the joints of a motion without springs."""
+    frames = frames_of(figure, clip, times, base, interpolate=True)
+    world, count = world_frames(figure, frames), frames.n_frames
+    local = np.zeros_like(world)
+    local[..., 3, 3] = 1.0
+    local[..., :3, :3] = quaternion_to_matrix(frames.rotations)
+    local[..., :3, 3] = rest_translations_of(figure, frames.shape_weights) + frames.translations
+    places = np.tile(np.eye(4), (count, 1, 1))
+    places[:, :3, :3] *= frames.figure_scales[:, None, None]
+    places[:, :3, 3] = frames.figure_translations
+    scales = np.broadcast_to(frames.scales, (count, *frames.scales.shape[1:]))
+    return PosedJoints(world, local, scales, places)

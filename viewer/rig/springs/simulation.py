@@ -1,0 +1,268 @@
+"""Simulation of spring joints by Verlet integration, in steps of equal length.
+
+With the position c of the point now and p in the step before, the head h and rest direction a of
+the joint in its posed parent, and a step of t seconds, a step computes ::
+
+    n = c + (1 - drag) (c - p) + t (stiffness a + gravity)
+    n = h + length (n - h) / |n - h|
+
+and then moves n out of each collider, along the shortest way, and back to its length. The joint's
+rotation is the smallest one that points it at n. Inertia, the first two terms, is evaluated in the
+space of the joint's centre. Joints are updated from the root to the tips.
+
+Source: ``VRMC_springBone`` 1.0, github.com/vrm-c/vrm-specification.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.geometry.vectors import unit
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.springs.springs import Springs
+
+__all__ = ["STEPS_PER_SECOND", "Simulation", "Tails"]
+
+STEPS_PER_SECOND = 60
+"""Steps of the simulation per second; the result depends on it, as in other programs."""
+
+_STEP = 1.0 / STEPS_PER_SECOND
+_SHORT = 1e-12
+_OPPOSITE = 1e-9
+_FLAT = 1e-30  # determinant below which a matrix has no inverse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Tails:
+    """The points that swing, each in the space of its centre: (N, 3) now and one step before."""
+
+    now: Floats
+    before: Floats
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Level:
+    """Joints at one depth below the topmost spring joint.
+
+    ``joints``, ``parents`` (L,): indices of joints; a parent may be -1.
+    ``rows`` (N',): indices of the spring joints among them, and ``places`` (N',) where they are.
+    ``hits``: pairs of positions in ``rows`` and colliders, one collider per spring joint at a time.
+    """
+
+    joints: Ints
+    parents: Ints
+    rows: Ints
+    places: Ints
+    hits: tuple[tuple[Ints, Ints], ...]
+
+
+class Simulation:
+    """Evaluator of the spring joints of one skeleton.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Skeleton with springs.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        if skeleton.springs is None:
+            raise ValueError("expected a skeleton with springs")
+        self._springs: Springs = skeleton.springs
+        rests = skeleton.rest_rotations[self._springs.joints]
+        self._rests = rests / np.linalg.norm(rests, axis=-1, keepdims=True)
+        self._linear = quaternion_to_matrix(self._rests)
+        self._axes = unit(self._springs.tails)
+        self._levels = _levels(skeleton, self._springs)
+
+    @property
+    def rests(self) -> Floats:
+        """Rotations of the spring joints at rest: (N, 4)."""
+        return self._rests
+
+    def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> Tails:
+        """Return points without speed, in the rest pose of the spring joints; as for ``step``."""
+        springs, world = self._springs, world.copy()
+        points = np.zeros((springs.n_joints, 3))
+        for level in self._levels:
+            heads = self._heads(level, world, local, place)
+            rows = level.rows
+            tails = springs.tails[rows] * scales[springs.joints[rows]]
+            points[rows] = _points(heads[level.places], tails)
+            world[level.joints] = _scaled(heads, scales[level.joints])
+        points = _points(_inverse(self._centers(world)), points)
+        return Tails(points, points)
+
+    def step(
+        self, tails: Tails, world: Floats, local: Floats, scales: Floats, place: Floats
+    ) -> tuple[Tails, Floats]:
+        """Return the points after one step, and the rotations of the spring joints.
+
+        Parameters
+        ----------
+        tails : Tails
+            The points before the step.
+        world, local : (J, 4, 4)
+            Matrices of all joints in the pose at the end of the step, without springs; local ones
+            without scale.
+        scales : (J, 3)
+            Scale factors of the joints.
+        place : (4, 4)
+            Placement of the whole figure.
+
+        Returns
+        -------
+        tails : Tails
+            The points after the step.
+        rotations : (N, 4)
+            Complete rotations relative to the parents: unit quaternions (x, y, z, w).
+        """
+        springs, world = self._springs, world.copy()
+        now = np.empty_like(tails.now)
+        rotations = np.empty((springs.n_joints, 4))
+        for level in self._levels:
+            heads = self._heads(level, world, local, place)
+            rows, at = level.rows, level.places
+            if len(rows):
+                factors = scales[springs.joints[rows]]
+                points = self._moved(level, tails, world, heads[at], factors)
+                arcs = self._arcs(rows, heads[at], points, factors)
+                rotations[rows] = multiply(self._rests[rows], arcs)
+                heads[at, :3, :3] = heads[at, :3, :3] @ quaternion_to_matrix(arcs)
+                centers = self._centers(world, rows)
+                now[rows] = _points(_inverse(centers), points)
+            world[level.joints] = _scaled(heads, scales[level.joints])
+        return Tails(now, tails.now), rotations
+
+    def _heads(self, level: _Level, world: Floats, local: Floats, place: Floats) -> Floats:
+        """Return world matrices without own scale, spring joints in their rest rotation."""
+        own = local[level.joints]
+        own[level.places, :3, :3] = self._linear[level.rows]
+        above = np.where((level.parents >= 0)[:, None, None], world[level.parents], place)
+        found: Floats = above @ own
+        return found
+
+    def _centers(self, world: Floats, rows: Ints | None = None) -> Floats:
+        """Return the matrices from center space to figure space: (N, 4, 4)."""
+        centers = self._springs.centers if rows is None else self._springs.centers[rows]
+        found: Floats = np.where((centers >= 0)[:, None, None], world[centers], np.eye(4))
+        return found
+
+    def _moved(
+        self, level: _Level, tails: Tails, world: Floats, heads: Floats, factors: Floats
+    ) -> Floats:
+        """Return the points of one level in figure space after one step: (N', 3)."""
+        springs, rows = self._springs, level.rows
+        origins = heads[:, :3, 3]
+        rest = np.einsum("nab,nb->na", heads[:, :3, :3], springs.tails[rows] * factors)
+        lengths = np.linalg.norm(rest, axis=-1, keepdims=True)
+        speed = (tails.now[rows] - tails.before[rows]) * (1.0 - springs.drags[rows, None])
+        points = _points(self._centers(world, rows), tails.now[rows] + speed)
+        points = points + _STEP * springs.stiffness[rows, None] * unit(rest)
+        points = points + _STEP * springs.gravities[rows]
+        points = _at_length(points, origins, lengths, rest)
+        for chosen, which in level.hits:
+            moved, is_inside = self._pushed(points[chosen], rows[chosen], which, world)
+            held = _at_length(moved, origins[chosen], lengths[chosen], rest[chosen])
+            points[chosen] = np.where(is_inside[:, None], held, points[chosen])
+        return points
+
+    def _pushed(
+        self, points: Floats, rows: Ints, which: Ints, world: Floats
+    ) -> tuple[Floats, Bools]:
+        """Return points moved to the surface of one collider each, and whether they were inside."""
+        shapes = self._springs.colliders
+        matrices = world[shapes.joints[which]]
+        start = _points(matrices, shapes.offsets[which])
+        along = _points(matrices, shapes.tails[which]) - start
+        delta = points - start
+        square = np.einsum("na,na->n", along, along)
+        fraction = np.einsum("na,na->n", along, delta) / np.maximum(square, _SHORT)
+        delta = delta - np.clip(fraction, 0.0, 1.0)[:, None] * along
+        distance = np.linalg.norm(delta, axis=-1) - shapes.radii[which] - self._springs.radii[rows]
+        return points - unit(delta) * distance[:, None], distance < 0.0
+
+    def _arcs(self, rows: Ints, heads: Floats, points: Floats, factors: Floats) -> Floats:
+        """Return the smallest rotations from the rest directions to the points: (N', 4)."""
+        away = (points - heads[:, :3, 3])[..., None]
+        local = np.linalg.solve(_regular(heads[:, :3, :3]), away)[..., 0]
+        start, end = self._axes[rows], unit(local / np.where(factors == 0.0, 1.0, factors))
+        scalar = 1.0 + np.einsum("na,na->n", start, end)[:, None]
+        arcs = np.concatenate([np.cross(start, end), scalar], axis=-1)
+        # Opposite directions: rotate by 180 degrees about any perpendicular axis.
+        other = np.cross(start, np.eye(3)[np.abs(start).argmin(axis=-1)])
+        half = np.concatenate([other, np.zeros_like(scalar)], axis=-1)
+        return unit(np.where(scalar > _OPPOSITE, arcs, half))
+
+
+def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
+    """Return the spring joints and all joints below them by depth."""
+    depths = np.full(skeleton.n_joints, -1)
+    is_spring = np.zeros(skeleton.n_joints, dtype=np.bool_)
+    is_spring[springs.joints] = True
+    for joint, parent in enumerate(skeleton.parents.tolist()):
+        above = depths[parent] if parent >= 0 else -1
+        depths[joint] = above + 1 if above >= 0 or is_spring[joint] else -1
+    row_of = np.full(skeleton.n_joints, -1, dtype=np.int32)
+    row_of[springs.joints] = np.arange(springs.n_joints)
+    levels = []
+    for depth in range(int(depths.max(initial=-1)) + 1):
+        joints: Ints = np.flatnonzero(depths == depth).astype(np.int32)
+        places: Ints = np.flatnonzero(is_spring[joints]).astype(np.int32)
+        rows = row_of[joints[places]]
+        hits = _hits([springs.obstacles[row] for row in rows])
+        levels.append(_Level(joints, skeleton.parents[joints], rows, places, hits))
+    return levels
+
+
+def _hits(listed: list[tuple[int, ...]]) -> tuple[tuple[Ints, Ints], ...]:
+    """Return the first collider of all points that have one, then the second ones, and so on."""
+    most = max(map(len, listed), default=0)
+    pairs = []
+    for rank in range(most):
+        chosen = [place for place, each in enumerate(listed) if len(each) > rank]
+        which = [listed[place][rank] for place in chosen]
+        pairs.append((np.array(chosen, np.int32), np.array(which, np.int32)))
+    return tuple(pairs)
+
+
+def _points(matrices: Floats, points: Floats) -> Floats:
+    """Return points transformed by one matrix each: (N, 3)."""
+    found: Floats = np.einsum("nab,nb->na", matrices[:, :3, :3], points) + matrices[:, :3, 3]
+    return found
+
+
+def _inverse(matrices: Floats) -> Floats:
+    regular = matrices.copy()
+    regular[:, :3, :3] = _regular(matrices[:, :3, :3])
+    return np.asarray(np.linalg.inv(regular), dtype=np.float64)
+
+
+def _regular(linear: Floats) -> Floats:
+    """Return matrices (N, 3, 3) with the identity in place of those that have no inverse.
+
+    Joints are hidden by a scale of 0, which leaves nothing to swing.
+    """
+    is_flat = np.abs(np.linalg.det(linear)) < _FLAT
+    found: Floats = np.where(is_flat[:, None, None], np.eye(3), linear)
+    return found
+
+
+def _scaled(matrices: Floats, scales: Floats) -> Floats:
+    """Return matrices with the scales of the joints applied first."""
+    matrices[:, :3, :3] *= scales[:, None, :]
+    return matrices
+
+
+def _at_length(points: Floats, origins: Floats, lengths: Floats, rest: Floats) -> Floats:
+    """Return points moved to a distance from their origins; the rest direction if undefined."""
+    away = points - origins
+    distance = np.linalg.norm(away, axis=-1, keepdims=True)
+    away = np.where(distance > _SHORT, away / np.maximum(distance, _SHORT), unit(rest))
+    found: Floats = origins + lengths * away
+    return found

@@ -1,0 +1,111 @@
+"""Spring joints of a skeleton and the shapes that they collide with, as in VRM."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+
+__all__ = ["Colliders", "Springs"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Colliders:
+    """Spheres and capsules that follow joints.
+
+    Attributes
+    ----------
+    joints : (C,) int32
+        Joint that each shape follows.
+    offsets, tails : (C, 3)
+        Centres of both ends in joint space; equal for a sphere.
+    radii : (C,)
+        Scene units; joints do not scale them.
+    """
+
+    joints: Ints
+    offsets: Floats
+    tails: Floats
+    radii: Floats
+
+    def __post_init__(self) -> None:
+        count = len(self.joints)
+        for name, shape in (("offsets", (count, 3)), ("tails", (count, 3)), ("radii", (count,))):
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
+        object.__setattr__(self, "joints", frozen("joints", self.joints, (count,), np.int32))
+
+    @property
+    def n_colliders(self) -> int:
+        """Number of shapes, C."""
+        return len(self.joints)
+
+
+def _no_colliders() -> Colliders:
+    return Colliders(np.zeros(0, np.int32), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Springs:
+    """Joints whose rotation follows from the inertia of a point below them.
+
+    Attributes
+    ----------
+    joints : (N,) int32
+        Joints that swing, each once.
+    tails : (N, 3)
+        The point that swings, in the rest space of the joint.
+    stiffness : (N,)
+        Speed towards the rest direction, per second.
+    drags : (N,)
+        Fraction of the speed that is lost in each step, 0 to 1.
+    gravities : (N, 3)
+        Constant speed in figure space, per second.
+    radii : (N,)
+        Radius of the sphere around the point that collides.
+    centers : (N,) int32
+        Joint relative to which inertia is evaluated; -1 for figure space.
+    colliders : Colliders
+        Shapes of the figure.
+    obstacles : tuple of N tuple of int
+        Indices of the colliders that each point avoids, in this order.
+    n_chains : int
+        Number of chains in the file.
+    """
+
+    joints: Ints
+    tails: Floats
+    stiffness: Floats
+    drags: Floats
+    gravities: Floats
+    radii: Floats
+    centers: Ints
+    colliders: Colliders = field(default_factory=_no_colliders)
+    obstacles: tuple[tuple[int, ...], ...] = ()
+    n_chains: int = 1
+
+    def __post_init__(self) -> None:
+        def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
+            object.__setattr__(self, name, frozen(name, getattr(self, name), shape, dtype))
+
+        count = len(self.joints)
+        for name in ("tails", "gravities"):
+            put(name, (count, 3))
+        for name in ("stiffness", "drags", "radii"):
+            put(name, (count,))
+        for name in ("joints", "centers"):
+            put(name, (count,), np.int32)
+        if len(np.unique(self.joints)) != count:
+            raise RigError("springs: expected each joint once")
+        if not self.obstacles:
+            object.__setattr__(self, "obstacles", ((),) * count)
+        indices = {index for listed in self.obstacles for index in listed}
+        if len(self.obstacles) != count or not indices <= {*range(self.colliders.n_colliders)}:
+            raise RigError("springs: expected indices of colliders for each joint")
+
+    @property
+    def n_joints(self) -> int:
+        """Number of joints that swing, N."""
+        return len(self.joints)
