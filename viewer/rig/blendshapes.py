@@ -8,9 +8,15 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.bodies.feature import Feature
+from viewer.rig.bodies.shape_space import ShapeSpace
 from viewer.rig.expressions import ExpressionRules
 
 __all__ = ["BlendShapes", "Correctives", "JointRegressor", "corrective_weights", "regress_joints"]
+
+
+_BLOCK = 9  # correctives of one joint in SMPL
+_LONGEST = 252  # rows in one range of correctives; a multiple of the block
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,6 +39,13 @@ class BlendShapes:
         Weights of the file's own pose; None if all are 0.
     rules : ExpressionRules or None
         How weights of expressions change each other; None if they do not.
+    space : ShapeSpace or None
+        Computes the displacement if it is not the sum of the offsets; these are then those of
+        each weight of 1 alone.
+    origins : (S,) or None
+        Number that a slider shows at weight 0; None if all are 0.
+    ranges : (S, 2) or None
+        Smallest and largest number of each slider; None for the usual range of its group.
     """
 
     names: tuple[str, ...]
@@ -41,8 +54,15 @@ class BlendShapes:
     normal_offsets: Floats | Deferred | None = None
     rest_weights: Floats | None = None
     rules: ExpressionRules | None = None
+    space: ShapeSpace | None = None
+    origins: Floats | None = None
+    ranges: Floats | None = None
 
     def __post_init__(self) -> None:
+        for name, size in (("origins", ()), ("ranges", (2,))):
+            if getattr(self, name) is not None:
+                numbers = frozen(name, getattr(self, name), (len(self.names), *size))
+                object.__setattr__(self, name, numbers)
         if not isinstance(self.offsets, Deferred):
             offsets = frozen("offsets", self.offsets, (len(self.names), None, 3))
             object.__setattr__(self, "offsets", offsets)
@@ -71,12 +91,21 @@ class BlendShapes:
         """Number of vertices, V."""
         return self.offsets.shape[1]
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether the displacement is the weighted sum of the offsets."""
+        return self.space is None
+
+    def origin(self, row: int) -> float:
+        """Return the number that the slider of a blend shape shows at weight 0."""
+        return 0.0 if self.origins is None else float(self.origins[row])
+
     def is_expression(self, row: int) -> bool:
         """Return whether a blend shape is a combination of others, governed by ``rules``."""
         return self.rules is not None and bool((self.rules.rows == row).any())
 
     def displacement(self, weights: Floats) -> Floats:
-        """Return sum_s w_s d_s.
+        """Return sum_s w_s d_s, or the displacement of the shape space.
 
         Parameters
         ----------
@@ -93,6 +122,9 @@ class BlendShapes:
         RigError
             If there are more weights than blend shapes.
         """
+        if self.space is not None:
+            self._check_count(weights)
+            return self.space.displacement(weights)
         return self._weighted(self.offsets, weights)
 
     def normal_displacement(self, weights: Floats) -> Floats | None:
@@ -118,13 +150,16 @@ class BlendShapes:
 
     def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
         """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
-        if len(weights) > self.n_shapes:
-            raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
+        self._check_count(weights)
         weights = weights if self.rules is None else self.rules.shown(weights)
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
         return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
+
+    def _check_count(self, weights: Floats) -> None:
+        if len(weights) > self.n_shapes:
+            raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
 
     def direction_values(self) -> Floats:
         """Return the offsets, read from the file on first use: (S, V, 3)."""
@@ -138,27 +173,40 @@ class BlendShapes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correctives:
-    """Pose-dependent offsets of the SMPL family: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
+    """Pose-dependent offsets of body models: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
 
     Attributes
     ----------
-    offsets : (9 (J - 1), V, 3), or Deferred
-        Figure units per unit of ``corrective_weights``.
+    offsets : (P, V, 3), or Deferred
+        Figure units per unit of weight.
+    feature : Feature or None
+        Computes the weights of a pose; None for those of SMPL, ``corrective_weights``, which are
+        nine for each joint except the root.
     """
 
     offsets: Floats | Deferred
+    feature: Feature | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
             object.__setattr__(self, "offsets", frozen("offsets", self.offsets, (None, None, 3)))
         count = self.offsets.shape[0]
-        if len(self.offsets.shape) != 3 or count % 9:
+        if self.feature is not None:
+            _check_shape(
+                "offsets", self.offsets.shape, (self.feature.n_weights, self.n_vertices, 3)
+            )
+        elif len(self.offsets.shape) != 3 or count % _BLOCK:
             raise RigError(f"offsets: expected nine for each joint except the root, found {count}")
 
     @property
     def n_vertices(self) -> int:
         """Number of vertices, V."""
         return self.offsets.shape[1]
+
+    @property
+    def block(self) -> int:
+        """Number of weights that are skipped together if all of them are 0."""
+        return _BLOCK if self.feature is None else 1
 
     def values(self) -> Floats:
         """Return the offsets, read from the file on first use."""
@@ -169,8 +217,8 @@ class Correctives:
 
         Parameters
         ----------
-        weights : (9 (J - 1),)
-            From ``corrective_weights``.
+        weights : (P,)
+            From ``viewer.rig.shape.pose_weights``.
 
         Returns
         -------
@@ -178,16 +226,24 @@ class Correctives:
             Figure units.
         """
         total = np.zeros(3 * self.n_vertices)
-        for rows in active_rows(weights):
+        for rows in active_rows(weights, self.block):
             total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)
         return total.reshape(-1, 3)
 
 
-def active_rows(weights: Floats) -> list[slice]:
-    """Return the row ranges of consecutive joints, nine rows each, whose weights are not all 0."""
-    active = weights.reshape(-1, 9).any(axis=1)
-    edges = np.flatnonzero(np.diff(active, prepend=False, append=False))
-    return [slice(9 * int(a), 9 * int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
+    """Return the ranges of consecutive blocks of rows whose weights are not all 0.
+
+    Long ranges are split, so that the products of a range need little memory.
+    """
+    active = weights.reshape(-1, block).any(axis=1)
+    edges = np.flatnonzero(np.diff(active, prepend=False, append=False)) * block
+    ranges = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [
+        slice(start, min(start + _LONGEST, stop))
+        for first, stop in ranges
+        for start in range(first, stop, _LONGEST)
+    ]
 
 
 def corrective_weights(rotations: Floats) -> Floats:

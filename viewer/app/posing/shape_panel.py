@@ -22,6 +22,7 @@ from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
@@ -34,7 +35,14 @@ __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
 _LABELS = 0.55  # maximum width of the names, relative to the width of the panel
-_HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
+_HEADINGS = {
+    "shape": "Shape",
+    "expression": "Expression",
+    MORPH_GROUP: "Morphs",
+    "detail": "Local changes",
+    "proportion": "Proportions",
+}
+_SIGMA = "standard deviations"
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
 
@@ -120,12 +128,13 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
 
 def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: float) -> None:
     shapes, shown = state.actor.figure.blend_shapes, printable(name, 40)
-    is_morph = shapes is not None and shapes.groups[index] == MORPH_GROUP
-    low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
+    assert shapes is not None  # checked by the caller
+    low, high, unit = _slider_range(shapes, index)
+    origin = shapes.origin(index)
     changed, value = slider_float(
         state,
         begin_field(f"{shown}##{index}", column=column),
-        plain_zero(float(pose.shape_weights[index]), "%.2f"),
+        plain_zero(float(pose.shape_weights[index]) + origin, "%.2f"),
         low,
         high,
         "%.2f",
@@ -134,14 +143,23 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     if imgui.is_item_activated() and isinstance(state.actor.clip, TransformClip):
         pause_for_edit(state)
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
-        pose.shape_weights[index] = value
-    if not is_morph:
+        pose.shape_weights[index] = value - origin
+    if unit == _SIGMA:
         _draw_marks()
     if imgui.is_item_hovered():
-        unit = "1 is the full morph target" if is_morph else "standard deviations"
         show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = state.actor.figure.rest_shape_weights[index]
+
+
+def _slider_range(shapes: BlendShapes, index: int) -> tuple[float, float, str]:
+    """Return the ends of a slider, and the unit in its tooltip."""
+    if shapes.ranges is not None:
+        low, high = shapes.ranges[index].tolist()
+        return low, high, f"{low:.2g} to {high:.2g}"
+    if shapes.groups[index] == MORPH_GROUP:
+        return 0.0, 1.0, "1 is the full morph target"
+    return -_REACH, _REACH, _SIGMA
 
 
 def _draw_marks() -> None:

@@ -15,9 +15,10 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import active_rows, corrective_weights
+from viewer.rig.blendshapes import active_rows
 from viewer.rig.figure import Figure
-from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.pose import Pose
+from viewer.rig.shape import pose_weights
 from viewer.rig.skinning import Skinning
 
 __all__ = ["WAYS", "RestBuffers"]
@@ -81,7 +82,7 @@ class RestBuffers:
     def _weights(self, figure: Figure, pose: Pose) -> Floats:
         if figure.correctives is None or figure.skeleton is None:
             return np.zeros(0)
-        return corrective_weights(joint_rotations(figure.skeleton, pose))
+        return pose_weights(figure.correctives, figure.skeleton, pose)
 
     def _write_list(self, weights: Floats) -> None:
         rows = np.flatnonzero(weights)
@@ -104,7 +105,7 @@ class RestBuffers:
         rest = float32(shape.positions - self.mesh.center)
         if weights is not None:
             product = self.mesh.product
-            for rows in active_rows(weights):
+            for rows in active_rows(weights, self.mesh.block):
                 rest += (float32(weights[rows]) @ product[rows]).reshape(-1, 3)
         self.positions.write(rest[self.mesh.sources])
         if normals:

@@ -16,7 +16,7 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.hands import Hand
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.shape import joint_directions, rest_joints
+from viewer.rig.shape import joint_shifts, rest_joints
 
 __all__ = ["BodyMotion", "body_clip", "root_positions"]
 
@@ -156,8 +156,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 
 def root_positions(figure: Figure, weights: Floats) -> Floats:
     """Return the rest position of the root joint of many shapes: (N, 3) for weights (N, S)."""
-    directions = joint_directions(figure)[:, 0]
-    return rest_joints(figure)[0] + weights[:, : len(directions)] @ directions
+    return rest_joints(figure)[0] + joint_shifts(figure, weights)[:, 0]
 
 
 def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:
