@@ -59,6 +59,10 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         f"{f' (default: {default})' if default else ''}",
     )
     add_animation_argument(group)
+    group.add_argument(
+        "--rig", metavar="NAME", help="rig of Anny: default, mixamo, game_engine, cmu_mb"
+    )
+    group.add_argument("--lod", metavar="N", help="level of detail of MHR, 0 (fine) to 6 (coarse)")
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
@@ -134,6 +138,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
+        rig=arguments.rig or "",
+        lod=arguments.lod or "",
     )
 
 

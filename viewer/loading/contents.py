@@ -177,6 +177,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
 
 def _read(source: Source, settings: MotionSettings) -> Content:
     """Read a file; explicit settings override the properties of a capture."""
+    source.options = settings.options
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture

