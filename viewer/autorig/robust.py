@@ -141,7 +141,9 @@ def _transferred_skeleton(
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(aligned, mesh.triangles)
     ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
-    regressor = template.joint_regressor
+    given = template.joint_regressor
+    # Entries that mix coordinates are not weights of vertices.
+    regressor = None if given is not None and given.axes is not None else given
     found = transfer_joints(
         joints,
         skeleton.parents,

@@ -264,7 +264,7 @@ def corrective_weights(rotations: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRegressor:
-    """Rest joints as weighted sums of rest vertices, J_j = sum_v r_jv v.
+    """Rest joints as weighted sums of rest vertices, J_j = b_j + sum_v r_jv v.
 
     Attributes
     ----------
@@ -274,14 +274,27 @@ class JointRegressor:
         Row and column of each entry of the sparse (J, V) matrix.
     weights : (N,)
         Value of each entry.
+    axes : (N, 2) int32 or None
+        Coordinate of the joint and of the vertex that an entry connects; None if each connects
+        all three with themselves.
+    bias : (J, 3) or None
+        Constants b; None if all are 0.
     """
 
     n_joints: int
     joints: Ints
     vertices: Ints
     weights: Floats
+    axes: Ints | None = None
+    bias: Floats | None = None
 
     def __post_init__(self) -> None:
+        if self.axes is not None:
+            axes = frozen("axes", self.axes, (len(self.joints), 2), np.int32)
+            object.__setattr__(self, "axes", axes)
+        if self.bias is not None:
+            bias = frozen("bias", self.bias, (self.n_joints, 3))
+            object.__setattr__(self, "bias", bias)
         for name, dtype in (("joints", np.int32), ("vertices", np.int32), ("weights", np.float64)):
             values = frozen(name, getattr(self, name), (len(self.joints),), dtype)
             object.__setattr__(self, name, values)
@@ -306,12 +319,18 @@ def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
     (J, 3)
         Figure units.
     """
+    bias = np.zeros(3) if regressor.bias is None else regressor.bias
+    if regressor.axes is not None:
+        to, of = regressor.axes.T
+        terms = positions[regressor.vertices, of] * regressor.weights
+        sums = np.bincount(3 * regressor.joints + to, terms, minlength=3 * regressor.n_joints)
+        return bias + sums.reshape(-1, 3)
     terms = positions[regressor.vertices] * regressor.weights[:, None]
     columns = [
         np.bincount(regressor.joints, terms[:, axis], minlength=regressor.n_joints)
         for axis in range(3)
     ]
-    return np.stack(columns, axis=1)
+    return bias + np.stack(columns, axis=1)
 
 
 def _values(offsets: Floats | Deferred) -> Floats:

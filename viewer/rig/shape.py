@@ -209,12 +209,15 @@ def joint_directions(figure: Figure) -> Floats:
     if regressor is None or shapes is None or mesh is None:
         return directions
 
+    # Only displacements are regressed, so that constants do not count.
+    linear = replace(regressor, bias=None)
+
     def make() -> Floats:
         one, still = np.zeros(figure.n_shapes), np.zeros_like(mesh.positions)
         for row in range(figure.n_shapes):
             one[:] = 0.0
             one[row] = 1.0
-            directions[row] = regress_joints(regressor, still + shapes.displacement(one))
+            directions[row] = regress_joints(linear, still + shapes.displacement(one))
         return directions
 
     return _directions.get(figure, (), make)
