@@ -153,6 +153,12 @@ FORMATS = {
         rb"\AKaydara FBX Binary|\A;\s*FBX|\A(?s:.{0,2000}?)FBXHeaderExtension\s*:",
         writes=False,
     ),
+    "skel_body": Format(
+        "SKEL body model",
+        (".pkl", ".npz"),
+        keys=("J_regressor_osim", "skin_template_v", "apose_rel_transfo"),
+        writes=False,
+    ),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),

@@ -113,7 +113,9 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
 
 
 def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
-    return replace(skeleton, rest_translations=moved_rest_translations(skeleton, joints))
+    posing = None if skeleton.posing is None else skeleton.posing.with_joints(joints)
+    moved = moved_rest_translations(skeleton, joints)
+    return replace(skeleton, rest_translations=moved, posing=posing)
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.bodies.joint_posing import JointPosing
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.humanoid import Humanoid
 
@@ -62,6 +63,8 @@ class Skeleton:
         Joints with the standard names of human bones, if the file states them.
     constraints : tuple of Constraint
         Joints that follow others, in the order of evaluation; at most one per joint.
+    posing : JointPosing or None
+        Rules by which joints follow the DOFs instead of rotating about x, y and z.
     """
 
     names: tuple[str, ...]
@@ -77,6 +80,7 @@ class Skeleton:
     auxiliary: Bools | None = None
     humanoid: Humanoid | None = None
     constraints: tuple[Constraint, ...] = ()
+    posing: JointPosing | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

@@ -30,6 +30,9 @@ MESSAGES = {
     "F007.smpl-symmetry-range": "`vert_sym_idxs` refers to nonexistent vertices: omitted",
     "F007.smpl-symmetry": "`vert_sym_idxs` does not pair the vertices: omitted",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
+    # SKEL
+    "F002.skel-tree": "{item:text}: expected 24 joints in order, each with a parent before it",
+    "F007.skel-bones": "the mesh of the bones (`skel_template_v`) is omitted",
     # MHR
     "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "
     "writes them, and its `download_assets.py --lod 1` downloads them",
