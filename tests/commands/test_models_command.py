@@ -9,7 +9,7 @@ from formats.anny.anny_package import files
 from viewer import models
 from viewer.cli import run as main
 from viewer.formats._anny.targets import ACTIONS
-from viewer.model_catalog import CATALOG
+from viewer.models.catalog import CATALOG
 
 METADATA = b"Metadata-Version: 2.1\nName: anny\nVersion: 0.6.2\n"
 WHEEL = b"Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"

@@ -29,7 +29,7 @@ class Files:
     recent : list of tuple of str
         Groups of files that were opened together, latest first.
     models : dict
-        Body models in the model folder, by name; searched for when the menu opens.
+        Body models that were found, by name; searched for when the menu opens.
     """
 
     dialog: FileDialog | None = None
