@@ -52,6 +52,12 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
+    if named is not None and bodies and not contents.captures and not is_body(named):
+        # The bundled body drives a figure with other joints by their names.
+        for _ in contents.body_motions:
+            title = cast.free_title(named.name)
+            cast.add(Actor(named, called=title), named.up, placed=False)
+        named = None
     if bodies:
         model, is_bundled = _model(cast, named)
         for path, body in contents.body_motions:
