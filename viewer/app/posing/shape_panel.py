@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import begin_field, slider_float
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import whole_field
+from viewer.app.core.text_fields import search_field, whole_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -34,6 +34,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
+_SEARCHED = 60  # longer lists of shapes have a filter
 _LABELS = 0.55  # maximum width of the names, relative to the width of the panel
 _HEADINGS = {
     "shape": "Shape",
@@ -67,6 +68,9 @@ def draw(state: AppState) -> None:
         skinning = state.options.skinning
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
     imgui.separator()
+    if figure.n_shapes > _SEARCHED:
+        posing = state.of(Posing)
+        posing.shape_filter = search_field("##shapes", posing.shape_filter, "Filter shapes")
     if imgui.begin_child("coefficients", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         _draw_coefficients(state, figure, pose)
     imgui.end_child()
@@ -106,12 +110,7 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     if len(pose.shape_weights) < shapes.n_shapes:
         padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
         pose.shape_weights = np.concatenate([pose.shape_weights, padding])
-    # A heading is a row like the others, so that long lists can be clipped.
-    rows: list[int | str] = []
-    for index, group in enumerate(shapes.groups):
-        if index == 0 or shapes.groups[index - 1] != group:
-            rows.append(_HEADINGS.get(group, group))
-        rows.append(index)
+    rows = _rows(shapes, state.of(Posing).shape_filter if shapes.n_shapes > _SEARCHED else "")
     longest = imgui.calc_text_size(printable(max(shapes.names, key=len), 40)).x
     column = min(longest, _LABELS * imgui.get_content_region_avail().x)
     clipper = imgui.ListClipper()
@@ -124,6 +123,23 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
             else:
                 _draw_slider(state, shapes.names[row], row, pose, column)
     clipper.end()
+
+
+def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
+    """Return the shapes whose names contain a text, below the headings of their groups.
+
+    A heading is a row like the others, so that long lists can be clipped.
+    """
+    rows: list[int | str] = []
+    last = ""
+    for index, (name, group) in enumerate(zip(shapes.names, shapes.groups, strict=True)):
+        if wanted.lower() not in name.lower():
+            continue
+        if group != last:
+            rows.append(_HEADINGS.get(group, group))
+            last = group
+        rows.append(index)
+    return rows
 
 
 def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: float) -> None:
