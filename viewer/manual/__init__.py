@@ -15,7 +15,7 @@ PAGES = {
     "pictures": "pictures and videos without a screen",
     "course": "course files: .skel, .skin, .anim, .morph and .rig",
     "characters": "glTF, VRM and FBX: what is read, drawn and reported",
-    "bodies": "body models: the SMPL family and PIG",
+    "bodies": "body models: Anny, MHR, the SMPL family and PIG",
     "motion": "clips, BVH and AMASS: play, edit, retarget, convert",
     "captures": "EasyMocap recordings: people, gaps, keypoints, cameras",
     "weights": "inspect, check and compare weights and rigs",
