@@ -26,6 +26,8 @@ __all__ = ["WAYS", "RestBuffers"]
 WAYS = ("texture", "product")
 """Methods of summing pose correctives."""
 
+_MOST_TEXELS = 24 << 20  # offsets in a texture, 12 bytes each; more are summed on the processor
+
 
 class RestBuffers:
     """Positions and normals that are the input of the skinning shader.
@@ -49,7 +51,7 @@ class RestBuffers:
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
-        self.way = way or ("product" if is_software(context) else "texture")
+        self.way = way or _usual_way(context, mesh)
         self.positions, self.normals = mesh.positions, mesh.normals
         self.n_offsets = 0
         self._own: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
@@ -144,3 +146,9 @@ class RestBuffers:
         for item in (*(self._own or ()), self._list):
             if item is not None:
                 item.release()
+
+
+def _usual_way(context: moderngl.Context, mesh: MeshBuffers) -> str:
+    correctives = mesh.figure.correctives
+    count = 0 if correctives is None else correctives.offsets.shape[0] * correctives.n_vertices
+    return "product" if is_software(context) or count > _MOST_TEXELS else "texture"
