@@ -3,7 +3,7 @@
 A folder, its ``rig.npz``, or one level of detail beside it; no pickled objects::
 
     rig.npz     joint_names parents offsets prerotations   (J,) (J,) (J, 3) (J, 4), quaternions xyzw
-                parameter_transform (7 J, P + S)           parameter_names limit_*
+                parameter_transform (7 J, P + S)           parameter_names
                 inverse_bind_pose (J, 8)                   translation, quaternion, scale
                 0.sparse_indices (2, N)  0.sparse_weight (N,)
     lodN.npz    base_shape (V, 3)  shape_vectors (S, V, 3) identity, then expressions; centimetres
@@ -39,7 +39,7 @@ _N_IDENTITY = 45  # shapes of the identity; the others are expressions
 _SMALLEST = 1e-5  # MHR's skinning leaves out smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
-    "joint_parents joint_names inverse_bind_pose limit_min limit_max limit_parameter_index"
+    "joint_parents joint_names inverse_bind_pose"
 )
 _LOD_KEYS = "base_shape shape_vectors faces texcoords texcoord_faces skin_indices skin_weights"
 

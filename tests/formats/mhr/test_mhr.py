@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from formats.mhr.mhr_files import (
-    LIMITED,
     N_EXPRESSIONS,
     N_IDENTITY,
     N_JOINTS,
@@ -75,12 +74,8 @@ def test_dofs_are_the_driven_joint_parameters(figure):
     assert labels == [*root, "joint_2.y", "joint_3.x", "joint_3.z", "joint_4.ty", "joint_4.x"]
 
 
-def test_limits_of_a_parameter_are_those_of_its_only_dof(figure):
-    limits = figure.skeleton.dof_limits
-    assert limits[6].tolist() == list(LIMITED[5])
-    # The second one drives its joint with a factor of -1; the third drives two joints.
-    assert limits[4].tolist() == [-0.75, 0.25]
-    assert np.isinf(limits[[0, 5, 8]]).all()
+def test_soft_limits_are_not_enforced(figure):
+    assert np.isinf(figure.skeleton.dof_limits).all()
 
 
 def test_shapes_are_identity_and_expressions(figure):
@@ -141,7 +136,6 @@ WRONG_RIGS = [
     ({"joint_prerotations": np.zeros((N_JOINTS, 4))}, "F002.mhr-quaternion"),
     ({"inverse_bind_pose": np.zeros((N_JOINTS, 8))}, "F002.mhr-quaternion"),
     ({"joint_names": None}, "F002.mhr-keys"),
-    ({"limit_parameter_index": np.array([5, 6, 999])}, "F002.mhr-index"),
     ({"0.sparse_indices": np.full((2, len(rig()["0.sparse_weight"])), 99)}, "F002.mhr-index"),
     (
         {"parameter_transform": np.ones((7 * N_JOINTS, len(NAMES) + N_SHAPES))},

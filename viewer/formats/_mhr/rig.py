@@ -1,4 +1,4 @@
-"""The rig of MHR, ``rig.npz``: skeleton, parameter transform, limits and bind pose."""
+"""The rig of MHR, ``rig.npz``: skeleton, parameter transform and bind pose."""
 
 from __future__ import annotations
 
@@ -6,13 +6,8 @@ import numpy as np
 
 from viewer.formats._archive.checking import are_indices, finite
 from viewer.formats._archive.values import Archive
-from viewer.rig.arrays import Floats, Ints
-from viewer.rig.bodies.model_parameters import (
-    PER_JOINT,
-    ModelParameters,
-    driven_dofs,
-    parameter_limits,
-)
+from viewer.rig.arrays import Floats
+from viewer.rig.bodies.model_parameters import PER_JOINT, ModelParameters, driven_dofs
 from viewer.rig.bodies.network_feature import NetworkFeature
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
@@ -46,7 +41,8 @@ def read_skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
         dof_joints=joints,
         dof_kinds=kinds,
         rest_dofs=np.zeros(len(joints)),
-        dof_limits=_limits(archive, parameters, joints, kinds),
+        # Momentum's limits are soft: fitted parameters may exceed them, and are shown as they are.
+        dof_limits=np.tile([-np.inf, np.inf], (len(joints), 1)),
     )
 
 
@@ -65,17 +61,6 @@ def read_parameters(archive: Archive, n_shapes: int) -> ModelParameters:
             "F002.mhr-parameters", item="parameter_transform", found=found, n=n_shapes
         )
     return ModelParameters(tuple(map(str, names[:count])), transform[:, :count])
-
-
-def _limits(archive: Archive, parameters: ModelParameters, joints: Ints, kinds: Ints) -> Floats:
-    """Return the limits of the DOFs."""
-    index = archive.array("limit_parameter_index", (None,)).values()
-    ends = [_floats(archive, key, (len(index),)) for key in ("limit_min", "limit_max")]
-    if not are_indices(index, parameters.transform.shape[1]):
-        last = parameters.count - 1
-        raise archive.fault("F002.mhr-index", item="limit_parameter_index", last=last)
-    limits = np.stack(ends, axis=1)
-    return parameter_limits(parameters.transform, joints, kinds, index.astype(np.int32), limits)
 
 
 def read_feature(archive: Archive, n_joints: int, n_weights: int) -> NetworkFeature:

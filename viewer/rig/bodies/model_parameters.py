@@ -17,7 +17,7 @@ from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["PER_JOINT", "ModelParameters", "driven_dofs", "parameter_limits"]
+__all__ = ["PER_JOINT", "ModelParameters", "driven_dofs"]
 
 PER_JOINT = 7
 """Parameters of a joint."""
@@ -50,7 +50,7 @@ class ModelParameters:
         return len(self.names)
 
     def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
-        """Set DOFs, translations and scales of a pose, in place; limits are not enforced.
+        """Set DOFs, translations and scales of a pose, in place.
 
         Parameters
         ----------
@@ -91,34 +91,3 @@ def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
     driven = transform.any(axis=1).reshape(-1, PER_JOINT)[:, :_SCALE]
     joints, kinds = np.nonzero(driven)
     return joints.astype(np.int32), kinds.astype(np.int32)
-
-
-def parameter_limits(
-    transform: Floats, joints: Ints, kinds: Ints, parameters: Ints, limits: Floats
-) -> Floats:
-    """Return the limits of DOFs that follow one limited parameter only, which drives no other.
-
-    Parameters
-    ----------
-    transform : (7 J, P)
-        See ``ModelParameters``.
-    joints, kinds : (D,)
-        The DOFs.
-    parameters : (N,)
-        Limited model parameters.
-    limits : (N, 2)
-        Their smallest and largest values.
-
-    Returns
-    -------
-    (D, 2)
-        -inf and inf for DOFs without a limit of their own.
-    """
-    found = np.tile([-np.inf, np.inf], (len(joints), 1))
-    rows = transform[PER_JOINT * joints.astype(np.int64) + kinds]
-    alone = (np.count_nonzero(rows, axis=1) == 1)[:, None] & (rows != 0.0)
-    for parameter, (low, high) in zip(parameters.tolist(), limits.tolist(), strict=True):
-        of = np.flatnonzero(alone[:, parameter])
-        if len(of) == 1 and np.count_nonzero(transform[:, parameter]) == 1 and low <= high:
-            found[of[0]] = sorted((low * rows[of[0], parameter], high * rows[of[0], parameter]))
-    return found

@@ -1,7 +1,8 @@
 """Feature of MHR: a sparse layer of joint rotations, without negative values.
 
-The input has six numbers for each joint from the third on: the first two columns of the rotation by
-its DOFs, minus those of the identity. MHR (Momentum Human Rig), ``MHRPoseCorrectivesModel``::
+The input has six numbers for each joint from the third on: the first two columns of its rotation
+relative to its rest, minus those of the identity. ``MHRPoseCorrectivesModel`` of the Momentum Human
+Rig::
 
     h = max(0, W x)
 """
@@ -14,7 +15,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
-from viewer.rig.pose import Pose, dof_rotations
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["NetworkFeature"]
@@ -57,7 +59,8 @@ class NetworkFeature:
 
     def weights(self, skeleton: Skeleton, pose: Pose) -> Floats:
         """Return the weights of a pose: (P,)."""
-        rotations = dof_rotations(skeleton, pose.dofs)[_FIRST:] - np.eye(3)
+        beneath = np.swapaxes(quaternion_to_matrix(skeleton.rest_rotations), 1, 2)
+        rotations = (beneath @ joint_rotations(skeleton, pose))[_FIRST:] - np.eye(3)
         columns = np.swapaxes(rotations[..., :2], -1, -2).reshape(-1)
         terms = self.entries * columns[self.inputs]
         sums = np.bincount(self.outputs, terms, minlength=self.n_weights)
