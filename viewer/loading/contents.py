@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -118,9 +118,20 @@ def read_files(
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
+    contents.diagnostics += tuple(_unused_options(sources, settings or MotionSettings()))
     read = (path for source in sources for path in (source.path, *source.also_read))
     contents.files = tuple(dict.fromkeys(read))
     return contents
+
+
+def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iterator[Diagnostic]:
+    """Yield a message for each choice among the contents of files that no file has."""
+    if settings.model is not None:
+        return  # read later
+    used = {name for source in sources for name in source.used_options}
+    for name, value in settings.options.items():
+        if value and name not in used:
+            yield Diagnostic(f"F007.unused-{name}", values={"value": value})
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:

