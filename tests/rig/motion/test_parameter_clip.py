@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 from viewer.errors import RigError
 from viewer.formats import Source, read
 from viewer.rig.motion.evaluation import pose_actor
-from viewer.rig.motion.parameter_clip import parameter_clip
+from viewer.rig.motion.parameter_clip import ParameterMotion, parameter_clip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import deform
@@ -26,7 +26,8 @@ def test_frames_have_the_vertices_of_the_published_equations_in_metres(figure):
     expression = generator.normal(size=(3, N_EXPRESSIONS))
     places = generator.normal(size=(3, 3))
     timing = Timing(10.0, np.arange(3, dtype=np.int32))
-    clip = parameter_clip("sam", timing, figure, parameters, identity, expression, places)
+    motion = ParameterMotion("sam", timing, parameters, identity, expression, places)
+    clip = parameter_clip(motion, figure)
     actor = Actor(figure, clip=clip)
     for row in range(3):
         pose_actor(actor, 0.1 * row)
@@ -39,4 +40,4 @@ def test_no_frames_are_refused(figure):
     timing = Timing(10.0, np.zeros(0, dtype=np.int32))
     empty = np.zeros((0, 3))
     with pytest.raises(RigError, match="at least one frame"):
-        parameter_clip("sam", timing, figure, empty, empty, empty, empty)
+        parameter_clip(ParameterMotion("sam", timing, empty, empty, empty, empty), figure)

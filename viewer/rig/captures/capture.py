@@ -10,6 +10,7 @@ from viewer.rig.captures.camera_images import CameraImages
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.parameter_clip import ParameterMotion
 
 __all__ = ["Capture", "CapturePart"]
 
@@ -26,6 +27,9 @@ class CapturePart:
         Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
+    parameters : mapping of person to ParameterMotion
+        The same for model parameters; people who have both are shown as bodies if the figure of
+        the bodies has model parameters, otherwise as points.
     warnings : tuple of Diagnostic
         Messages from the reader about these frames.
     """
@@ -34,6 +38,7 @@ class CapturePart:
     bodies: dict[int, BodyMotion] = field(default_factory=dict)
     points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
     warnings: tuple[Diagnostic, ...] = ()
+    parameters: dict[int, ParameterMotion] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
