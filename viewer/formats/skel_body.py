@@ -38,6 +38,7 @@ _KEYS = (
 # The joint of SMPL whose correctives each joint drives; 0 for none.
 _SMPL = (0, 2, 5, 8, 8, 11, 1, 4, 7, 7, 10, 3, 6, 15, 14, 17, 19, 0, 21, 13, 16, 18, 0, 20)
 _N_SMPL = 24
+_ROUNDED = 1e-3  # largest error of a rotation's entries; files are in single precision
 
 
 def read(source: Source) -> Figure:
@@ -91,6 +92,8 @@ def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
     parents = _parents(archive)
     frames = _floats(archive, "apose_rel_transfo", (len(JOINTS), 4, 4))
     learned = _floats(archive, "per_joint_rot", (len(JOINTS), 3, 3))
+    _check_rotations(archive, "apose_rel_transfo", frames[:, :3, :3])
+    _check_rotations(archive, "per_joint_rot", learned)
     owners, kinds = dof_table()
     above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
     return Skeleton(
@@ -105,6 +108,13 @@ def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
         dof_limits=np.tile([-np.inf, np.inf], (len(owners), 1)),
         posing=AnatomicalPosing(parents, frames[:, :3, :3], frames[:, :3, 3], learned, joints),
     )
+
+
+def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
+    products = np.swapaxes(matrices, 1, 2) @ matrices
+    wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
+    if wrong.any():
+        raise archive.fault("F002.skel-rotation", item=key, joint=int(wrong.argmax()))
 
 
 def _parents(archive: Archive) -> Ints:

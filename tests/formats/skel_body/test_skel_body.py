@@ -71,6 +71,8 @@ def test_bones_are_said_to_be_omitted(tmp_path):
     [
         ({"weights": None}, "F002.smpl-keys"),
         ({"per_joint_rot": np.zeros((23, 3, 3))}, "F002.value"),
+        ({"per_joint_rot": np.zeros((24, 3, 3))}, "F002.skel-rotation"),
+        ({"apose_rel_transfo": 2.0 * MODEL["apose_rel_transfo"]}, "F002.skel-rotation"),
         ({"osim_kintree_table": np.zeros((2, 24))}, "F002.skel-tree"),
         ({"osim_kintree_table": np.stack([np.full(24, 30), np.arange(24)])}, "F002.skel-tree"),
         ({"skin_template_f": np.array([[0, 1, 99]])}, "F002.vertex-range"),

@@ -32,6 +32,7 @@ MESSAGES = {
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
     # SKEL
     "F002.skel-tree": "{item:text}: expected 24 joints in order, each with a parent before it",
+    "F002.skel-rotation": "{item:text}: joint {joint}: expected a rotation matrix",
     "F007.skel-bones": "the mesh of the bones (`skel_template_v`) is omitted",
     # MHR
     "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "

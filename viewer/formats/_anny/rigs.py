@@ -96,7 +96,7 @@ def _regressor(
     joints, vertices, weights = [], [], []
     for joint, bone in enumerate(bones):
         chosen = _vertices_of(bone.get("head", {}), base)
-        if len(chosen) == 0 or chosen.min() < 0 or chosen.max() >= len(base.positions):
+        if len(chosen) == 0 or chosen.min() < 0:
             raise package.fault(file, f"joint {joint}: expected vertices of the base mesh")
         joints.append(np.full(len(chosen), joint))
         vertices.append(chosen)
@@ -106,15 +106,20 @@ def _regressor(
     )
 
 
-def _vertices_of(place: dict[str, Any], base: BaseMesh) -> Ints:
+def _vertices_of(place: object, base: BaseMesh) -> Ints:
     """Return the vertices whose mean is a place; none if the place is not understood."""
-    strategy = place.get("strategy")
-    if strategy == "CUBE" and place.get("cube_name") in base.quads:
-        return np.unique(base.quads[place["cube_name"]][:, 0]).astype(np.int32)
-    given = {"VERTEX": [place.get("vertex_index", -1)], "MEAN": place.get("vertex_indices", ())}
-    found = given.get(str(strategy), ())
+    told = place if isinstance(place, dict) else {}
+    strategy, cube = told.get("strategy"), str(told.get("cube_name"))
+    if strategy == "CUBE" and cube in base.quads:
+        return np.unique(base.quads[cube][:, 0]).astype(np.int32)
+    given = {"VERTEX": [told.get("vertex_index")], "MEAN": told.get("vertex_indices")}
+    found = given.get(str(strategy))
+    if not isinstance(found, list):
+        return np.zeros(0, dtype=np.int32)
+    end = len(base.positions)
     # A vertex that is listed twice counts twice.
-    return np.array([v if isinstance(v, int) else -1 for v in found], dtype=np.int32)
+    known = [vertex if isinstance(vertex, int) and 0 <= vertex < end else -1 for vertex in found]
+    return np.array(known, dtype=np.int32)
 
 
 def _influences(
@@ -128,7 +133,7 @@ def _influences(
         if joint in index and rows:
             try:
                 table = np.array(rows, dtype=np.float64).reshape(-1, 2)
-            except (TypeError, ValueError):
+            except (TypeError, ValueError, OverflowError):
                 raise package.fault(file, f"joint {joint}: expected pairs of numbers") from None
             vertices.append(table[:, 0])
             weights.append(table[:, 1])

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -95,8 +96,10 @@ def change_targets(package: Package) -> dict[str, tuple[str, str]]:
     for folder, about in package.read_json(index).items():
         if folder == "genitals":
             continue
-        for category in about.get("categories", ()) if isinstance(about, dict) else ():
-            opposites = category.get("opposites", {})
+        for category in _listed(about, "categories"):
+            opposites = category.get("opposites")
+            if not isinstance(opposites, dict):
+                continue
             for side in ("left", "right", "unsided"):
                 both = [
                     str(opposites.get(f"{sign}-{side}", "")) for sign in ("positive", "negative")
@@ -105,6 +108,12 @@ def change_targets(package: Package) -> dict[str, tuple[str, str]]:
                     positive, negative = (f"{_FOLDER}{folder}/{name}.target.gz" for name in both)
                     found[both[0]] = positive, negative
     return found
+
+
+def _listed(about: object, key: str) -> list[dict[str, Any]]:
+    """Return the objects in a list of an object; none if there is no such list."""
+    found = about.get(key) if isinstance(about, dict) else None
+    return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
 
 
 def read_row(package: Package, name: str, base: Floats, is_newborn: bool) -> tuple[Ints, Floats]:

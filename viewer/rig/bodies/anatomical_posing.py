@@ -234,7 +234,7 @@ def _arc(angle: Floats, length: float) -> tuple[Floats, Floats]:
 
 
 def _shortest_rotations(source: Floats, target: Floats) -> Floats:
-    """Return the rotations that align vectors (J, 3), zeros where that is not defined."""
+    """Return the rotations that align vectors (J, 3); none where a vector is 0."""
     with np.errstate(invalid="ignore", divide="ignore"):
         a = source / np.linalg.norm(source, axis=1, keepdims=True)
         b = target / np.linalg.norm(target, axis=1, keepdims=True)
@@ -244,4 +244,4 @@ def _shortest_rotations(source: Floats, target: Floats) -> Floats:
     zero = np.zeros_like(x)
     matrix = np.array([[zero, -z, y], [z, zero, -x], [-y, x, zero]]).transpose(2, 0, 1)
     found = np.eye(3) + matrix + matrix @ matrix * ((1.0 - cosine) / sine**2)[:, None, None]
-    return np.where(np.isnan(found), 0.0, found)
+    return np.where(np.isnan(found), np.eye(3), found)
