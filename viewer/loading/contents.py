@@ -19,8 +19,9 @@ from viewer.formats import (
     read_picture,
     referenced_path,
 )
+from viewer.loading.choices import reader_options
 from viewer.loading.covering import with_texture
-from viewer.loading.settings import MotionSettings, reader_options
+from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 

@@ -15,8 +15,9 @@ from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
+from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
-from viewer.loading.settings import MotionSettings, reader_options
+from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup

@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["MotionSettings", "reader_options"]
-
-
-def reader_options(settings: MotionSettings) -> dict[str, str]:
-    """Return the choices among the contents of files, see ``Source.options``."""
-    return {"rig": settings.rig, "lod": settings.lod}
+__all__ = ["MotionSettings"]
 
 
 @dataclass(frozen=True, slots=True)
