@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.npz import array_dtype, item_count, shaped
+from viewer.formats._archive.element_types import array_dtype, item_count, shaped
 from viewer.formats._misfit import MisfitError
 from viewer.rig.arrays import Deferred
 
@@ -54,6 +54,10 @@ class Span:
     def raw(self) -> bytes:
         """Return a copy of the bytes."""
         return self.data[self.start : self.stop]
+
+    def view(self) -> memoryview:
+        """Return the bytes without copying them."""
+        return memoryview(self.data)[self.start : self.stop]
 
     def text(self) -> str:
         """Return the string, which is decoded only once.
@@ -142,6 +146,8 @@ class Array:
         Element type; None if the array is not evaluated, with the reason in ``what``.
     axes : tuple of int, optional
         Order of the stored axes in the array.
+    items : list, optional
+        Objects of an object array, which is not evaluated otherwise.
     """
 
     shape: tuple[int, ...] = ()
@@ -149,6 +155,7 @@ class Array:
     payload: Span | None = None
     is_fortran: bool = False
     axes: tuple[int, ...] | None = None
+    items: list[object] | None = None
     what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:

@@ -1,4 +1,4 @@
-"""Messages about EasyMocap recordings and their cameras."""
+"""Messages about captures: EasyMocap recordings, their cameras, results of video capture."""
 
 _RECORD = "{item:+{}: }{problem}"
 
@@ -62,6 +62,16 @@ MESSAGES = {
     "F002.camera-data": "expected a list of numbers in brackets, found {found:quoted}",
     "F002.camera-lacks": "{item:text}: expected rows, cols and data, found no {name}",
     "F002.camera-count": "{item:text}: expected {shape:axes} numbers, found {found}",
+    # Results of video motion capture
+    "F002.video-unknown": "expected results of video motion capture, found keys {found:list12}",
+    "F002.video-people": "expected at least one person in results of {tool}, found none",
+    "F002.video-space": "expected results of {tool} in {space} space, found none",
+    "F002.video-frames": "expected frames from 0, and at most {most}, found {low} to {high}",
+    "F002.video-frame-numbers": "{item:text}: expected whole numbers of frames, found others",
+    "F002.video-rotation": "{item:text}: expected rotations, found a matrix or vector of size "
+    "{found:.3g}",
+    "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
+    "sets it)",
 }
 
 PHRASES = {
