@@ -82,7 +82,7 @@ __all__ = [
 ]
 
 _ARCHIVE_HEAD = 64
-_ARCHIVES = (".pkl", ".pickle", ".npz", ".npy")
+_ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
 _ANY_TEXT = (".txt",)  # does not identify the content
 _HEAD = 1 << 16  # bytes that must identify a file
 
@@ -164,6 +164,13 @@ FORMATS = {
         (".npz", ".pkl"),
         keys=("t_pose_joints", "skinning_weights", "faces_vert"),
         files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
+        writes=False,
+    ),
+    "video_mocap": Format(
+        "video motion capture",
+        (".pt", ".pth", ".pkl", ".npz", ".npy"),
+        keys=("smpl_params_global", "smpl_params_incam"),
+        files=("hps",),
         writes=False,
     ),
     "amass": Format(
@@ -271,7 +278,7 @@ def _detect_folder(source: Source) -> str:
 
 def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
-    if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
+    if head[:1].isalpha() and not head.startswith((b"PK", b"c", b"x", b"BZh", b"ZF0x")):
         return False  # most text files return here, without importing the module for archives
     from viewer.formats._archive.opening import is_archive
 
@@ -286,6 +293,8 @@ def _detect_archive(source: Source) -> str:
     for kind, form in FORMATS.items():
         if set(keys).intersection(form.keys):
             return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
+    if _is_video_mocap(archive):
+        return "video_mocap"
     wanted = "; ".join(
         f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
     )
@@ -293,6 +302,13 @@ def _detect_archive(source: Source) -> str:
         raise source.fault("F002.empty-archive", wanted=wanted)
     found = [printable(key, 40) for key in keys]
     raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+
+
+def _is_video_mocap(archive: Archive) -> bool:
+    """Return whether an archive has results of a tool that have no keys of their own."""
+    from viewer.formats._video_mocap.tools import tool_of
+
+    return tool_of(archive) is not None
 
 
 def _pose_or_motion(archive: Archive) -> str:
