@@ -169,8 +169,11 @@ FORMATS = {
     "video_mocap": Format(
         "video motion capture",
         (".pt", ".pth", ".pkl", ".npz", ".npy"),
-        keys=("smpl_params_global", "smpl_params_incam"),
-        files=("hps",),
+        keys=(
+            *("smpl_params_global", "smpl_params_incam", "pred_rotmat", "camera_world"),
+            *("latent_pose", "cam_R"),
+        ),
+        files=("hps", "hmr4d_results.pt", "wham_output.pkl"),
         writes=False,
     ),
     "amass": Format(
@@ -270,6 +273,8 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
+    if _is_video_folder(source, names):
+        return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
@@ -292,7 +297,9 @@ def _detect_archive(source: Source) -> str:
     keys = archive.keys
     for kind, form in FORMATS.items():
         if set(keys).intersection(form.keys):
-            return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
+            if kind not in ("amass", "pose"):
+                return kind
+            return "video_mocap" if _is_video_mocap(archive) else _pose_or_motion(archive)
     if _is_video_mocap(archive):
         return "video_mocap"
     wanted = "; ".join(
@@ -302,6 +309,12 @@ def _detect_archive(source: Source) -> str:
         raise source.fault("F002.empty-archive", wanted=wanted)
     found = [printable(key, 40) for key in keys]
     raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+
+
+def _is_video_folder(source: Source, names: set[str]) -> bool:
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    return folder_tool(source, names) is not None
 
 
 def _is_video_mocap(archive: Archive) -> bool:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.results import Options, capture_of
-from viewer.formats._video_mocap.tools import module_of, tool_of
+from viewer.formats._video_mocap.results import Options, Results, capture_of
+from viewer.formats._video_mocap.tools import TOOLS, folder_tool, module_of, tool_of
 from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_results", "read"]
@@ -53,9 +53,26 @@ def open_results(
         If no tool's results are recognised, their arrays contradict each other, or they do not
         have the requested space.
     """
+    results = _folder(source) if source.is_folder else _file(source)
+    return capture_of(source, results, Options(frame_rate, space, up, average_shape))
+
+
+def _file(source: Source) -> Results:
     archive = archive_of(source)
     tool = tool_of(archive)
     if tool is None:
         raise source.fault("F002.video-unknown", found=list(archive.keys))
-    results = module_of(tool).read(source, archive)
-    return capture_of(source, results, Options(frame_rate, space, up, average_shape))
+    found: Results = module_of(tool).read(source, archive)
+    return found
+
+
+def _folder(source: Source) -> Results:
+    names = {path.name for path in source.path.iterdir()}
+    single = next((row.files for row in TOOLS.values() if row.files in names), None)
+    if single is not None:
+        return _file(source.inside(single))
+    tool = folder_tool(source, names)
+    if tool is None:
+        raise source.fault("F002.unknown-folder")
+    found: Results = module_of(tool).read_folder(source, names)
+    return found

@@ -115,3 +115,124 @@ def drawn(scene: Scene, person: int, frame: int) -> Any:
 def assert_drawn(scene: Scene, person: int, frame: int, wanted: Any) -> None:
     """Vertices agree with a tool's own formula; the files have single precision."""
     assert_allclose(drawn(scene, person, frame), wanted, rtol=0, atol=1e-6)
+
+
+def phalp(length: int = 3) -> dict[str, Any]:
+    """Person 2 in all frames, person 5 seen in the first and a ghost in the others."""
+    frames: dict[str, Any] = {}
+    for frame in range(length):
+        detections = [phalp_body(person, frame) for person in (2, 5)]
+        frames[f"out/img/{frame + 1:06}.jpg"] = {
+            "time": frame,
+            "shot": 0,
+            "tid": [2, 5],
+            "tracked_ids": [2] if frame else [2, 5],
+            "tracked_time": [0, frame],
+            "bbox": [single([1, 2, 3, 4])] * 2,
+            "size": [[720, 1280]] * 2,
+            "mask": [[{"size": [720, 1280], "counts": b"abc"}]] * 2,
+            "smpl": [smpl for smpl, _ in detections],
+            "camera": [place for _, place in detections],
+        }
+    return frames
+
+
+def phalp_body(person: int, frame: int) -> tuple[dict[str, Any], Any]:
+    vectors = waves(24, 3, seed=person + 10 * frame) / 2
+    turned = single(matrices(np.vstack([UPRIGHT + vectors[0], vectors[1:]])))
+    body = {
+        "global_orient": turned[:1],
+        "body_pose": turned[1:],
+        "betas": single(waves(10, seed=person)),
+    }
+    return body, single(waves(3, seed=frame) + AHEAD)
+
+
+def turns(length: int, seed: float) -> tuple[Any, Any]:
+    """Rotations and translations of a moving camera."""
+    return single(matrices(waves(length, 3, seed=seed))), single(waves(length, 3, seed=seed + 1))
+
+
+def tram_track(frames: list[int], seed: float) -> dict[str, Any]:
+    vectors = waves(len(frames), 24, 3, seed=seed) / 2
+    vectors[:, 0] += UPRIGHT
+    return {
+        "pred_cam": single(waves(len(frames), 3)),
+        "pred_pose": single(six_of(matrices(vectors))),
+        "pred_shape": single(waves(len(frames), 10, seed=seed)),
+        "pred_rotmat": single(matrices(vectors)),
+        "pred_trans": single(waves(len(frames), 3, seed=seed) + AHEAD)[:, None],
+        "frame": np.array(frames),
+        "img_focal": np.array(900.0),
+    }
+
+
+def six_of(turned: Any) -> Any:
+    """6D rotations: the first two columns, one after the other."""
+    return np.swapaxes(np.asarray(turned)[..., :2], -1, -2).reshape(len(turned), -1)
+
+
+def tram_camera(length: int = 6) -> dict[str, Any]:
+    pred_r, pred_t = turns(length, 1.0)
+    world_r, world_t = turns(length, 2.0)
+    return {
+        "pred_cam_R": pred_r,
+        "pred_cam_T": pred_t,
+        "world_cam_R": world_r,
+        "world_cam_T": world_t,
+        "img_focal": np.array(900.0),
+        "img_center": np.array([640.0, 360.0]),
+        "spec_focal": np.array(800.0),
+    }
+
+
+def prompthmr(length: int = 4) -> dict[str, Any]:
+    """One person with finger matrices that are all zero."""
+    vectors = waves(length, 55, 3, seed=1.0) / 2
+    vectors[:, 0] += UPRIGHT
+    turned = single(matrices(vectors))
+    turned[:, 25:] = 0.0
+    rcw, tcw = turns(length + 2, 3.0)
+    person = {
+        "frames": np.arange(1, length + 1),
+        "track_id": 1,
+        "masks": np.zeros((length, 2, 2), np.bool_),
+        "smplx_cam": {
+            "rotmat": turned,
+            "pose": single(waves(length, 75)),
+            "shape": single(waves(length, 10)),
+            "trans": single(waves(length, 3) + AHEAD),
+            "contact": single(waves(length, 6)),
+        },
+        "smplx_world": {
+            "pose": single(waves(length, 165, seed=5.0) / 2),
+            "shape": single(np.tile(waves(10), (length, 1))),
+            "trans": single(waves(length, 3, seed=6.0)),
+        },
+    }
+    camera = {"img_focal": 900.0, "img_center": np.array([640.0, 360.0])}
+    return {
+        "camera": camera | {"pred_cam_R": rcw, "pred_cam_T": tcw},
+        "people": {1: person},
+        "timings": {},
+        "masks": None,
+        "camera_world": camera | {"Rcw": rcw, "Tcw": tcw},
+    }
+
+
+def slahmr(length: int = 4) -> dict[str, Any]:
+    """Two people, and a camera that both share."""
+    turned, placed = turns(length, 4.0)
+    roots = waves(2, length, 3, seed=1.0) / 4 + UPRIGHT
+    return {
+        "trans": single(waves(2, length, 3) + AHEAD),
+        "root_orient": single(roots),
+        "pose_body": single(waves(2, length, 63, seed=2.0) / 2),
+        "betas": single(waves(2, 16, seed=3.0)),
+        "latent_pose": single(waves(2, length, 32)),
+        "cam_R": np.stack([turned] * 2),
+        "cam_t": np.stack([placed] * 2),
+        "intrins": single([900, 910, 640, 360]),
+        "floor_plane": single([[0, -1, 0.5]]),
+        "world_scale": single([[1.0]]),
+    }

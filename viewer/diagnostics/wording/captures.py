@@ -70,6 +70,17 @@ MESSAGES = {
     "F002.video-frame-numbers": "{item:text}: expected whole numbers of frames, found others",
     "F002.video-rotation": "{item:text}: expected rotations, found a matrix or vector of size "
     "{found:.3g}",
+    "F002.video-count": "{item:text}: expected {expected:#number}, found {found}",
+    "F002.video-whole": "{item:text}: expected a list of whole numbers, found another value",
+    "F002.video-frame": "{item:text}: expected the detections of a frame, found another value",
+    "F002.video-person": "{item:text}: expected a person with a number, found another value",
+    "F002.video-lists": "{item:text}: expected as many bodies and cameras as tracks, found "
+    "{counts:list}",
+    "F002.video-camera": "{item:text}: expected a camera in each frame of person {person}, found "
+    "{n:#frame}",
+    "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
+    "F007.video-last": "{n:#result} in the folder: {name:text} opened, that of the last iteration",
+    "F007.video-tracks": "ignored, as it does not match the people: all are present in all frames",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
     "sets it)",
 }
