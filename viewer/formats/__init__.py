@@ -171,7 +171,7 @@ FORMATS = {
         (".pt", ".pth", ".pkl", ".npz", ".npy"),
         keys=(
             *("smpl_params_global", "smpl_params_incam", "pred_rotmat", "camera_world"),
-            *("latent_pose", "cam_R"),
+            *("latent_pose", "cam_R", "pred_joint_coords", "pred_keypoints_3d"),
         ),
         files=("hps", "hmr4d_results.pt", "wham_output.pkl"),
         writes=False,

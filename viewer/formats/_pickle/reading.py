@@ -88,12 +88,23 @@ def _archive(
 
 
 def _items(value: object) -> Mapping[str | bytes | int, object] | None:
-    """Return a dict, or the dicts of a list by index; None for anything else."""
+    """Return a dict, or by index the dicts of a list, or its lists of dicts; else None."""
     if isinstance(value, dict):
         return value
-    if isinstance(value, list | tuple) and value and all(isinstance(item, dict) for item in value):
+    if isinstance(value, list | tuple) and any(map(_has_dict, value)) and all(map(_is_nest, value)):
         return dict(enumerate(value))
     return None
+
+
+def _has_dict(item: object) -> bool:
+    return isinstance(item, dict) or (isinstance(item, list | tuple) and len(item) > 0)
+
+
+def _is_nest(item: object) -> bool:
+    """Return whether an item of a list is a dict, or a list of dicts, which may be empty."""
+    if isinstance(item, list | tuple):
+        return all(isinstance(inner, dict) for inner in item)
+    return isinstance(item, dict)
 
 
 def _named(source: Source, whole: object) -> dict[str, object]:
@@ -102,7 +113,7 @@ def _named(source: Source, whole: object) -> dict[str, object]:
     if found is None:
         raise source.fault("F002.pickle-named", found=noun(whole))
     for key, value in found.items():
-        if isinstance(key, int) and not isinstance(value, dict):
+        if isinstance(key, int) and not isinstance(value, dict | list | tuple):
             raise source.fault("F002.pickle-key", found=key)
     return _strings(source, found)
 

@@ -151,7 +151,8 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     rate = options.frame_rate or results.frame_rate
     if rate is None:
         rate = DEFAULT_RATE
-        source.warn("F007.video-no-rate", rate=rate)
+        if last > first:
+            source.warn("F007.video-no-rate", rate=rate)
     capture = _Capture(source, results, options, first, last - first + 1, rate)
     return capture.in_space(space)
 

@@ -39,6 +39,7 @@ TOOLS = {
     "tram": Tool("TRAM", "folder of hps/ and camera.npy", has_folders=True),
     "prompthmr": Tool("PromptHMR", "results.pkl"),
     "slahmr": Tool("SLAHMR", "NAME_world_results.npz", has_folders=True),
+    "sam3d_body": Tool("SAM 3D Body", "NAME.npz, folders of them, pickles", has_folders=True),
 }
 """Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``."""
 
