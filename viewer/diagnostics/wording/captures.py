@@ -84,6 +84,8 @@ MESSAGES = {
     "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
     "F007.video-last": "{n:#result} in the folder: {name:text} opened, that of the last iteration",
     "F007.video-tracks": "ignored, as it does not match the people: all are present in all frames",
+    "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
+    "{ignored:+; ignored: {}}",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
     "sets it)",
 }

@@ -84,20 +84,20 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
         If a shape differs from those of the tool, or a number is not finite.
     """
     place = shape_of(archive, _PLACE)
-    count = place[0] if len(place) == 2 else 1
+    lead = place[:1] if len(place) == 2 else ()
+    count = lead[0] if lead else 1
     found = {
-        key: _positions(archive, key, count)
+        key: _positions(archive, key, lead)
         for key in (_KEYPOINTS, _JOINTS, _VERTICES)
         if key != _VERTICES or with_vertices
     }
     rotations = None
     if shape_of(archive, _ROTATIONS):
         n_joints = found[_JOINTS].shape[1]
-        rotations = rows(archive, _ROTATIONS, _shape(archive, _ROTATIONS, count, n_joints, 3, 3))
-        rotations = rotations.reshape(count, n_joints, 3, 3)
-    translations = rows(archive, _PLACE, _shape(archive, _PLACE, count, 3)).reshape(count, 3)
+        rotations = _framed(rows(archive, _ROTATIONS, (*lead, n_joints, 3, 3)), lead)
+    translations = _framed(rows(archive, _PLACE, (*lead, 3)), lead)
     parameters = {
-        key: rows(archive, key, _shape(archive, key, count, None)).reshape(count, -1)
+        key: _framed(rows(archive, key, (*lead, None)), lead)
         for key in _PARAMETERS
         if shape_of(archive, key)
     }
@@ -112,17 +112,16 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
     )
 
 
-def _shape(archive: Archive, key: str, count: int, *sides: int | None) -> tuple[int | None, ...]:
-    """Return the expected shape, with an axis of frames if the array has one."""
-    return (count, *sides) if len(shape_of(archive, key)) > len(sides) else sides
+def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
+    """Return values with an axis of frames."""
+    return values if lead else values[None]
 
 
-def _positions(archive: Archive, key: str, count: int) -> Floats:
+def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
     if not shape_of(archive, key):
-        return np.zeros((count, 0, 3))
-    found = rows(archive, key, _shape(archive, key, count, None, 3))
-    found = found.reshape(count, -1, 3)
-    within_reach(archive, key, found.reshape(-1, 3))
+        return np.zeros((lead[0] if lead else 1, 0, 3))
+    found = _framed(rows(archive, key, (*lead, None, 3)), lead)
+    within_reach(archive, key, found.reshape(found.shape[0] * found.shape[1], 3))
     return found * [1.0, -1.0, -1.0]
 
 

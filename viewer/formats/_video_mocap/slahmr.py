@@ -31,7 +31,7 @@ from viewer.formats._video_mocap.numbers import (
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.spaces import moved
-from viewer.rig.arrays import Bools
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.smpl_family import members_by_numbers
 
 __all__ = ["claims_folder", "read", "read_folder", "recognises"]
@@ -79,7 +79,7 @@ def read(source: Source, archive: Archive) -> Results:
             for person, track in world.items()
         }
         if archive.has("intrins"):
-            values = rows(archive, "intrins", archive.array("intrins").shape).reshape(-1, 4)[0]
+            values = _intrinsics(archive)
             matrix = intrinsics_of(values[None, :2], values[2:])
             size = round(2 * float(values[2])), round(2 * float(values[3]))
             still = np.eye(3)[None], np.zeros((1, 3))
@@ -89,6 +89,14 @@ def read(source: Source, archive: Archive) -> Results:
             }
     ups = {"world": "-y", "camera": "-y"}
     return Results("SLAHMR", "SMPL+H", spaces, ups, cameras, notes=notes)
+
+
+def _intrinsics(archive: Archive) -> Floats:
+    """Return fx, fy, cx and cy: those of the first frame, if there are several."""
+    values = rows(archive, "intrins", archive.array("intrins").shape).reshape(-1)
+    if len(values) == 0 or len(values) % 4:
+        raise archive.fault("F002.video-count", item="intrins", expected=4, found=len(values))
+    return values[:4]
 
 
 def _bodies(archive: Archive, person: int, n_people: int, n_frames: int) -> Track:

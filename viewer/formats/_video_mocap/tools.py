@@ -40,6 +40,7 @@ TOOLS = {
     "prompthmr": Tool("PromptHMR", "results.pkl"),
     "slahmr": Tool("SLAHMR", "NAME_world_results.npz", has_folders=True),
     "sam3d_body": Tool("SAM 3D Body", "NAME.npz, folders of them, pickles", has_folders=True),
+    "parameters": Tool("SMPL parameters of other tools", "dicts with the usual keys"),
 }
 """Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``."""
 
