@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import re
 
+from viewer.formats._archive.file_window import Data, FileWindow
 from viewer.formats._archive.values import Archive
 from viewer.formats._joblib.compression import is_compressed
 from viewer.formats._source import Source
 
 __all__ = ["is_archive", "open_archive"]
 
+_LARGE = 32 << 20  # bytes; smaller pickles are read at once
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
@@ -62,10 +64,21 @@ def open_archive(source: Source) -> Archive:
     if not is_archive(head):
         looks = source.looks_like() or "an unknown format"
         raise source.fault("F002.archive", found=looks)
-    return _open_pickle(source, source.data)
+    return _open_pickle(source, _pickle_data(source))
 
 
-def _open_pickle(source: Source, data: bytes) -> Archive:
+def _pickle_data(source: Source) -> Data:
+    """Return the bytes of a pickle; those of a large file are read where they are needed."""
+    from viewer.formats._archive.stored_file import StoredFile
+
+    if source._data is None:
+        storage = StoredFile(source)
+        if storage.size > _LARGE:
+            return FileWindow(storage)
+    return source.data
+
+
+def _open_pickle(source: Source, data: Data) -> Archive:
     """Open a pickle, or a legacy file of torch, which begins like one."""
     from viewer.formats._pickle.machine import Machine
     from viewer.formats._pickle.reading import named_archive, warn_of_rest
@@ -74,7 +87,7 @@ def _open_pickle(source: Source, data: bytes) -> Archive:
 
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
-    whole = read_stream(machine) if data.startswith(MAGIC) else run(machine)
+    whole = read_stream(machine) if data[: len(MAGIC)] == MAGIC else run(machine)
     warn_of_rest(machine)
     return named_archive(source, "pickle", len(data), whole)
 
@@ -86,8 +99,9 @@ def _open_objects(source: Source, offset: int) -> Archive | None:
     from viewer.formats._pickle.steps import run
     from viewer.formats._torch.legacy import read_bytes
 
-    machine = Machine(source, start=offset)
+    data = _pickle_data(source)
+    machine = Machine(source, data, offset)
     machine.load_bytes = read_bytes
     whole = run(machine)
     warn_of_rest(machine)
-    return named_archive(source, "npy", len(source.data), whole) if has_names(whole) else None
+    return named_archive(source, "npy", len(data), whole) if has_names(whole) else None

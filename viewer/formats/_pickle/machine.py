@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._archive.file_window import Data
 from viewer.formats._pickle.values import Span
 from viewer.formats._source import Source
 
@@ -32,7 +33,7 @@ class Machine:
 
     Attributes
     ----------
-    data : bytes
+    data : bytes or FileWindow
         The file.
     at : int
         Offset of the next byte.
@@ -50,10 +51,10 @@ class Machine:
     """
 
     def __init__(
-        self, source: Source, data: bytes | None = None, start: int = 0, end: int | None = None
+        self, source: Source, data: Data | None = None, start: int = 0, end: int | None = None
     ) -> None:
         self.source, self.at = source, start
-        self.data = source.data if data is None else data
+        self.data: Data = source.data if data is None else data
         self.end = len(self.data) if end is None else end
         self.depth = 0
         self.persistent: Callable[[object], object] | None = None
@@ -85,7 +86,7 @@ class Machine:
         if self._budget < 0:
             raise self.fail(Phrase("pickle-steps", most=self._most))
 
-    def nested(self, data: bytes, start: int, end: int) -> Machine:
+    def nested(self, data: Data, start: int, end: int) -> Machine:
         """Return a machine for a pickle inside this one, which continues its budget.
 
         Raises

@@ -114,7 +114,7 @@ def _float_text(machine: Machine) -> None:
 
 
 def _float(machine: Machine) -> None:
-    machine.push(struct.unpack_from(">d", machine.data, machine.skip(8))[0])
+    machine.push(struct.unpack(">d", machine.data[machine.skip(8) : machine.at])[0])
 
 
 # Strings.

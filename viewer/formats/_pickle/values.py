@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.element_types import array_dtype, item_count, shaped
+from viewer.formats._archive.file_window import Data
 from viewer.formats._misfit import MisfitError
 from viewer.rig.arrays import Deferred
 
@@ -33,7 +34,7 @@ class Span:
 
     Parameters
     ----------
-    data : bytes
+    data : bytes or FileWindow
         The file, or bytes decoded from it.
     start, stop : int
         The range of the bytes.
@@ -43,7 +44,7 @@ class Span:
 
     __slots__ = ("_packed", "_text", "coding", "data", "start", "stop")
 
-    def __init__(self, data: bytes, start: int, stop: int, coding: str | None = None) -> None:
+    def __init__(self, data: Data, start: int, stop: int, coding: str | None = None) -> None:
         self.data, self.start, self.stop, self.coding = data, start, stop, coding
         self._text: str | None = None
         self._packed: Span | None = None
@@ -56,8 +57,10 @@ class Span:
         return self.data[self.start : self.stop]
 
     def view(self) -> memoryview:
-        """Return the bytes without copying them."""
-        return memoryview(self.data)[self.start : self.stop]
+        """Return the bytes, without copying them if they are in memory."""
+        if isinstance(self.data, bytes):
+            return memoryview(self.data)[self.start : self.stop]
+        return memoryview(self.raw())
 
     def text(self) -> str:
         """Return the string, which is decoded only once.
@@ -200,7 +203,11 @@ class Array:
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize
-            flat = np.frombuffer(self.payload.data, self.dtype, n_items, self.payload.start)
+            payload = self.payload
+            if isinstance(payload.data, bytes):
+                flat = np.frombuffer(payload.data, self.dtype, n_items, payload.start)
+            else:
+                flat = np.frombuffer(payload.raw(), self.dtype, n_items)
         array = shaped(flat, self.shape, self.is_fortran)
         return array if self.axes is None else np.ascontiguousarray(array.transpose(self.axes))
 
