@@ -88,6 +88,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
     group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
+    _add_video_arguments(group)
     group.add_argument(
         "--layout",
         choices=LAYOUTS,
@@ -111,6 +112,20 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--interpolate-gaps", action="store_true", help="interpolate gaps in captures"
+    )
+
+
+def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options of video motion capture."""
+    group.add_argument(
+        "--space",
+        choices=("world", "camera"),
+        help="space of video motion capture (default: the world, if the file has it)",
+    )
+    group.add_argument(
+        "--average-shape",
+        action="store_true",
+        help="average each person's shape over time, where video motion capture varies it",
     )
 
 
@@ -140,6 +155,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
+        space=arguments.space or "",
+        average_shape=arguments.average_shape,
     )
 
 

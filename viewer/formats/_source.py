@@ -23,7 +23,8 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-_ANY_END = (b"ply\n", b"ply\r", b"glTF")  # binary data follows, which may end with any byte
+# Binary data follows, which may end with any byte.
+_ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (

@@ -204,6 +204,12 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             layout=settings.layout,
             images=settings.images,
         )
+    if kind == "video_mocap":
+        from viewer.formats.video_mocap import open_results
+
+        return open_results(
+            source, settings.frame_rate, settings.space, settings.up, settings.average_shape
+        )
     return read(source)
 
 

@@ -18,11 +18,13 @@ from viewer.loading.cast import Cast
 from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
@@ -242,8 +244,19 @@ def _begin_capture(
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     to_capture = builder.placement[:3, :3].T
-    cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
+    views = [*capture.views]
+    if capture.views_of is not None:
+        views += capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
+    cast.views += [_turned(view, to_capture) for view in views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
+
+
+def _turned(view: CameraView, to_capture: Floats) -> CameraView:
+    """Return a camera of a capture that was rotated upright."""
+    motion = view.motion
+    if motion is not None:
+        motion = replace(motion, rotations=motion.rotations @ to_capture)
+    return replace(view, rotation=view.rotation @ to_capture, motion=motion)

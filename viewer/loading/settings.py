@@ -43,6 +43,10 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
+    space : "world", "camera" or ""
+        The space of results of video motion capture; empty for the world, if they have it.
+    average_shape : bool
+        Whether people of video motion capture keep one shape, the average over time.
     """
 
     model: Path | None = None
@@ -57,3 +61,5 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
+    space: str = ""
+    average_shape: bool = False

@@ -6,13 +6,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from viewer.diagnostics import Diagnostic
+from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImages
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
 
-__all__ = ["Capture", "CapturePart"]
+__all__ = ["Capture", "CapturePart", "RestRoots"]
+
+RestRoots = Callable[[Floats | None], Floats]
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +66,10 @@ class Capture:
         Calibrated cameras.
     images : CameraImages or None
         Images of the cameras, if available.
+    views_of : callable or None
+        Returns further cameras, whose places depend on the figure that shows the bodies.
+    facts : tuple of (str, str)
+        What was recognised in the file, for ``viewer info``.
     space : "world", "camera" or ""
         The space of its bodies, of those that the file contains; empty if it has only one.
     in_space : callable or None
@@ -81,5 +89,7 @@ class Capture:
     model: str = ""
     warnings: tuple[Diagnostic, ...] = ()
     images: CameraImages | None = None
+    views_of: Callable[[RestRoots], tuple[CameraView, ...]] | None = None
+    facts: tuple[tuple[str, str], ...] = ()
     space: str = ""
     in_space: Callable[[str], Capture] | None = None
