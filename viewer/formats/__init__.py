@@ -155,7 +155,7 @@ FORMATS = {
     ),
     "smpl": Format(
         "SMPL family",
-        (".npz", ".pkl"),
+        (".npz", ".pkl", ".npy"),
         keys=("v_template", "kintree_table", "shapedirs", "posedirs"),
         writes=False,
     ),

@@ -49,6 +49,13 @@ def test_models_are_recognised_by_their_correctives(tmp_path):
     assert dict(load(tmp_path, supr()).facts)["model"] == "SUPR"
 
 
+def test_supr_is_read_as_published_a_dict_in_an_npy_file(tmp_path):
+    np.save(tmp_path / "supr_neutral.npy", supr(), allow_pickle=True)
+    figure = viewer.load(tmp_path / "supr_neutral.npy").actors[0].figure
+    assert dict(figure.facts)["model"] == "SUPR"
+    assert_allclose(deform(figure)[0], supr()["v_template"], atol=ROUNDING)
+
+
 def test_constants_of_the_regressor_do_not_follow_the_shape(tmp_path):
     figure = load(tmp_path, supr())
     weights = np.random.default_rng(2).normal(size=(2, N_SHAPES))

@@ -16,6 +16,7 @@ from viewer.rig.captures.camera_view import CameraMotion, CameraView
 from viewer.rig.captures.capture import Capture, CapturePart, RestRoots
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.parameter_clip import ParameterMotion
 from viewer.rig.motion.timing import DEFAULT_RATE, Timing
 
 __all__ = ["Cameras", "Options", "Results", "Track", "capture_of"]
@@ -55,6 +56,8 @@ class Track:
         As for ``BodyMotion``.
     layout, points : PointLayout, (N, P, 4)
         Captured points, in place of a body.
+    rig : tuple of (N, P), (N, S), (N, E), (N, 3), or None
+        Model parameters, identity, expression and place of the Momentum Human Rig.
     """
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
@@ -66,6 +69,7 @@ class Track:
     world_rotations: Floats | None = None
     layout: PointLayout | None = None
     points: Floats | None = None
+    rig: tuple[Floats, Floats, Floats, Floats] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,7 +200,12 @@ class _Capture:
             for person, track in people.items()
             if track.layout is not None and track.points is not None
         }
-        yield CapturePart(self.n_frames, bodies, points)
+        parameters = {
+            person: ParameterMotion(self.name, self.timing(track.frames), *track.rig)
+            for person, track in people.items()
+            if track.rig is not None
+        }
+        yield CapturePart(self.n_frames, bodies, points, parameters=parameters)
 
     @property
     def name(self) -> str:

@@ -10,7 +10,7 @@
     folder  files of people or frames, see ``sam3d_files.py``
 
 Positions are in the camera's space, with y down, relative to ``pred_cam_t``. They are points: a
-mesh needs the triangles of the Momentum Human Rig.
+mesh needs the triangles of the Momentum Human Rig, whose parameters are read, too.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,6 +41,7 @@ _PARAMETERS = (
     *("mhr_model_params", "shape_params", "expr_params", "scale_params", "body_pose_params"),
     *("hand_pose_params", "global_rot"),
 )
+_MODEL = ("mhr_model_params", "shape_params", "expr_params")
 _MOST_POINTS = 4_000_000  # points of a person in all frames: 128 MB
 _SUFFIXES = (".npz", ".pkl")
 
@@ -184,7 +186,7 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
     counts = [shape_of(each, _VERTICES)[-2:-1] for _, _, each in found]
     most = max((count[0] for count in counts if count), default=0)
     step = max(1, -(-most * len(found) // _MOST_POINTS))
-    placed: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
+    placed: dict[int, list[_Row]] = defaultdict(list)
     cameras: dict[int, Floats] = {}
     sizes: tuple[int, ...] = ()
     for frame, person, archive in found:
@@ -194,7 +196,16 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
         if sizes != tuple(part.shape[1] for part in parts):
             raise archive.fault("F002.video-points", item=_VERTICES, expected=sizes)
         points = np.concatenate(parts, axis=1) + arrays.translations[:, None]
-        placed[person] += [(frame + row, places) for row, places in enumerate(points)]
+        own = [arrays.parameters.get(key) for key in _MODEL]
+        placed[person] += [
+            _Row(
+                frame + row,
+                places,
+                arrays.translations[row],
+                tuple(each[row] for each in own if each is not None),
+            )
+            for row, places in enumerate(points)
+        ]
         camera = intrinsics_seen(archive, arrays)
         if camera is not None:
             cameras.setdefault(frame, camera)
@@ -214,13 +225,39 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
     )
 
 
-def _track(rows: list[tuple[int, Floats]], layout: PointLayout) -> Track:
-    frames, first = np.unique([frame for frame, _ in rows], return_index=True)
-    places = np.array([rows[row][1] for row in first])
+class _Row(NamedTuple):
+    """One person in one frame: points, place, and the parameters of the rig."""
+
+    frame: int
+    points: Floats
+    place: Floats
+    parameters: tuple[Floats, ...]
+
+
+def _track(rows: list[_Row], layout: PointLayout) -> Track:
+    frames, first = np.unique([row.frame for row in rows], return_index=True)
+    kept = [rows[row] for row in first.tolist()]
+    places = np.array([row.points for row in kept])
     points = np.concatenate([places, np.ones((*places.shape[:2], 1))], axis=2)
     if ORIGIN in layout.names:  # of the rig, which is no point of the body
         points[:, layout.names.index(ORIGIN)] = 0.0
-    return Track(frames.astype(np.int64), layout=layout, points=points)
+    return Track(
+        frames.astype(np.int64),
+        layout=layout,
+        points=points,
+        rig=_rig(kept),
+    )
+
+
+def _rig(rows: list[_Row]) -> tuple[Floats, Floats, Floats, Floats] | None:
+    """Return parameters and places of the rig; None unless every frame has all of them."""
+    sizes = {tuple(map(len, row.parameters)) for row in rows}
+    if len(sizes) != 1 or len(next(iter(sizes))) != len(_MODEL):
+        return None
+    model, identity, expression = (
+        np.array([row.parameters[index] for row in rows]) for index in range(len(_MODEL))
+    )
+    return model, identity, expression, np.array([row.place for row in rows])
 
 
 def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
