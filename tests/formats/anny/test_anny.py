@@ -233,3 +233,16 @@ def test_unknown_rig_and_other_wheels_are_refused(tmp_path, path):
     other.write_bytes(wheel({"nothing.txt": b""}).replace(ROOT.encode(), b"nnny/data/"))
     with pytest.raises(FormatError):
         read(Source.open(other))
+
+
+def test_mirror_counterparts_are_optional_and_checked(figure, tmp_path):
+    assert figure.symmetry.tolist() == [vertex ^ 1 for vertex in range(16)]
+    assert read(changed_wheel(tmp_path, mirror=None)).symmetry is None
+    for text in (b"0 1 l", b"9 " * 48, CONTENT["mpfb2/mesh_metadata/hm08.mirror"] + b"1 x r"):
+        source = changed_wheel(tmp_path, mirror=text)
+        assert read(source).symmetry is None
+        assert [found.key for found in source.diagnostics.warnings] == ["F007.anny-mirror"]
+
+
+def test_human_bones_are_named(figure):
+    assert figure.skeleton.humanoid.joints["hips"] == 0

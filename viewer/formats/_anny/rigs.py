@@ -12,8 +12,10 @@ from viewer.formats._anny.base_mesh import BaseMesh
 from viewer.formats._anny.package import Package
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
+from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
+from viewer.rig.retargeting.joint_names import canonical_names
 
-__all__ = ["RIGS", "Rig", "read_rig"]
+__all__ = ["RIGS", "Rig", "humanoid_of", "read_rig"]
 
 RIGS = {
     "default": "MakeHuman's own, with face, tongue and toes",
@@ -147,3 +149,15 @@ def _influences(
     at, values = rows[kept].astype(np.int32), values[kept]
     sums = np.bincount(at, values, minlength=n_vertices)
     return at, np.concatenate(joints)[kept].astype(np.int32), values / sums[at]
+
+
+def humanoid_of(rig: Rig) -> Humanoid | None:
+    """Return the joints by the names of human bones; None for a rig that has no hips.
+
+    Some joints of MakeHuman's rig coincide, so that places alone do not tell left from right.
+    """
+    names = canonical_names(rig.names, rig.parents)
+    spines = {bone: f"spine{number}" for number, bone in enumerate(SPINE_BONES, start=1)}
+    known = {bone: name for bone, name in (HUMAN_BONES | spines).items() if name in names}
+    joints = {bone: names.index(name) for bone, name in known.items()}
+    return Humanoid(joints) if "hips" in joints else None
