@@ -41,7 +41,7 @@ _PUBLISHED = (
     (r"supr_(?P<sex>neutral|male|female)(_\w+)?", "supr"),
     (r"skel_(?P<sex>male|female)", "skel"),
     (r"smil_\w+", "smil"),
-    (r"smal_\w+|my_smpl_\w*dog\w*", "smal"),
+    (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
     (r"anny-[\d.]+-[\w.-]+", "anny"),
 )
 _MHR = "rig.npz"  # beside lod0.npz ...

@@ -41,7 +41,6 @@ _HEADINGS = {
     "expression": "Expression",
     MORPH_GROUP: "Morphs",
     "detail": "Local changes",
-    "proportion": "Proportions",
 }
 _SIGMA = "standard deviations"
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)

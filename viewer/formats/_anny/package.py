@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import weakref
 import zipfile
 import zlib
 from pathlib import Path, PurePosixPath
@@ -52,11 +53,13 @@ class Package:
     place : str
         Path of the data folder in it, with a slash at the end unless it is empty.
     archive : ZipFile or None
-        The wheel; None for a folder.
+        The wheel, closed with the last use of the package; None for a folder.
     """
 
     def __init__(self, source: Source, place: str, archive: zipfile.ZipFile | None) -> None:
         self.source, self._place, self._archive = source, place, archive
+        if archive is not None:
+            weakref.finalize(self, archive.close)
 
     def has(self, name: str) -> bool:
         """Return whether there is a file of this name."""

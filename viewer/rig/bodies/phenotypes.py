@@ -1,4 +1,4 @@
-"""Phenotypes of Anny: how age, gender, height and the like blend the targets of MakeHuman.
+"""Phenotypes of Anny: age, gender, height and others, as blends of MakeHuman's targets.
 
 Brégier et al., Human Mesh Modeling for Anny Body. A target belongs to one variation of several
 phenotypes (``female``, ``young``, ``maxmuscle`` ...). A phenotype between two of its anchors gives
@@ -6,7 +6,7 @@ two variations a weight; a target's coefficient is the product of the weights of
 
     c_t = prod_{v in t} w_v        w_v: piecewise linear in the phenotype, sums to 1
 
-Origins are shared out by their proportions.
+The numbers of the origins are normalised to a sum of 1.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def weights_of(values: Floats, masks: Bools) -> Floats:
         _anchored(float(value), len(names), phenotype_range(name)[0])
         for value, (name, names) in zip(values[: len(VARIATIONS)], VARIATIONS.items(), strict=True)
     ]
-    weights = np.concatenate([*parts, _shares(values[len(VARIATIONS) :])])
+    weights = np.concatenate([*parts, _fractions(values[len(VARIATIONS) :])])
     return np.where(masks, weights, 1.0).prod(axis=1)
 
 
@@ -101,7 +101,7 @@ def _anchored(value: float, count: int, low: float) -> Floats:
     return np.array([np.interp(value, anchors, row) for row in np.eye(count)])
 
 
-def _shares(values: Floats) -> Floats:
-    """Return the proportions of the origins; equal ones if all are 0."""
+def _fractions(values: Floats) -> Floats:
+    """Return the fractions of the origins; equal ones if all numbers are 0."""
     total = float(values.sum())
     return values / total if total else np.full(len(values), 1.0 / len(values))
