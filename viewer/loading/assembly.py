@@ -95,6 +95,7 @@ def begin(
     found = (*contents.diagnostics, *cast.diagnostics)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
     scene.files, scene.images = contents.files, cast.images
+    scene.facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     if settings is not None and settings.model is not None:
         scene.files += (settings.model,)
     return scene, cast.builders

@@ -194,6 +194,8 @@ class Scene:
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
         All files from which it was read, including images; no output may overwrite them.
+    facts : tuple of (str, str)
+        What captures among the files contain, for ``viewer info``.
     """
 
     actors: list[Actor]
@@ -203,6 +205,7 @@ class Scene:
     time: float | None = None
     files: tuple[Path, ...] = ()
     images: CameraImages | None = None
+    facts: tuple[tuple[str, str], ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
