@@ -13,6 +13,7 @@ from viewer.interrupts import deferred
 from viewer.phrases import printable
 
 __all__ = [
+    "family_model",
     "find_model",
     "known_models",
     "load_model_folder",
@@ -164,3 +165,18 @@ def resolve(file: str | Path) -> Path:
     if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110
         return path
     return find_model(str(file), load_model_folder()) or path
+
+
+_FAMILY = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
+
+
+def family_model(member: str) -> Path | None:
+    """Return the neutral model of a member of the SMPL family in the remembered folder, if any.
+
+    Parameters
+    ----------
+    member : str
+        Its title: ``"SMPL"``, ``"SMPL+H"`` or ``"SMPL-X"``; None is returned for others.
+    """
+    kind = _FAMILY.get(member)
+    return None if kind is None else find_model(f"{kind}:neutral", load_model_folder())

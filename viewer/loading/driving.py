@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError
+from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
@@ -55,7 +55,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
-        model, is_bundled = _model(cast, named)
+        model, is_bundled = _model(cast, named, contents, settings)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled)
         for path, capture in contents.captures:
@@ -124,7 +124,9 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
     return model
 
 
-def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
+def _model(
+    cast: Cast, named: Figure | None, contents: Contents, settings: MotionSettings
+) -> tuple[Figure, bool]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
     A body model among the files is not shown as an actor of its own.
@@ -135,9 +137,29 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
         if actor.clip is None and is_body(actor.figure):
             figure = cast.take(index).figure
             return figure, _is_bundled(figure)
+    own = _own_model(cast, contents, settings)
+    if own is not None:
+        return own, False
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
     return body, True
+
+
+def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figure | None:
+    """Return the user's model for the first capture whose bodies it fits, if there is one."""
+    for path, capture in contents.captures:
+        found = settings.find_model(capture.model) if settings.find_model is not None else None
+        if found is None:
+            continue
+        try:
+            model = read(Source.open(found))
+        except FormatError as problem:  # nobody asked for this file
+            cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
+            continue
+        if isinstance(model, Figure) and is_body(model):
+            cast.note("F007.own-model", path, model=found.name)
+            return model
+    return None
 
 
 def _is_bundled(figure: Figure) -> bool:
