@@ -141,6 +141,9 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     return MotionSettings(
         model=None if model is None else Path(model),
         frame_rate=arguments.fps,
+        space=arguments.space or "",
+        average_shape=arguments.average_shape,
+        find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
@@ -149,9 +152,6 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
-        find_model=family_model,
-        space=arguments.space or "",
-        average_shape=arguments.average_shape,
     )
 
 

@@ -234,6 +234,22 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
     return up
 
 
+def _turned(view: CameraView, to_capture: Floats) -> CameraView:
+    """Return a camera of a capture that was rotated upright."""
+    motion = view.motion
+    if motion is not None:
+        motion = replace(motion, rotations=motion.rotations @ to_capture)
+    return replace(view, rotation=view.rotation @ to_capture, motion=motion)
+
+
+def _with_cameras(capture: Capture, model: Figure, is_bundled: bool) -> Capture:
+    """Return a capture with the cameras that depend on the figure that shows its bodies."""
+    if capture.views_of is None:
+        return capture
+    found = capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
+    return replace(capture, views=(*capture.views, *found), views_of=None)
+
+
 def _begin_capture(
     path: Path,
     capture: Capture,
@@ -243,6 +259,7 @@ def _begin_capture(
     is_bundled: bool,
 ) -> None:
     """Read a capture until the first person appears; the rest is read later."""
+    capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings
@@ -257,19 +274,8 @@ def _begin_capture(
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     to_capture = builder.placement[:3, :3].T
-    views = [*capture.views]
-    if capture.views_of is not None:
-        views += capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
-    cast.views += [_turned(view, to_capture) for view in views]
+    cast.views += [_turned(view, to_capture) for view in capture.views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
-
-
-def _turned(view: CameraView, to_capture: Floats) -> CameraView:
-    """Return a camera of a capture that was rotated upright."""
-    motion = view.motion
-    if motion is not None:
-        motion = replace(motion, rotations=motion.rotations @ to_capture)
-    return replace(view, rotation=view.rotation @ to_capture, motion=motion)

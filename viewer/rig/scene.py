@@ -188,24 +188,24 @@ class Scene:
         Up axis; None for the up axis of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
+    facts : tuple of (str, str)
+        What captures among the files contain, for ``viewer info``.
     images : CameraImages or None
         Images of the cameras, if available.
     time : float or None
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
         All files from which it was read, including images; no output may overwrite them.
-    facts : tuple of (str, str)
-        What captures among the files contain, for ``viewer info``.
     """
 
     actors: list[Actor]
     diagnostics: tuple[Diagnostic, ...] = ()
     world_up: Literal["y", "z"] | None = None
     views: tuple[CameraView, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
     images: CameraImages | None = None
-    facts: tuple[tuple[str, str], ...] = ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
