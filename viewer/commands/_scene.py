@@ -17,7 +17,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
-from viewer.models import known_models, load_model_folder, resolve, save_model_folder
+from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rig.scene import Scene
@@ -147,6 +147,9 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         rig=arguments.rig or "",
         lod=arguments.lod or "",
         frame_rate=arguments.fps,
+        space=arguments.space or "",
+        average_shape=arguments.average_shape,
+        find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
@@ -155,8 +158,6 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
         animation=arguments.animation or "",
-        space=arguments.space or "",
-        average_shape=arguments.average_shape,
     )
 
 

@@ -6,13 +6,18 @@ their contents, and people keep their numbers and the frames in which they are s
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.results import Options, Results, capture_of
 from viewer.formats._video_mocap.tools import TOOLS, folder_tool, module_of, tool_of
+from viewer.phrases import listed, printable
 from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_results", "read"]
+
+_LISTED = 12  # keys that are named
 
 
 def read(source: Source) -> Capture:
@@ -63,7 +68,9 @@ def _file(source: Source) -> Results:
     if tool is None:
         raise source.fault("F002.video-unknown", found=list(archive.keys))
     found: Results = module_of(tool).read(source, archive)
-    return found
+    unread = [printable(key, 40) for key in sorted(archive.unread())]
+    ignored = (("not needed", listed(unread, _LISTED)),) if unread else ()
+    return replace(found, facts=(*found.facts, *ignored))
 
 
 def _folder(source: Source) -> Results:

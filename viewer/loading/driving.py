@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError
+from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
@@ -62,7 +62,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
             cast.add(Actor(named, called=title), named.up, placed=False)
         named = None
     if bodies:
-        model, is_bundled = _model(cast, named)
+        model, is_bundled = _model(cast, named, contents, settings)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled)
         for path, capture in contents.captures:
@@ -133,7 +133,9 @@ def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
     return model
 
 
-def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
+def _model(
+    cast: Cast, named: Figure | None, contents: Contents, settings: MotionSettings
+) -> tuple[Figure, bool]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
     A body model among the files is not shown as an actor of its own.
@@ -144,9 +146,29 @@ def _model(cast: Cast, named: Figure | None) -> tuple[Figure, bool]:
         if actor.clip is None and is_body(actor.figure):
             figure = cast.take(index).figure
             return figure, _is_bundled(figure)
+    own = _own_model(cast, contents, settings)
+    if own is not None:
+        return own, False
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
     return body, True
+
+
+def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figure | None:
+    """Return the user's model for the first capture whose bodies it fits, if there is one."""
+    for path, capture in contents.captures:
+        found = settings.find_model(capture.model) if settings.find_model is not None else None
+        if found is None:
+            continue
+        try:
+            model = read(Source.open(found))
+        except FormatError as problem:  # nobody asked for this file
+            cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
+            continue
+        if isinstance(model, Figure) and is_body(model):
+            cast.note("F007.own-model", path, model=found.name)
+            return model
+    return None
 
 
 def _is_bundled(figure: Figure) -> bool:
@@ -221,6 +243,22 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
     return up
 
 
+def _turned(view: CameraView, to_capture: Floats) -> CameraView:
+    """Return a camera of a capture that was rotated upright."""
+    motion = view.motion
+    if motion is not None:
+        motion = replace(motion, rotations=motion.rotations @ to_capture)
+    return replace(view, rotation=view.rotation @ to_capture, motion=motion)
+
+
+def _with_cameras(capture: Capture, model: Figure, is_bundled: bool) -> Capture:
+    """Return a capture with the cameras that depend on the figure that shows its bodies."""
+    if capture.views_of is None:
+        return capture
+    found = capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
+    return replace(capture, views=(*capture.views, *found), views_of=None)
+
+
 def _begin_capture(
     path: Path,
     capture: Capture,
@@ -230,6 +268,7 @@ def _begin_capture(
     is_bundled: bool,
 ) -> None:
     """Read a capture until the first person appears; the rest is read later."""
+    capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings
@@ -244,19 +283,8 @@ def _begin_capture(
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     to_capture = builder.placement[:3, :3].T
-    views = [*capture.views]
-    if capture.views_of is not None:
-        views += capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
-    cast.views += [_turned(view, to_capture) for view in views]
+    cast.views += [_turned(view, to_capture) for view in capture.views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
-
-
-def _turned(view: CameraView, to_capture: Floats) -> CameraView:
-    """Return a camera of a capture that was rotated upright."""
-    motion = view.motion
-    if motion is not None:
-        motion = replace(motion, rotations=motion.rotations @ to_capture)
-    return replace(view, rotation=view.rotation @ to_capture, motion=motion)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,6 +44,9 @@ class MotionSettings:
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
+    find_model : callable or None
+        Returns the user's own model of a member of the SMPL family, such as ``"SMPL"``, for
+        captures that are opened without one; None for the bundled body.
     space : "world", "camera" or ""
         The space of results of video motion capture; empty for the world, if they have it.
     average_shape : bool
@@ -61,5 +65,6 @@ class MotionSettings:
     drives: bool = True
     images: Path | None = None
     animation: str = ""
+    find_model: Callable[[str], Path | None] | None = None
     space: str = ""
     average_shape: bool = False

@@ -18,6 +18,7 @@ PAGES = {
     "bodies": "body models: Anny, MHR, the SMPL family and PIG",
     "motion": "clips, BVH and AMASS: play, edit, retarget, convert",
     "captures": "EasyMocap recordings: people, gaps, keypoints, cameras",
+    "video": "results of video motion capture: GVHMR, WHAM, 4D-Humans, TRAM and others",
     "weights": "inspect, check and compare weights and rigs",
     "rigging": "give a mesh the rig of a figure",
     "window": "panels, tools and the mouse",

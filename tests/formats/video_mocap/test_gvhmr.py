@@ -19,6 +19,7 @@ from formats.video_mocap.tool_files import (
 )
 from numpy.testing import assert_allclose
 
+from viewer.commands.info import describe
 from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import open_results
@@ -74,6 +75,14 @@ def test_capture_says_what_it_is(tmp_path: Path) -> None:
     assert capture.in_space is not None
     other = capture.in_space("camera")
     assert (other.space, other.up) == ("camera", "-y")
+
+
+def test_info_says_what_was_recognised(tmp_path: Path) -> None:
+    scene = scene_of(gvhmr_file(tmp_path), "smplx")
+    assert describe(scene)["captures"] == [
+        ["capture", "results of GVHMR: 1 person, in world and camera space"],
+        ["not needed", "net_outputs"],
+    ]
 
 
 def test_one_space_is_enough(tmp_path: Path) -> None:

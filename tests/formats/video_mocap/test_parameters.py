@@ -98,7 +98,11 @@ def test_what_was_recognised_and_ignored_is_said() -> None:
         "recognised": ["rotmat (matrices of 24 joints)", "cam_t"],
         "ignored": "verts, note",
     }
-    assert dict(capture.facts)["ignored"] == "verts, note"
+    assert dict(capture.facts) == {
+        "capture": "results of SMPL parameters: 1 person, in camera space",
+        "recognised": "rotmat (matrices of 24 joints), cam_t",
+        "not needed": "note, verts",
+    }
 
 
 def test_places_that_are_missing_are_a_note() -> None:

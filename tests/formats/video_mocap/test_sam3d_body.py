@@ -149,6 +149,14 @@ def test_folders(names: list[str], wanted: dict[int, int], tmp_path: Path) -> No
     assert counts == wanted
 
 
+def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:
+    (tmp_path / "a.npz").write_bytes(b"PK\x03\x04 broken")
+    with pytest.raises(FormatError) as caught:
+        detect(Source.open(tmp_path))
+    assert caught.value.diagnostic is not None
+    assert caught.value.diagnostic.key == "F002.unknown-folder"
+
+
 @pytest.mark.parametrize(
     ("changes", "key"),
     [

@@ -30,6 +30,8 @@ MESSAGES = {
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
+    "F007.own-model": "drawn with {model:text} of the model folder (--model selects another)",
+    "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
     "F007.bundled-body": "drawn with the bundled body (--model selects another)",
     "F007.bundled-body-without-shapes": "drawn with the bundled body, without the shape "
     "coefficients of the files, which do not apply to it (--model selects another)",

@@ -208,6 +208,15 @@ class Archive:
             self._branches[key] = found
         return self._branches[key]
 
+    def unread(self) -> set[str]:
+        """Return the names of values that nobody has asked for, also in the dicts inside."""
+        found = {
+            key for key in self.keys if key not in self._values and not self._branches.get(key)
+        }
+        for branch in self._branches.values():
+            found |= branch.unread() if branch is not None else set()
+        return found
+
     def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
         """Return an array of the given shape and kinds of values.
 

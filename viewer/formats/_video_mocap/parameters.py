@@ -97,10 +97,7 @@ def read(source: Source, archive: Archive) -> Results:
     source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
     n_joints = sum(form.n_joints for _, form in layout.poses)
     model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
-    facts = (
-        ("recognised", ", ".join(recognised)),
-        ("ignored", rest or "nothing"),
-    )
+    facts = (("recognised", ", ".join(recognised)),)
     return Results(
         "SMPL parameters", model, {space: people}, {space: "-y" if is_camera else ""}, facts=facts
     )

@@ -189,8 +189,17 @@ class _Capture:
             views_of=None
             if cameras_of is None or space != "world"
             else lambda rest_roots: (self.view(cameras_of(rest_roots)),),
-            facts=results.facts,
+            facts=self.facts,
         )
+
+    @property
+    def facts(self) -> tuple[tuple[str, str], ...]:
+        results = self.results
+        spaces = " and ".join(results.people)
+        people = {person for tracks in results.people.values() for person in tracks}
+        count = f"{len(people)} {'person' if len(people) == 1 else 'people'}"
+        first = ("capture", f"results of {results.tool}: {count}, in {spaces} space")
+        return (first, *results.facts)
 
     def parts(self, space: str) -> Iterator[CapturePart]:
         people = self.results.people[space]
@@ -229,7 +238,7 @@ class _Capture:
             shape=shape,
             hands=track.hands,
             world_rotations=track.world_rotations,
-            facts=self.results.facts,
+            facts=self.facts,
         )
 
     def view(self, cameras: Cameras) -> CameraView:

@@ -23,6 +23,7 @@ from typing import NamedTuple
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
@@ -162,8 +163,10 @@ def claims_folder(source: Source, names: set[str]) -> bool:
     if first is None or any(name.lower().endswith(".json") for name in names):
         return False
     file = Source(source.path / first, max_size=source.max_size)
-    with_head = file.peek(4)
-    return with_head.startswith((b"PK", b"\x80")) and recognises(archive_of(file))
+    try:
+        return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
+    except FormatError:  # a file of some other kind, in a folder of another format
+        return False
 
 
 def read_folder(source: Source, names: set[str]) -> Results:
