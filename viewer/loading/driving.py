@@ -165,10 +165,16 @@ def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figu
         except FormatError as problem:  # nobody asked for this file
             cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
             continue
-        if isinstance(model, Figure) and is_body(model):
+        if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
             cast.note("F007.own-model", path, model=found.name)
             return model
     return None
+
+
+def _all_have_parameters(contents: Contents) -> bool:
+    """Return whether all people are given by the parameters of MHR."""
+    members = {capture.model for _, capture in contents.captures}
+    return members == {"MHR"} and not contents.body_motions
 
 
 def _is_bundled(figure: Figure) -> bool:

@@ -220,16 +220,19 @@ def found_models() -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-_FAMILY = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx"}
+_OF_CAPTURES = {
+    **{"SMPL": "smpl:neutral", "SMPL+H": "smplh:neutral", "SMPL-X": "smplx:neutral"},
+    "MHR": "mhr",
+}
 
 
 def family_model(member: str) -> Path | None:
-    """Return the neutral model of a member of the SMPL family in the remembered folder, if any.
+    """Return MHR, or the neutral model of a member of the SMPL family, in the remembered folder.
 
     Parameters
     ----------
     member : str
-        Its title: ``"SMPL"``, ``"SMPL+H"`` or ``"SMPL-X"``; None is returned for others.
+        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; None is returned for others.
     """
-    kind = _FAMILY.get(member)
-    return None if kind is None else find_model(f"{kind}:neutral", load_model_folder())
+    name = _OF_CAPTURES.get(member)
+    return None if name is None else find_model(name, load_model_folder())

@@ -104,7 +104,7 @@ class Results:
     tool : str
         Title of the tool.
     model : str
-        The member of the SMPL family; empty if there are no bodies.
+        The member of the SMPL family, or ``"MHR"``; empty if there are no bodies.
     people : mapping of space to {person: Track}
         ``"world"`` and ``"camera"``, as far as the file has them; the first is the default.
     ups : mapping of space to axis

@@ -219,7 +219,7 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
     )
     return Results(
         "SAM 3D Body",
-        "",
+        "MHR" if people and all(track.rig for track in people.values()) else "",
         {"camera": people},
         {"camera": "y"},
         {"camera": _camera(cameras)} if cameras else {},

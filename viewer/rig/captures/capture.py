@@ -75,7 +75,7 @@ class Capture:
     in_space : callable or None
         Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str
-        The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
+        The model that its people use, e.g. ``"SMPL+H"`` or ``"MHR"``; empty if unknown.
     warnings : tuple of Diagnostic
         Messages from opening the sequence.
     """
