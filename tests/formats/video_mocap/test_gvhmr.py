@@ -80,7 +80,7 @@ def test_capture_says_what_it_is(tmp_path: Path) -> None:
 def test_info_says_what_was_recognised(tmp_path: Path) -> None:
     scene = scene_of(gvhmr_file(tmp_path), "smplx")
     assert describe(scene)["captures"] == [
-        ["capture", "results of GVHMR: 1 person, in world and camera space"],
+        ["capture", "GVHMR: 1 person, in world and camera space"],
         ["not needed", "net_outputs"],
     ]
 

@@ -99,7 +99,7 @@ def test_what_was_recognised_and_ignored_is_said() -> None:
         "ignored": "verts, note",
     }
     assert dict(capture.facts) == {
-        "capture": "results of SMPL parameters: 1 person, in camera space",
+        "capture": "SMPL parameters: 1 person, in camera space",
         "recognised": "rotmat (matrices of 24 joints), cam_t",
         "not needed": "note, verts",
     }

@@ -65,7 +65,9 @@ MESSAGES = {
     # Results of video motion capture
     "F002.video-unknown": "expected results of video motion capture, found keys {found:list12}",
     "F002.video-people": "expected at least one person in results of {tool}, found none",
-    "F002.video-space": "expected results of {tool} in {space} space, found none",
+    "F002.video-space": "expected people in {space} space, found them only in {found:list} space "
+    "({tool})",
+    "F002.video-rows": "expected at most {most} frames of all people, found more",
     "F002.video-frames": "expected frames from 0, and at most {most}, found {low} to {high}",
     "F002.video-frame-numbers": "{item:text}: expected whole numbers of frames, found others",
     "F002.video-rotation": "{item:text}: expected rotations, found a matrix or vector of size "

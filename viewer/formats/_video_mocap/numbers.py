@@ -14,6 +14,7 @@ from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rota
 
 __all__ = [
     "Frames",
+    "RowBudget",
     "frames_of",
     "has",
     "intrinsics_of",
@@ -31,7 +32,27 @@ __all__ = [
 
 Frames = np.ndarray[Any, np.dtype[np.int64]]
 
+_MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
 _SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
+
+
+class RowBudget:
+    """Counts the frames of all people, because dicts that share arrays multiply them."""
+
+    def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
+        self._archive, self._most, self._left = archive, most, most
+
+    def spend(self, count: int) -> None:
+        """Deduct a number of frames.
+
+        Raises
+        ------
+        FormatError
+            If there are more than any recording has.
+        """
+        self._left -= max(count, 1)
+        if self._left < 0:
+            raise self._archive.source.fault("F002.video-rows", most=self._most)
 
 
 def has(archive: Archive | None, *keys: str) -> bool:

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import frames_of, places, rows, shape_of
+from viewer.formats._video_mocap.numbers import RowBudget, frames_of, places, rows, shape_of
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
 from viewer.phrases import printable
@@ -53,7 +54,8 @@ _SHAPES = (
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _DEEPEST = 3  # dicts inside dicts
-_MOST = 100_000  # dicts that are looked at
+_COST = 20  # frames; looking at a dict takes about as long as reading so many
+_LOOKED_AT = 5000  # dicts of which one must be recognised
 _LISTED = 12  # ignored keys that are named
 
 
@@ -76,7 +78,11 @@ def recognises(archive: Archive) -> bool:
     """Return whether an archive has such parameters, in a layout that is not AMASS's."""
     layout = _layout(archive)
     if layout is None:
-        return next(_found(archive), None) is not None
+        budget = RowBudget(archive, _COST * _LOOKED_AT)
+        try:
+            return next(_found(archive, budget), None) is not None
+        except FormatError:  # thousands of dicts without poses
+            return False
     is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
     return not is_plain or layout.place in _CAMERA or bool(layout.frames)
 
@@ -144,17 +150,22 @@ def _is_shape(shape: tuple[int, ...], count: int) -> bool:
     return (len(shape) == 1 and shape[0] > 0) or (len(shape) == 2 and shape[0] in (1, count))
 
 
-def _found(archive: Archive, depth: int = 0) -> Iterator[tuple[tuple[str, ...], Archive, _Layout]]:
+def _found(
+    archive: Archive, budget: RowBudget | None = None, depth: int = 0
+) -> Iterator[tuple[tuple[str, ...], Archive, _Layout]]:
     """Yield the path, the dict and the layout of all dicts with poses."""
     layout = _layout(archive)
+    budget = budget or RowBudget(archive)
+    budget.spend(_COST if layout is None else layout.poses[0][1].n_frames)
     if layout is not None:
         yield (), archive, layout
         return
-    for key in archive.keys[:_MOST] if depth < _DEEPEST else ():
+    for key in archive.keys if depth < _DEEPEST else ():
         inner = archive.inside(key)
         if inner is not None:
             yield from (
-                ((key, *path), found, kept) for path, found, kept in _found(inner, depth + 1)
+                ((key, *path), found, kept)
+                for path, found, kept in _found(inner, budget, depth + 1)
             )
 
 

@@ -23,7 +23,13 @@ from viewer.errors import FormatError
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import intrinsics_of, sole, vectors_of, within_reach
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    intrinsics_of,
+    sole,
+    vectors_of,
+    within_reach,
+)
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.smpl_family import FAMILY
@@ -46,12 +52,14 @@ def read(source: Source, archive: Archive) -> Results:
     """Read all people who are seen, frame by frame."""
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     size, n_ghosts, n_cuts = None, 0, 0
+    budget = RowBudget(archive)
     for key in archive.keys:
         frame = archive.inside(key)
         if frame is None:
             raise archive.fault("F002.video-frame", item=key)
         number = int(sole(frame, "time"))
         n_cuts += bool(frame.has("shot") and frame.get("shot"))
+        budget.spend(len(_whole_numbers(frame, "tid")))
         present = _people(frame)
         n_ghosts += sum(row is None for _, row in present)
         for person, row in present:

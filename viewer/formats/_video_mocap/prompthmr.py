@@ -18,6 +18,7 @@ import numpy as np
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
+    RowBudget,
     frames_of,
     has,
     intrinsics_of,
@@ -26,6 +27,7 @@ from viewer.formats._video_mocap.numbers import (
     places,
     rotations_of,
     rows,
+    shape_of,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.spaces import inverse
@@ -47,16 +49,20 @@ def recognises(archive: Archive) -> bool:
 
 def read(source: Source, archive: Archive) -> Results:
     """Read all people in both spaces."""
-    people: dict[str, dict[int, Track]] = {}
-    tracks = archive.inside("people")
+    tracks, budget = archive.inside("people"), RowBudget(archive)
+    found: list[tuple[int, str, Archive, Archive]] = []
     for key in () if tracks is None else tracks.keys:
         person = None if tracks is None else tracks.inside(key)
-        if person is None or tracks is None or not key.lstrip("-").isdigit():
+        if person is None or not key.lstrip("-").isdigit():
             raise archive.fault("F002.video-person", item=f"people.{key}")
         for space, part in _SPACES.items():
             body = person.inside(part)
             if body is not None and body.has("trans"):
-                people.setdefault(space, {})[int(key)] = _track(person, body)
+                budget.spend(sum(shape_of(body, "trans")[:1]))
+                found.append((int(key), space, person, body))
+    people: dict[str, dict[int, Track]] = {}
+    for number, space, person, body in found:
+        people.setdefault(space, {})[number] = _track(person, body)
     ordered = {space: people[space] for space in _SPACES if space in people}
     return Results(
         "PromptHMR", "SMPL-X", ordered, {"world": "y", "camera": "-y"}, _cameras(archive)

@@ -147,7 +147,8 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
         raise source.fault("F002.video-people", tool=results.tool)
     space = options.space or next(iter(results.people))
     if space not in results.people:
-        raise source.fault("F002.video-space", space=space, tool=results.tool)
+        found = [*results.people]
+        raise source.fault("F002.video-space", space=space, found=found, tool=results.tool)
     frames = [track.frames for people in results.people.values() for track in people.values()]
     first, last = int(np.concatenate(frames).min()), int(np.concatenate(frames).max())
     if first < 0 or last - first >= _MOST_FRAMES or last >= 1 << 30:
@@ -198,7 +199,7 @@ class _Capture:
         spaces = " and ".join(results.people)
         people = {person for tracks in results.people.values() for person in tracks}
         count = f"{len(people)} {'person' if len(people) == 1 else 'people'}"
-        first = ("capture", f"results of {results.tool}: {count}, in {spaces} space")
+        first = ("capture", f"{results.tool}: {count}, in {spaces} space")
         return (first, *results.facts)
 
     def parts(self, space: str) -> Iterator[CapturePart]:

@@ -28,7 +28,13 @@ from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.mhr_points import ORIGIN, point_layout
-from viewer.formats._video_mocap.numbers import intrinsics_of, rows, shape_of, within_reach
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    intrinsics_of,
+    rows,
+    shape_of,
+    within_reach,
+)
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.sam3d_files import frames_and_people
 from viewer.rig.arrays import Floats
@@ -44,6 +50,8 @@ _PARAMETERS = (
 )
 _MODEL = ("mhr_model_params", "shape_params", "expr_params")
 _MOST_POINTS = 4_000_000  # points of a person in all frames: 128 MB
+_COST = 10  # frames; looking at a person takes about as long as reading so many
+_LOOKED_AT = 1000  # frames or people of which one must be recognised
 _SUFFIXES = (".npz", ".pkl")
 
 
@@ -130,7 +138,13 @@ def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
 
 def recognises(archive: Archive) -> bool:
     """Return whether an archive is such a file."""
-    return _is_person(archive) or any(_is_person(person) for _, _, person in _people(archive))
+    if _is_person(archive):
+        return True
+    firsts = [inner for key in archive.keys[:_LOOKED_AT] if (inner := archive.inside(key))]
+    if any(map(_is_person, firsts)):
+        return True
+    inside = (inner.inside(inner.keys[0]) for inner in firsts if inner.keys)
+    return any(person is not None and _is_person(person) for person in inside)
 
 
 def _is_person(archive: Archive) -> bool:
@@ -142,6 +156,7 @@ def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
     if _is_person(archive):
         yield 0, 0, archive
         return
+    budget = RowBudget(archive)
     for frame, key in enumerate(archive.keys):
         inner = archive.inside(key)
         if inner is None:
@@ -151,6 +166,7 @@ def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
             is_list = archive.keys == tuple(map(str, range(len(archive.keys))))
             yield (0, frame, inner) if is_list else (frame, 0, inner)
             continue
+        budget.spend(_COST * len(inner.keys))
         for person, name in enumerate(inner.keys):
             found = inner.inside(name)
             if found is not None and _is_person(found):

@@ -22,6 +22,7 @@ from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
+    RowBudget,
     has,
     intrinsics_of,
     rotations_of,
@@ -66,7 +67,8 @@ def read_folder(source: Source, names: set[str]) -> Results:
 def read(source: Source, archive: Archive) -> Results:
     """Read all people, in the world and in the camera's space."""
     n_people, n_frames = archive.array("trans").shape[:2]
-    bodies = [_bodies(archive, person, n_people, n_frames) for person in range(n_people)]
+    RowBudget(archive).spend(n_people * n_frames)
+    bodies = _bodies(archive, n_people, n_frames)
     ids, seen, notes = _tracks(source, n_people, n_frames)
     world = {ids[b]: _selected(body, seen[b]) for b, body in enumerate(bodies)}
     spaces, cameras = {"world": world}, {}
@@ -99,14 +101,19 @@ def _intrinsics(archive: Archive) -> Floats:
     return values[:4]
 
 
-def _bodies(archive: Archive, person: int, n_people: int, n_frames: int) -> Track:
+def _bodies(archive: Archive, n_people: int, n_frames: int) -> list[Track]:
     both = n_people, n_frames
-    roots = rows(archive, "root_orient", (*both, 3))[person, :, None]
-    joints = rows(archive, "pose_body", (*both, 63))[person].reshape(n_frames, 21, 3)
-    shape = rows(archive, "betas", (n_people, None))[person][None] if archive.has("betas") else None
-    placed = within_reach(archive, "trans", rows(archive, "trans", (*both, 3))[person])
-    vectors = np.concatenate([roots, joints], axis=1)
-    return Track(np.arange(n_frames), members_by_numbers()[66], vectors, placed, shape)
+    roots = rows(archive, "root_orient", (*both, 3)).reshape(*both, 1, 3)
+    joints = rows(archive, "pose_body", (*both, 63)).reshape(*both, 21, 3)
+    vectors = np.concatenate([roots, joints], axis=2)
+    shape = rows(archive, "betas", (n_people, None)) if archive.has("betas") else None
+    placed = rows(archive, "trans", (*both, 3))
+    within_reach(archive, "trans", placed.reshape(n_people * n_frames, 3))
+    frames, names = np.arange(n_frames), members_by_numbers()[66]
+    return [
+        Track(frames, names, vectors[b], placed[b], None if shape is None else shape[b][None])
+        for b in range(n_people)
+    ]
 
 
 def _selected(track: Track, seen: Bools) -> Track:

@@ -16,7 +16,7 @@ import numpy as np
 
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import frames_of, has, places, rows
+from viewer.formats._video_mocap.numbers import RowBudget, frames_of, has, places, rows, shape_of
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.rig.smpl_family import FAMILY
 
@@ -35,12 +35,19 @@ def recognises(archive: Archive) -> bool:
 
 def read(source: Source, archive: Archive) -> Results:
     """Read both spaces of all people."""
+    found = [
+        (int(key), space, person, names)
+        for key in archive.keys
+        if (person := archive.inside(key)) is not None
+        for space, names in _KEYS.items()
+        if has(person, *names, "frame_ids")
+    ]
+    budget = RowBudget(archive)
+    for _, _, person, names in found:  # before any array is read
+        budget.spend(sum(shape_of(person, names[0])[:1]))
     people: dict[str, dict[int, Track]] = {}
-    for key in archive.keys:
-        person = archive.inside(key)
-        for space, names in _KEYS.items():
-            if person is not None and has(person, *names, "frame_ids"):
-                people.setdefault(space, {})[int(key)] = _track(person, *names)
+    for number, space, person, names in found:
+        people.setdefault(space, {})[number] = _track(person, *names)
     return Results("WHAM", "SMPL", people, {"world": "y", "camera": "-y"})
 
 
