@@ -196,6 +196,23 @@ def test_slahmr_in_both_spaces(tmp_path: Path) -> None:
     assert_allclose(np.diag(world.views[0].intrinsic), [900, 910, 1])
 
 
+@pytest.mark.parametrize(
+    ("intrins", "notes", "sizes"),
+    [
+        ([900.0, 900, 640, 360], [], [(1280, 720)]),
+        ([900.0, 900, 0, 0], [], [None]),
+        ([0.0, 900, 640, 360], ["F007.video-focal"], []),
+        ([900.0, -1, 640, 360], ["F007.video-focal"], []),
+    ],
+)
+def test_cameras_that_cannot_be_drawn_are_omitted(
+    intrins: list[float], notes: list[str], sizes: list[Any], tmp_path: Path
+) -> None:
+    capture = open_results(Source.open(slahmr_file(tmp_path, intrins=np.array(intrins))))
+    assert [note.key for note in capture.warnings] == notes
+    assert [view.size for view in capture.views] == sizes
+
+
 def test_slahmr_without_a_camera(tmp_path: Path) -> None:
     path = slahmr_file(tmp_path, cam_R=None, intrins=None)
     capture = open_results(Source.open(path))

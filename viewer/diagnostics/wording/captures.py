@@ -83,6 +83,7 @@ MESSAGES = {
     "F002.video-points": "{item:text}: expected {expected:list} keypoints, joints and vertices, as "
     "in the first frame, found others",
     "F007.video-vertices": "{n} of {all} vertices kept, as there are many frames",
+    "F007.video-focal": "camera omitted: expected a positive focal length, found {found:g} pixels",
     "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
     "F007.video-last": "{n:#result} in the folder: {name:text} opened, that of the last iteration",
     "F007.video-tracks": "ignored, as it does not match the people: all are present in all frames",

@@ -21,6 +21,7 @@ from viewer.rig.motion.timing import DEFAULT_RATE, Timing
 
 __all__ = ["Cameras", "Options", "Results", "Track", "capture_of"]
 
+_LARGEST = 1 << 20  # pixels along a side of a video
 _MOST_FRAMES = 1 << 22  # 38 hours at 30 frames per second
 
 
@@ -174,8 +175,14 @@ class _Capture:
     rate: float
 
     def in_space(self, space: str) -> Capture:
-        results = self.results
+        results, notes = self.results, self.results.notes
         cameras, cameras_of = results.cameras.get(space), results.cameras_of
+        shown = cameras or next(iter(results.cameras.values()), None)
+        if shown is not None and (shown.intrinsics[:, [0, 1], [0, 1]] <= 0.0).any():
+            # Frusta and pictures need positive focal lengths.
+            focal = float(shown.intrinsics[:, [0, 1], [0, 1]].min())
+            odd = Diagnostic("F007.video-focal", self.source.path, values={"found": focal})
+            cameras, cameras_of, notes = None, None, (*notes, odd)
         return Capture(
             self.source.path.stem,
             self.n_frames,
@@ -184,7 +191,7 @@ class _Capture:
             self.options.up or results.ups.get(space, ""),
             () if cameras is None else (self.view(cameras),),
             results.model,
-            results.notes,
+            notes,
             space=space if len(results.people) > 1 else "",
             in_space=self.in_space if len(results.people) > 1 else None,
             views_of=None
@@ -244,10 +251,10 @@ class _Capture:
 
     def view(self, cameras: Cameras) -> CameraView:
         """Return the camera; frames outside the timeline are dropped."""
-        intrinsic = cameras.intrinsics[0]
-        view = CameraView(
-            "camera", intrinsic, cameras.rotations[0], cameras.translations[0], cameras.size
-        )
+        intrinsic, size = cameras.intrinsics[0], cameras.size
+        if size is not None and not 0 < min(size) <= max(size) < _LARGEST:
+            size = None
+        view = CameraView("camera", intrinsic, cameras.rotations[0], cameras.translations[0], size)
         is_fixed = (cameras.intrinsics == intrinsic).all()
         if len(cameras.rotations) == 1 and is_fixed:
             return view
