@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from viewer.rig.mesh import Mesh
     from viewer.rig.motion.clip import Channel, Clip
     from viewer.rig.motion.clip_sampling import evaluate, sample
+    from viewer.rig.motion.motion_arrays import MotionArrays, motion
     from viewer.rig.motion.onion import onion
     from viewer.rig.pose import Pose, rest_pose
     from viewer.rig.posing.pose_record import PoseRecord, apply_record, record_of
@@ -53,6 +54,7 @@ __all__ = [
     "Lights",
     "Material",
     "Mesh",
+    "MotionArrays",
     "Pose",
     "PoseRecord",
     "Scene",
@@ -69,6 +71,7 @@ __all__ = [
     "joint_matrices",
     "load",
     "mirror_pose",
+    "motion",
     "onion",
     "record_of",
     "render",
@@ -92,6 +95,7 @@ _HOMES = {
     "Lights": "rendering.options",
     "Material": "rig.material",
     "Mesh": "rig.mesh",
+    "MotionArrays": "rig.motion.motion_arrays",
     "Pose": "rig.pose",
     "PoseRecord": "rig.posing.pose_record",
     "Scene": "rig.scene",
@@ -108,6 +112,7 @@ _HOMES = {
     "joint_matrices": "rig.skinning",
     "load": "loading",
     "mirror_pose": "rig.retargeting.mirror",
+    "motion": "rig.motion.motion_arrays",
     "onion": "rig.motion.onion",
     "record_of": "rig.posing.pose_record",
     "render": "rendering.offscreen",

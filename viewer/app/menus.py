@@ -22,7 +22,7 @@ from viewer.app.curves.clip_actions import new_clip
 from viewer.app.features import PANELS
 from viewer.app.files.export_formats import N_ROWS, draw_pose_formats, pose_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
-from viewer.app.files.model_folder import set_model_folder
+from viewer.app.files.model_menu import draw_model_menu
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -44,7 +44,6 @@ from viewer.app.shown_panels import is_open, reset_layout, set_open
 from viewer.app.view.view_menu import draw_view_menu
 from viewer.export import files_written
 from viewer.formats import FORMATS, file_stem, opened_text
-from viewer.models import known_models, load_model_folder
 from viewer.phrases import printable
 
 __all__ = ["ask_for_export", "ask_for_pose", "draw_menus"]
@@ -102,8 +101,8 @@ def _draw_file_menu(state: AppState) -> list[Path]:
         state.wants.add("open bundled")
     if menu_item(state, "Bundled body"):
         state.wants.add("open body")
-    if begin_menu(state, "Body models"):
-        chosen = _draw_models(state) or chosen
+    if begin_menu(state, "Models"):
+        chosen = draw_model_menu(state) or chosen
         imgui.end_menu()
     imgui.separator()
     if menu_item(state, "Save pose…", why=no_pose(state)):
@@ -119,27 +118,6 @@ def _draw_file_menu(state: AppState) -> list[Path]:
     imgui.separator()
     if menu_item(state, "Quit", "Ctrl+Q"):
         state.wants.add("quit")
-    return chosen
-
-
-def _draw_models(state: AppState) -> list[Path]:
-    """Draw the models of the model folder, searched when the menu opens."""
-    files = state.of(Files)
-    if imgui.is_window_appearing():
-        folder = load_model_folder()
-        files.models = known_models(folder) if folder is not None and folder.is_dir() else {}
-    chosen: list[Path] = []
-    for name, path in files.models.items():
-        if menu_item(state, name):
-            chosen = [path]
-        if imgui.is_item_hovered():
-            imgui.set_tooltip(printable(path, 200))
-    if not files.models:
-        imgui.text_disabled("none found: choose the folder that contains them")
-    imgui.separator()
-    if menu_item(state, "Choose model folder…"):
-        start = load_model_folder() or folder_of(state.paths)
-        files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
     return chosen
 
 

@@ -26,11 +26,12 @@ from viewer.autorig.weights.result import WeightTransfer
 from viewer.autorig.weights.weight_transfer import transferred_weights
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.blendshapes import Correctives, corrective_weights
+from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size, vertex_normals
-from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.pose import Pose
+from viewer.rig.shape import pose_weights
 from viewer.rig.skeleton import Skeleton, joint_label
 from viewer.rig.skinning import joint_matrices
 from viewer.rig.units import UNIT_NAMES, unit_of_scaled
@@ -140,7 +141,9 @@ def _transferred_skeleton(
     reach = _JOINT_REACH * box_size(bounding_box(target.positions[target.triangles.ravel()]))
     normals = vertex_normals(aligned, mesh.triangles)
     ways, matched = surface_shifts(aligned, normals, target.positions, target.triangles, reach)
-    regressor = template.joint_regressor
+    given = template.joint_regressor
+    # Entries that mix coordinates are not weights of vertices.
+    regressor = None if given is not None and given.axes is not None else given
     found = transfer_joints(
         joints,
         skeleton.parents,
@@ -183,8 +186,8 @@ def _at_rest(
     correctives = _correctives(template, weights, target, scale) if how.correctives else None
     if correctives is not None:
         # The pose's effect on the rest mesh is removed here, and added back when posing.
-        rotated = joint_rotations(skeleton, pose)
-        positions = positions - correctives.displacement(corrective_weights(rotated))
+        weights_there = pose_weights(correctives, skeleton, pose)
+        positions = positions - correctives.displacement(weights_there)
     mesh = replace(target, positions=positions, normals=vertex_normals(positions, target.triangles))
     mesh = with_reversed_winding(mesh, weights.backwards)
     figure = Figure(

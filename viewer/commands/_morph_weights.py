@@ -79,7 +79,7 @@ def _record(actor: Actor, wanted: list[tuple[str, float]]) -> PoseRecord:
                 f'--shape: {len(rows)} shapes are called "{printable(name, 60)}"; '
                 "numbers without names set all shapes in order"
             )
-        weights[rows] = value
+        weights[rows] = value - actor.figure.blend_shapes.origin(rows[0])
     is_shape = np.array([group == "shape" for group in actor.figure.blend_shapes.groups])
     return PoseRecord(shape=weights[is_shape], expression=weights[~is_shape])
 

@@ -202,6 +202,11 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
         first = morphed[0]
         record = morph_record(first.figure, values)
         return apply_record(record, first.figure, first.require_pose())
+    figure = next((actor.figure for actor in others if actor.figure.n_shapes), None)
+    if figure is not None and figure.blend_shapes is not None:
+        # Sliders may show another number than 0 for the mean body; these are given.
+        rows = range(min(len(values), figure.n_shapes))
+        values[: len(rows)] -= [figure.blend_shapes.origin(row) for row in rows]
     return _apply_record("--shape", PoseRecord(shape=values), scene)
 
 

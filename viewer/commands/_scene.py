@@ -17,7 +17,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
-from viewer.models import known_models, load_model_folder, resolve, save_model_folder
+from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rig.scene import Scene
@@ -60,6 +60,10 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
     )
     add_animation_argument(group)
     parser.set_defaults(springs="off")
+    group.add_argument(
+        "--rig", metavar="NAME", help="rig of Anny: default, mixamo, game_engine, cmu_mb"
+    )
+    group.add_argument("--lod", metavar="N", help="level of detail of MHR, 0 (fine) to 6 (coarse)")
     group.add_argument("--body", action="store_true", help="also open the bundled human body")
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
@@ -93,6 +97,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
     group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
+    _add_video_arguments(group)
     group.add_argument(
         "--layout",
         choices=LAYOUTS,
@@ -119,6 +124,20 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options of video motion capture."""
+    group.add_argument(
+        "--space",
+        choices=("world", "camera"),
+        help="space of video motion capture (default: the world, if the file has it)",
+    )
+    group.add_argument(
+        "--average-shape",
+        action="store_true",
+        help="average each person's shape over time, where video motion capture varies it",
+    )
+
+
 def add_animation_argument(group: argparse._ArgumentGroup) -> None:
     """Add ``--animation``."""
     group.add_argument(
@@ -134,7 +153,12 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
         model=None if model is None else Path(model),
+        rig=arguments.rig or "",
+        lod=arguments.lod or "",
         frame_rate=arguments.fps,
+        space=arguments.space or "",
+        average_shape=arguments.average_shape,
+        find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",

@@ -58,6 +58,8 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for actor, parts in zip(scene.actors, found["actors"], strict=True):
             print("\n".join(_lines(parts) + model_lines(parts["model"], actor.figure)))
+        for heading, text in found["captures"]:
+            print(f"{heading}: {text}")
         if found["cameras"]:
             print(f"{counted(len(found['cameras']), 'camera')}: {listed(found['cameras'])}")
     return 0
@@ -79,6 +81,7 @@ def describe(scene: Scene, skinning: Skinning | None = None) -> dict[str, Any]:
             _describe_actor(actor, scene.up) | {"model": describe_model(actor, how)}
             for actor in scene.actors
         ],
+        "captures": [[heading, text] for heading, text in scene.facts],
         "cameras": [printable(view.name) for view in scene.views],
         "warnings": list(scene.warnings),
         "diagnostics": [described(found) for found in scene.diagnostics],

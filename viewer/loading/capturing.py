@@ -20,6 +20,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.parameter_clip import parameter_clip
 from viewer.rig.motion.sampled_clip import SampledClip, joined
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
@@ -129,7 +130,11 @@ class Builder:
         notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
-        for person, (layout, clip) in sorted(part.points.items(), key=_order):
+        shown = part.parameters if self.model.parameters is not None else {}
+        for person, parameters in sorted(shown.items(), key=_order):
+            self._add_clip(person, parameter_clip(parameters, self.model), new)
+        points = {person: both for person, both in part.points.items() if person not in shown}
+        for person, (layout, clip) in sorted(points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
         notes += self._shape_notes()
@@ -144,7 +149,7 @@ class Builder:
     def _shape_notes(self) -> list[Diagnostic]:
         """At the end, return a message if bodies have the mean shape because none was given."""
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
-        lacks = lacks and self.target is None
+        lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
             return []
         return [Diagnostic("F007.no-shapes", self.path)]
@@ -159,6 +164,11 @@ class Builder:
         if self.target is not None:
             clip, more = carried_clip(self.model, clip, self.up, self.target)
             notes += more
+        self._add_clip(person, clip, new)
+        return [replace(note, path=self.path) for note in notes]
+
+    def _add_clip(self, person: int, clip: SampledClip, new: list[Actor]) -> None:
+        """Append a clip to that of a person, or add an actor."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
@@ -170,7 +180,6 @@ class Builder:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
             timing = joined_timing(actor.clip.timing, clip.timing, actor.clip.n_rows)
             actor.clip = joined([actor.clip, clip], timing)
-        return [replace(note, path=self.path) for note in notes]
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]

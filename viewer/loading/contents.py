@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -19,6 +19,7 @@ from viewer.formats import (
     read_picture,
     referenced_path,
 )
+from viewer.loading.choices import reader_options
 from viewer.loading.covering import with_texture
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
@@ -122,9 +123,20 @@ def read_files(
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
+    contents.diagnostics += tuple(_unused_options(sources, settings or MotionSettings()))
     read = (path for source in sources for path in (source.path, *source.also_read))
     contents.files = tuple(dict.fromkeys(read))
     return contents
+
+
+def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iterator[Diagnostic]:
+    """Yield a message for each choice among the contents of files that no file has."""
+    if settings.model is not None:
+        return  # read later
+    used = {name for source in sources for name in source.used_options}
+    for name, value in reader_options(settings).items():
+        if value and name not in used:
+            yield Diagnostic(f"F007.unused-{name}", values={"value": value})
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
@@ -181,6 +193,7 @@ def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple
 
 def _read(source: Source, settings: MotionSettings) -> Content:
     """Read a file; explicit settings override the properties of a capture."""
+    source.options = reader_options(settings)
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
@@ -194,6 +207,12 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             legacy_expression=settings.legacy_expression,
             layout=settings.layout,
             images=settings.images,
+        )
+    if kind == "video_mocap":
+        from viewer.formats.video_mocap import open_results
+
+        return open_results(
+            source, settings.frame_rate, settings.space, settings.up, settings.average_shape
         )
     return read(source)
 

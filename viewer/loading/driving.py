@@ -11,19 +11,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError
+from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.carrying import carried_clip, has_joints
 from viewer.loading.cast import Cast
+from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
-from viewer.rig.motion.body_motion import BodyMotion, body_clip
+from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scene import Actor
@@ -50,12 +53,12 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         _give_clip(path, clip, cast, contents)
     bodies = bool(contents.body_motions or contents.captures)
     drives = bool(contents.skeleton_motions) and settings.drives
-    named = _named_model(cast, settings.model) if bodies or drives else None
+    named = _named_model(cast, settings) if bodies or drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
-        model, is_bundled, target = _model(contents, cast, named)
+        model, is_bundled, target = _model(contents, cast, named, settings)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled, target)
         for path, capture in contents.captures:
@@ -114,11 +117,13 @@ def is_body(figure: Figure) -> bool:
     return skeleton.names[0] in _ROOTS
 
 
-def _named_model(cast: Cast, path: Path | None) -> Figure | None:
+def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
     """Return the body model given by ``--model``, if any."""
+    path = settings.model
     if path is None:
         return None
     source = Source.open(path)
+    source.options = reader_options(settings)
     model = read(source)
     if isinstance(model, FigureGroup):
         complete = [each for each in model.figures if each.is_attached]
@@ -130,7 +135,7 @@ def _named_model(cast: Cast, path: Path | None) -> Figure | None:
 
 
 def _model(
-    contents: Contents, cast: Cast, named: Figure | None
+    contents: Contents, cast: Cast, named: Figure | None, settings: MotionSettings
 ) -> tuple[Figure, bool, Figure | None]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
@@ -140,13 +145,17 @@ def _model(
     if named is not None:
         moves = [body.joint_names for _, body in contents.body_motions]
         own = any(has_joints(named, names) for names in moves)
-        if is_body(named) or (own and named.require_skeleton().humanoid is None):
+        is_family = is_body(named) or (own and named.require_skeleton().humanoid is None)
+        if is_family or (named.parameters is not None and _all_have_parameters(contents)):
             return named, False, None
         return _bundled(), True, named
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
             figure = cast.take(index).figure
             return figure, _is_bundled(figure), None
+    found = _own_model(cast, contents, settings)
+    if found is not None:
+        return found, False, None
     return _bundled(), True, None
 
 
@@ -154,6 +163,29 @@ def _bundled() -> Figure:
     body = read(Source.open(bundled_body()))
     assert isinstance(body, Figure)  # it is a bundled file
     return body
+
+
+def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figure | None:
+    """Return the user's model for the first capture whose bodies it fits, if there is one."""
+    for path, capture in contents.captures:
+        found = settings.find_model(capture.model) if settings.find_model is not None else None
+        if found is None:
+            continue
+        try:
+            model = read(Source.open(found))
+        except FormatError as problem:  # nobody asked for this file
+            cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
+            continue
+        if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
+            cast.note("F007.own-model", path, model=found.name)
+            return model
+    return None
+
+
+def _all_have_parameters(contents: Contents) -> bool:
+    """Return whether all people are given by the parameters of MHR."""
+    members = {capture.model for _, capture in contents.captures}
+    return members == {"MHR"} and not contents.body_motions
 
 
 def _is_bundled(figure: Figure) -> bool:
@@ -247,6 +279,22 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
     return up
 
 
+def _turned(view: CameraView, to_capture: Floats) -> CameraView:
+    """Return a camera of a capture that was rotated upright."""
+    motion = view.motion
+    if motion is not None:
+        motion = replace(motion, rotations=motion.rotations @ to_capture)
+    return replace(view, rotation=view.rotation @ to_capture, motion=motion)
+
+
+def _with_cameras(capture: Capture, model: Figure, is_bundled: bool) -> Capture:
+    """Return a capture with the cameras that depend on the figure that shows its bodies."""
+    if capture.views_of is None:
+        return capture
+    found = capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
+    return replace(capture, views=(*capture.views, *found), views_of=None)
+
+
 def _begin_capture(
     path: Path,
     capture: Capture,
@@ -257,6 +305,7 @@ def _begin_capture(
     target: Figure | None,
 ) -> None:
     """Read a capture until the first person appears; the rest is read later."""
+    capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings
@@ -273,7 +322,7 @@ def _begin_capture(
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     to_capture = builder.placement[:3, :3].T
-    cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
+    cast.views += [_turned(view, to_capture) for view in capture.views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)

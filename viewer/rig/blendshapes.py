@@ -9,6 +9,8 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.bodies.feature import Feature
+from viewer.rig.bodies.shape_space import ShapeSpace
 from viewer.rig.expressions import ExpressionRules
 
 __all__ = [
@@ -46,6 +48,10 @@ class SummedOffsets(Deferred):
         self.total = total
 
 
+_BLOCK = 9  # correctives of one joint in SMPL
+_LONGEST = 252  # rows in one range of correctives; a multiple of the block
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BlendShapes:
     """Per-vertex offsets of the rest mesh, scaled by weights: v = v_rest + sum_s w_s d_s.
@@ -66,6 +72,13 @@ class BlendShapes:
         Weights of the file's own pose; None if all are 0.
     rules : ExpressionRules or None
         How weights of expressions change each other; None if they do not.
+    space : ShapeSpace or None
+        Computes the displacement if it is not the sum of the offsets; these are then those of
+        each weight of 1 alone.
+    origins : (S,) or None
+        Number that a slider shows at weight 0; None if all are 0.
+    ranges : (S, 2) or None
+        Smallest and largest number of each slider; None for the usual range of its group.
     """
 
     names: tuple[str, ...]
@@ -74,8 +87,15 @@ class BlendShapes:
     normal_offsets: Floats | Deferred | None = None
     rest_weights: Floats | None = None
     rules: ExpressionRules | None = None
+    space: ShapeSpace | None = None
+    origins: Floats | None = None
+    ranges: Floats | None = None
 
     def __post_init__(self) -> None:
+        for name, size in (("origins", ()), ("ranges", (2,))):
+            if getattr(self, name) is not None:
+                numbers = frozen(name, getattr(self, name), (len(self.names), *size))
+                object.__setattr__(self, name, numbers)
         if not isinstance(self.offsets, Deferred):
             offsets = frozen("offsets", self.offsets, (len(self.names), None, 3))
             object.__setattr__(self, "offsets", offsets)
@@ -104,12 +124,21 @@ class BlendShapes:
         """Number of vertices, V."""
         return self.offsets.shape[1]
 
+    @property
+    def is_linear(self) -> bool:
+        """Whether the displacement is the weighted sum of the offsets."""
+        return self.space is None
+
+    def origin(self, row: int) -> float:
+        """Return the number that the slider of a blend shape shows at weight 0."""
+        return 0.0 if self.origins is None else float(self.origins[row])
+
     def is_expression(self, row: int) -> bool:
         """Return whether a blend shape is a combination of others, governed by ``rules``."""
         return self.rules is not None and bool((self.rules.rows == row).any())
 
     def displacement(self, weights: Floats) -> Floats:
-        """Return sum_s w_s d_s.
+        """Return sum_s w_s d_s, or the displacement of the shape space.
 
         Parameters
         ----------
@@ -126,6 +155,9 @@ class BlendShapes:
         RigError
             If there are more weights than blend shapes.
         """
+        if self.space is not None:
+            self._check_count(weights)
+            return self.space.displacement(weights)
         return self._weighted(self.offsets, weights)
 
     def normal_displacement(self, weights: Floats) -> Floats | None:
@@ -151,8 +183,7 @@ class BlendShapes:
 
     def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
         """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
-        if len(weights) > self.n_shapes:
-            raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
+        self._check_count(weights)
         weights = weights if self.rules is None else self.rules.shown(weights)
         active = np.flatnonzero(weights)
         if len(active) == 0:
@@ -162,6 +193,10 @@ class BlendShapes:
             whole[: len(weights)] = weights
             return offsets.total(whole)
         return np.einsum("s,sva->va", weights[active], _values(offsets)[active])
+
+    def _check_count(self, weights: Floats) -> None:
+        if len(weights) > self.n_shapes:
+            raise RigError(f"expected at most {self.n_shapes} shape weights, found {len(weights)}")
 
     def direction_values(self) -> Floats:
         """Return the offsets, read from the file on first use: (S, V, 3)."""
@@ -175,27 +210,40 @@ class BlendShapes:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Correctives:
-    """Pose-dependent offsets of the SMPL family: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
+    """Pose-dependent offsets of body models: v = v_rest + sum_p c_p d_p (Loper 2015, eq. 9).
 
     Attributes
     ----------
-    offsets : (9 (J - 1), V, 3), or Deferred
-        Figure units per unit of ``corrective_weights``.
+    offsets : (P, V, 3), or Deferred
+        Figure units per unit of weight.
+    feature : Feature or None
+        Computes the weights of a pose; None for those of SMPL, ``corrective_weights``, which are
+        nine for each joint except the root.
     """
 
     offsets: Floats | Deferred
+    feature: Feature | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.offsets, Deferred):
             object.__setattr__(self, "offsets", frozen("offsets", self.offsets, (None, None, 3)))
         count = self.offsets.shape[0]
-        if len(self.offsets.shape) != 3 or count % 9:
+        if self.feature is not None:
+            _check_shape(
+                "offsets", self.offsets.shape, (self.feature.n_weights, self.n_vertices, 3)
+            )
+        elif len(self.offsets.shape) != 3 or count % _BLOCK:
             raise RigError(f"offsets: expected nine for each joint except the root, found {count}")
 
     @property
     def n_vertices(self) -> int:
         """Number of vertices, V."""
         return self.offsets.shape[1]
+
+    @property
+    def block(self) -> int:
+        """Number of weights that are skipped together if all of them are 0."""
+        return _BLOCK if self.feature is None else 1
 
     def values(self) -> Floats:
         """Return the offsets, read from the file on first use."""
@@ -206,8 +254,8 @@ class Correctives:
 
         Parameters
         ----------
-        weights : (9 (J - 1),)
-            From ``corrective_weights``.
+        weights : (P,)
+            From ``viewer.rig.shape.pose_weights``.
 
         Returns
         -------
@@ -215,16 +263,24 @@ class Correctives:
             Figure units.
         """
         total = np.zeros(3 * self.n_vertices)
-        for rows in active_rows(weights):
+        for rows in active_rows(weights, self.block):
             total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)
         return total.reshape(-1, 3)
 
 
-def active_rows(weights: Floats) -> list[slice]:
-    """Return the row ranges of consecutive joints, nine rows each, whose weights are not all 0."""
-    active = weights.reshape(-1, 9).any(axis=1)
-    edges = np.flatnonzero(np.diff(active, prepend=False, append=False))
-    return [slice(9 * int(a), 9 * int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+def active_rows(weights: Floats, block: int = _BLOCK) -> list[slice]:
+    """Return the ranges of consecutive blocks of rows whose weights are not all 0.
+
+    Long ranges are split, so that the products of a range need little memory.
+    """
+    active = weights.reshape(-1, block).any(axis=1)
+    edges = np.flatnonzero(np.diff(active, prepend=False, append=False)) * block
+    ranges = zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True)
+    return [
+        slice(start, min(start + _LONGEST, stop))
+        for first, stop in ranges
+        for start in range(first, stop, _LONGEST)
+    ]
 
 
 def corrective_weights(rotations: Floats) -> Floats:
@@ -245,7 +301,7 @@ def corrective_weights(rotations: Floats) -> Floats:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class JointRegressor:
-    """Rest joints as weighted sums of rest vertices, J_j = sum_v r_jv v.
+    """Rest joints as weighted sums of rest vertices, J_j = b_j + sum_v r_jv v.
 
     Attributes
     ----------
@@ -255,14 +311,27 @@ class JointRegressor:
         Row and column of each entry of the sparse (J, V) matrix.
     weights : (N,)
         Value of each entry.
+    axes : (N, 2) int32 or None
+        Coordinate of the joint and of the vertex that an entry connects; None if each connects
+        all three with themselves.
+    bias : (J, 3) or None
+        Constants b; None if all are 0.
     """
 
     n_joints: int
     joints: Ints
     vertices: Ints
     weights: Floats
+    axes: Ints | None = None
+    bias: Floats | None = None
 
     def __post_init__(self) -> None:
+        if self.axes is not None:
+            axes = frozen("axes", self.axes, (len(self.joints), 2), np.int32)
+            object.__setattr__(self, "axes", axes)
+        if self.bias is not None:
+            bias = frozen("bias", self.bias, (self.n_joints, 3))
+            object.__setattr__(self, "bias", bias)
         for name, dtype in (("joints", np.int32), ("vertices", np.int32), ("weights", np.float64)):
             values = frozen(name, getattr(self, name), (len(self.joints),), dtype)
             object.__setattr__(self, name, values)
@@ -287,12 +356,18 @@ def regress_joints(regressor: JointRegressor, positions: Floats) -> Floats:
     (J, 3)
         Figure units.
     """
+    bias = np.zeros(3) if regressor.bias is None else regressor.bias
+    if regressor.axes is not None:
+        to, of = regressor.axes.T
+        terms = positions[regressor.vertices, of] * regressor.weights
+        sums = np.bincount(3 * regressor.joints + to, terms, minlength=3 * regressor.n_joints)
+        return bias + sums.reshape(-1, 3)
     terms = positions[regressor.vertices] * regressor.weights[:, None]
     columns = [
         np.bincount(regressor.joints, terms[:, axis], minlength=regressor.n_joints)
         for axis in range(3)
     ]
-    return np.stack(columns, axis=1)
+    return bias + np.stack(columns, axis=1)
 
 
 def _values(offsets: Floats | Deferred) -> Floats:

@@ -23,6 +23,7 @@ from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 
 if TYPE_CHECKING:
+    from viewer.rig.bodies.model_parameters import ModelParameters
     from viewer.rig.captures.points import PointLayout
 
 __all__ = ["AttachedFigure", "Figure", "skeleton_points"]
@@ -65,6 +66,8 @@ class Figure:
         Principal components of the hand poses.
     pose_layout : PoseLayout or None
         Order of the values in the model's own pose vectors; None if those are the DOFs.
+    parameters : ModelParameters or None
+        Parameters of the model from which its DOFs and scales follow.
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
         Other annotations of the mesh.
     symmetry : (V,) int32 or None
@@ -92,6 +95,7 @@ class Figure:
     joint_regressor: JointRegressor | None = None
     hands: tuple[Hand, ...] = ()
     pose_layout: PoseLayout | None = None
+    parameters: ModelParameters | None = None
     body_parts: BodyParts | None = None
     keypoints: Keypoints | None = None
     reduced: ReducedMesh | None = None

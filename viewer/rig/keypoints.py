@@ -95,7 +95,7 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
         else BlendShapes(shapes.names, _columns(shapes.offsets, vertices), shapes.groups),
         correctives=None
         if correctives is None
-        else Correctives(_columns(correctives.offsets, vertices)),
+        else Correctives(_columns(correctives.offsets, vertices), correctives.feature),
     )
 
 

@@ -175,6 +175,8 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     joints, axes = skeleton.dof_joints[is_translation], skeleton.dof_kinds[is_translation]
     # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
     np.add.at(local[:, :3, 3], (joints, axes), pose.dofs[is_translation])
+    if skeleton.posing is not None:
+        local[:, :3, 3] += skeleton.posing.translations(pose.dofs)
     rotations = constrained_matrices(
         skeleton, joint_rotations(skeleton, pose), local[:, :3, 3], pose.scales
     )
@@ -205,6 +207,8 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
     (..., J, 3, 3)
         The first row of a joint is applied first.
     """
+    if skeleton.posing is not None:
+        return skeleton.posing.rotations(dofs)
     shape = (*dofs.shape[:-1], skeleton.n_joints, 3, 3)
     rotations = np.broadcast_to(np.eye(3), shape).copy()
     rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)

@@ -199,6 +199,8 @@ class Scene:
         Up axis; None for the up axis of the first figure.
     views : tuple of CameraView
         Calibrated cameras of a capture.
+    facts : tuple of (str, str)
+        What captures among the files contain, for ``viewer info``.
     images : CameraImages or None
         Images of the cameras, if available.
     time : float or None
@@ -211,6 +213,7 @@ class Scene:
     diagnostics: tuple[Diagnostic, ...] = ()
     world_up: Literal["y", "z"] | None = None
     views: tuple[CameraView, ...] = ()
+    facts: tuple[tuple[str, str], ...] = ()
     time: float | None = None
     files: tuple[Path, ...] = ()
     images: CameraImages | None = None

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import corrective_weights, regress_joints
+from viewer.rig.blendshapes import Correctives, corrective_weights, regress_joints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.kinematics import world_matrices
@@ -19,7 +19,9 @@ from viewer.rig.skin import Skin
 
 __all__ = [
     "joint_directions",
+    "joint_shifts",
     "moved_rest_translations",
+    "pose_weights",
     "rest_joints",
     "rest_positions",
     "shaped",
@@ -60,9 +62,21 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     def make() -> Figure:
         offsets = shapes.normal_displacement(weights)
         normals = None if offsets is None else mesh.normals + offsets
-        return with_rest_mesh(figure, mesh.positions + shapes.displacement(weights), normals)
+        moved = with_rest_mesh(figure, mesh.positions + shapes.displacement(weights), normals)
+        joints = None if shapes.space is None else shapes.space.joint_displacement(weights)
+        return moved if joints is None else _with_joints(moved, rest_joints(figure), joints)
 
     return _shaped.get(figure, weights.tobytes(), make)
+
+
+def _with_joints(figure: Figure, joints: Floats, shifts: Floats) -> Figure:
+    """Return a figure whose rest joints (J, 3) are moved by shifts (J, 3)."""
+    skeleton, skin = figure.require_skeleton(), figure.skin
+    return replace(
+        figure,
+        skeleton=_moved_skeleton(skeleton, joints + shifts),
+        skin=None if skin is None else _moved_skin(skin, shifts),
+    )
 
 
 def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = None) -> Figure:
@@ -99,7 +113,9 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
 
 
 def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
-    return replace(skeleton, rest_translations=moved_rest_translations(skeleton, joints))
+    posing = None if skeleton.posing is None else skeleton.posing.with_joints(joints)
+    moved = moved_rest_translations(skeleton, joints)
+    return replace(skeleton, rest_translations=moved, posing=posing)
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
@@ -139,6 +155,35 @@ def _zero_pose(skeleton: Skeleton) -> Pose:
     return pose
 
 
+def joint_shifts(figure: Figure, weights: Floats) -> Floats:
+    """Return how far shapes move the rest joints, J(beta) - J(0).
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with or without blend shapes.
+    weights : (F, S)
+        Weights of F shapes.
+
+    Returns
+    -------
+    (F, J, 3)
+        Figure units.
+    """
+    shapes = figure.blend_shapes
+    if shapes is None or shapes.space is None:
+        directions = joint_directions(figure)
+        weights = weights[:, : len(directions)]
+        return np.einsum("fs,sjc->fjc", weights, directions[: weights.shape[1]])
+    found = np.zeros((len(weights), figure.require_skeleton().n_joints, 3))
+    rows, row_of = np.unique(weights, axis=0, return_inverse=True)
+    for index, row in enumerate(rows):
+        moved = shapes.space.joint_displacement(row)
+        if moved is not None:
+            found[row_of.reshape(-1) == index] = moved
+    return found
+
+
 def rest_joints(figure: Figure) -> Floats:
     """Return the joint positions with all DOFs at 0: (J, 3), figure units."""
     skeleton = figure.require_skeleton()
@@ -166,15 +211,40 @@ def joint_directions(figure: Figure) -> Floats:
     if regressor is None or shapes is None or mesh is None:
         return directions
 
+    # Only displacements are regressed, so that constants do not count.
+    linear = replace(regressor, bias=None)
+
     def make() -> Floats:
         one, still = np.zeros(figure.n_shapes), np.zeros_like(mesh.positions)
         for row in range(figure.n_shapes):
             one[:] = 0.0
             one[row] = 1.0
-            directions[row] = regress_joints(regressor, still + shapes.displacement(one))
+            directions[row] = regress_joints(linear, still + shapes.displacement(one))
         return directions
 
     return _directions.get(figure, (), make)
+
+
+def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Floats:
+    """Return the weights of a figure's correctives in a pose.
+
+    Parameters
+    ----------
+    correctives : Correctives
+        The figure's correctives.
+    skeleton : Skeleton
+        Skeleton of the shaped figure.
+    pose : Pose
+        DOFs in lengths and radians.
+
+    Returns
+    -------
+    (P,)
+        One per row of the correctives.
+    """
+    if correctives.feature is None:
+        return corrective_weights(joint_rotations(skeleton, pose))
+    return correctives.feature.weights(skeleton, pose)
 
 
 def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True) -> Floats:
@@ -198,7 +268,7 @@ def rest_positions(figure: Figure, mesh: Mesh, pose: Pose, correct: bool = True)
     """
     if not correct or figure.correctives is None or figure.skeleton is None:
         return mesh.positions
-    weights = corrective_weights(joint_rotations(figure.skeleton, pose))
+    weights = pose_weights(figure.correctives, figure.skeleton, pose)
     if not weights.any():
         return mesh.positions
     return mesh.positions + figure.correctives.displacement(weights)

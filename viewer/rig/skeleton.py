@@ -10,6 +10,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.bodies.joint_posing import JointPosing
 from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.springs.springs import Springs
@@ -69,6 +70,8 @@ class Skeleton:
         Joints that follow others, in the order of evaluation; at most one per joint.
     springs : Springs or None
         Joints that swing while a motion plays.
+    posing : JointPosing or None
+        Rules by which joints follow the DOFs instead of rotating about x, y and z.
     """
 
     names: tuple[str, ...]
@@ -85,6 +88,7 @@ class Skeleton:
     humanoid: Humanoid | None = None
     constraints: tuple[Constraint, ...] = ()
     springs: Springs | None = None
+    posing: JointPosing | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:

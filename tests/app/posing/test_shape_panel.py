@@ -318,3 +318,46 @@ def test_reset_returns_to_the_weights_of_the_file(morphed):
     morphed.step(2)
     morphed.double_click("coefficient 0")
     assert _weights(morphed).tolist() == [0.25, 0.75]
+
+
+def _with_ranges(hand):
+    """Give the box two phenotypes: 0.5 is their mean, and one reaches further down."""
+    figure = hand.state.actor.figure
+    ranged = replace(
+        figure.blend_shapes,
+        origins=np.array([0.5, 0.0]),
+        ranges=np.array([[-0.25, 1.0], [0.0, 2.0]]),
+    )
+    hand.state.actor.figure = replace(figure, blend_shapes=ranged)
+
+
+def test_sliders_with_ranges_show_their_own_numbers(shape):
+    _with_ranges(shape)
+    shape.step(2)
+    _drag(shape, 0, 1.4)
+    assert _weights(shape)[0] == pytest.approx(0.5, abs=1e-6)  # shown as 1
+    shape.enter_value("coefficient 0", "0.75")
+    assert _weights(shape)[0] == pytest.approx(0.25, abs=1e-6)
+    _drag(shape, 1, 0.0)
+    assert _weights(shape)[1] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_random_shapes_stay_within_their_ranges(shape):
+    _with_ranges(shape)
+    for _ in range(5):
+        shape.click("Random")
+        shape.step()
+        shown = _weights(shape) + shape.state.actor.figure.blend_shapes.origins
+        assert -0.25 <= shown[0] <= 1.0 and 0.0 <= shown[1] <= 2.0
+
+
+def test_long_lists_of_shapes_are_filtered_by_name(shape):
+    figure = shape.state.actor.figure
+    count = figure.mesh.n_vertices
+    names = (*(f"jaw {k}" for k in range(50)), *(f"Brow {k}" for k in range(50)))
+    shapes = viewer.BlendShapes(names, np.zeros((100, count, 3)))
+    shape.state.actor.figure = replace(figure, blend_shapes=shapes, joint_regressor=None)
+    shape.state.of(Posing).shape_filter = "brow 4"
+    shape.state.item_rects.clear()
+    shape.step(2)
+    assert _coefficients(shape) == [f"coefficient {k}" for k in (54, *range(90, 100))]

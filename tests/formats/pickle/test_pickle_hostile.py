@@ -90,7 +90,6 @@ def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path: Path) -
         ("numpy.core.multiarray", "ndarray"),
         ("scipy.sparse.csc", "os"),
         ("chumpy.ch", "os"),
-        ("collections", "defaultdict"),
         ("copy_reg", "add_extension"),
         ("_codecs", "decode"),
         ("_codecs", "register"),

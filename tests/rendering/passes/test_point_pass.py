@@ -206,3 +206,12 @@ def test_radii_are_medians_of_the_frames_that_see_a_point():
     sizes[..., 3] = 0.0
     assert point_radii(sizes).tolist() == [0.0, 0.0, 0.0]
     assert point_radii(np.zeros((0, 2, 4))).tolist() == [0.0, 0.0]
+
+
+def test_radii_of_many_points_follow_their_density() -> None:
+    side = np.arange(40) / 39
+    plane = np.stack([*np.meshgrid(side, side), np.zeros((40, 40))], axis=-1).reshape(-1, 3)
+    points = np.concatenate([plane, np.ones((1600, 1))], axis=1)
+    # A grid's cell has one point or two, so gaps are 1/48 or 1/48 divided by the root of 2.
+    radii = point_radii(points[None])
+    assert 0.3 / 48 / 2 <= radii.min() <= radii.max() <= 0.3 / 48

@@ -28,8 +28,10 @@ class Files:
         Reader of captures that are not yet complete.
     recent : list of tuple of str
         Groups of files that were opened together, latest first.
+    rig : str
+        Rig of the body model that is opened next; empty for its default.
     models : dict
-        Body models in the model folder, by name; searched for when the menu opens.
+        Body models that were found, by name; searched for when the menu opens.
     """
 
     dialog: FileDialog | None = None
@@ -37,4 +39,5 @@ class Files:
     loader: Loader | None = None
     stream: Stream | None = None
     recent: list[tuple[str, ...]] = field(default_factory=list)
+    rig: str = ""
     models: dict[str, Path] = field(default_factory=dict)

@@ -175,7 +175,12 @@ def random_shape(state: AppState) -> None:
     rows = [row for row, group in enumerate(shapes.groups) if group == "shape"]
     chosen = rows[:_RANDOM]
     weights[rows] = 0.0
-    weights[chosen] = np.random.default_rng(posing.shape_seed).standard_normal(len(chosen))
+    generator = np.random.default_rng(posing.shape_seed)
+    if shapes.ranges is None:
+        weights[chosen] = generator.standard_normal(len(chosen))
+    else:
+        low, high = shapes.ranges[chosen].T
+        weights[chosen] = generator.uniform(low, high) - [shapes.origin(row) for row in chosen]
     actor.pose.shape_weights = weights
     state.say_status(f"Random shape, seed {posing.shape_seed}")
 

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 from viewer.app.core.fields import begin_field, slider_float
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
-from viewer.app.core.text_fields import whole_field
+from viewer.app.core.text_fields import search_field, whole_field
 from viewer.app.core.widgets import (
     button,
     checkbox,
@@ -22,6 +22,7 @@ from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
 from viewer.phrases import printable
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
 from viewer.rig.memo import Memo
@@ -33,8 +34,15 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
+_SEARCHED = 60  # longer lists of shapes have a filter
 _LABELS = 0.55  # maximum width of the names, relative to the width of the panel
-_HEADINGS = {"shape": "Shape", "expression": "Expression", MORPH_GROUP: "Morphs"}
+_HEADINGS = {
+    "shape": "Shape",
+    "expression": "Expression",
+    MORPH_GROUP: "Morphs",
+    "detail": "Local changes",
+}
+_SIGMA = "standard deviations"
 _measured: Memo[Figure, tuple[tuple[str, str], ...]] = Memo(kept=4)
 
 
@@ -59,6 +67,9 @@ def draw(state: AppState) -> None:
         skinning = state.options.skinning
         skinning.correctives = checkbox(state, "Pose correctives", skinning.correctives)
     imgui.separator()
+    if figure.n_shapes > _SEARCHED:
+        posing = state.of(Posing)
+        posing.shape_filter = search_field("##shapes", posing.shape_filter, "Filter shapes")
     if imgui.begin_child("coefficients", (0.0, 0.0), imgui.ChildFlags_.nav_flattened):
         _draw_coefficients(state, figure, pose)
     imgui.end_child()
@@ -98,12 +109,7 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     if len(pose.shape_weights) < shapes.n_shapes:
         padding = np.zeros(shapes.n_shapes - len(pose.shape_weights))
         pose.shape_weights = np.concatenate([pose.shape_weights, padding])
-    # A heading is a row like the others, so that long lists can be clipped.
-    rows: list[int | str] = []
-    for index, group in enumerate(shapes.groups):
-        if index == 0 or shapes.groups[index - 1] != group:
-            rows.append(_HEADINGS.get(group, group))
-        rows.append(index)
+    rows = _rows(shapes, state.of(Posing).shape_filter if shapes.n_shapes > _SEARCHED else "")
     longest = imgui.calc_text_size(printable(max(shapes.names, key=len), 40)).x
     column = min(longest, _LABELS * imgui.get_content_region_avail().x)
     clipper = imgui.ListClipper()
@@ -118,14 +124,32 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
     clipper.end()
 
 
+def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
+    """Return the shapes whose names contain a text, below the headings of their groups.
+
+    A heading is a row like the others, so that long lists can be clipped.
+    """
+    rows: list[int | str] = []
+    last = ""
+    for index, (name, group) in enumerate(zip(shapes.names, shapes.groups, strict=True)):
+        if wanted.lower() not in name.lower():
+            continue
+        if group != last:
+            rows.append(_HEADINGS.get(group, group))
+            last = group
+        rows.append(index)
+    return rows
+
+
 def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: float) -> None:
     shapes, shown = state.actor.figure.blend_shapes, printable(name, 40)
-    is_morph = shapes is not None and shapes.groups[index] == MORPH_GROUP
-    low, high = (0.0, 1.0) if is_morph else (-_REACH, _REACH)
+    assert shapes is not None  # checked by the caller
+    low, high, unit = _slider_range(shapes, index)
+    origin = shapes.origin(index)
     changed, value = slider_float(
         state,
         begin_field(f"{shown}##{index}", column=column),
-        plain_zero(float(pose.shape_weights[index]), "%.2f"),
+        plain_zero(float(pose.shape_weights[index]) + origin, "%.2f"),
         low,
         high,
         "%.2f",
@@ -134,14 +158,23 @@ def _draw_slider(state: AppState, name: str, index: int, pose: Pose, column: flo
     if imgui.is_item_activated() and isinstance(state.actor.clip, TransformClip):
         pause_for_edit(state)
     if changed and abs(value) < 1e6:  # "nan" and "1e99" can be typed into a slider
-        pose.shape_weights[index] = value
-    if not is_morph:
+        pose.shape_weights[index] = value - origin
+    if unit == _SIGMA:
         _draw_marks()
     if imgui.is_item_hovered():
-        unit = "1 is the full morph target" if is_morph else "standard deviations"
         show_tooltip(f"{shown}: {unit}\nCtrl+click to type a value, double-click to reset")
         if imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
             pose.shape_weights[index] = state.actor.figure.rest_shape_weights[index]
+
+
+def _slider_range(shapes: BlendShapes, index: int) -> tuple[float, float, str]:
+    """Return the ends of a slider, and the unit in its tooltip."""
+    if shapes.ranges is not None:
+        low, high = shapes.ranges[index].tolist()
+        return low, high, f"{low:.2g} to {high:.2g}"
+    if shapes.groups[index] == MORPH_GROUP:
+        return 0.0, 1.0, "1 is the full morph target"
+    return -_REACH, _REACH, _SIGMA
 
 
 def _draw_marks() -> None:

@@ -153,6 +153,8 @@ class Posing:
         Whether ball joints are edited as rotation vectors instead of angles about x, y, z.
     held_vector : HeldVector or None
         The rotation vector being edited.
+    shape_filter : str
+        Text that the names of listed shapes contain, for figures with many.
     shape_seed : int
         Seed of the last random shape.
     n_hand_components : int
@@ -166,6 +168,7 @@ class Posing:
     has_missed: bool = False
     as_vectors: bool = False
     held_vector: HeldVector | None = None
+    shape_filter: str = ""
     shape_seed: int = 0
     n_hand_components: int = 6
 

@@ -61,7 +61,7 @@ def transfer_correctives(
     # One corrective at a time, which bounds the memory of the temporaries.
     for row, direction in zip(transferred, offsets, strict=True):
         np.multiply(interpolate(points, triangles, direction), factors[:, None], out=row)
-    return Correctives(transferred)
+    return Correctives(transferred, correctives.feature)
 
 
 def _fade(matched: Bools, positions: Floats, triangles: Ints) -> Floats:

@@ -13,9 +13,9 @@ from viewer.diagnostics.wording import (
     bindings,
     body_models,
     bvh,
+    captures,
     clips,
     comparison,
-    easymocap,
     export,
     fbx,
     gltf,
@@ -41,7 +41,7 @@ from viewer.diagnostics.wording import (
 
 TABLES = (
     *(reading, kinds, skin, obj, ply, morph, rig, joints, bvh, anim, weights, gltf, fbx, nodes),
-    *(gltf_materials, archives, body_models, easymocap, poses, pictures),
+    *(gltf_materials, archives, body_models, captures, poses, pictures),
     *(bindings, skeletons, meshes, clips, motion, loading, rigging, comparison, export),
 )
 _CODED = (

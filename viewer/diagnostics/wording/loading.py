@@ -9,6 +9,8 @@ MESSAGES = {
     # Incompatible files
     "B001.joints": "expected {joints:#bind matrix}, one per joint of {skeleton:text}, found {n}",
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
+    "F007.unused-rig": "--rig {value:text} has no effect: only Anny has several rigs",
+    "F007.unused-lod": "--lod {value:text} has no effect: only MHR has levels of detail",
     "F002.no-body-model": "--model: not a body model",
     "F002.no-motion": "--motion: expected a motion or an animation of a skeleton, found none",
     "F004.animation": "no animation is called {name:quoted}; {hint}",
@@ -29,6 +31,8 @@ MESSAGES = {
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
+    "F007.own-model": "drawn with {model:text} of the model folder (--model selects another)",
+    "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
     "F007.bundled-body": "drawn with the bundled body (--model selects another)",
     "F007.bundled-body-without-shapes": "drawn with the bundled body, without the shape "
     "coefficients of the files, which do not apply to it (--model selects another)",

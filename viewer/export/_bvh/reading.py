@@ -30,7 +30,7 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
     world_frames,
 )
-from viewer.rig.shape import joint_directions
+from viewer.rig.shape import joint_shifts
 from viewer.rig.skinning import Skinning
 
 Rows = NDArray[np.intp]
@@ -111,7 +111,7 @@ def _bound(figure: Figure, weights: Floats) -> Floats:
     if figure.skin is None or not figure.is_attached:
         return np.tile(np.eye(4), (figure.require_skeleton().n_joints, 1, 1))
     bound = figure.skin.inverse_bind.copy()
-    moved = np.einsum("s,sjc->jc", weights, joint_directions(figure))
+    moved = joint_shifts(figure, weights[None])[0]
     bound[:, :3, 3] -= np.einsum("jab,jb->ja", bound[:, :3, :3], moved)
     return bound
 

@@ -56,7 +56,11 @@ def shape_of(figure: Figure, weights: Floats, reference: int = 0) -> Shape:
     used = np.flatnonzero(is_used | is_own)
     if figure.mesh is None or shapes is None or len(used) == 0:
         return Shape(figure, used[:0], np.zeros((1, 0)))
-    if figure.joint_regressor is None and np.sum(is_used & ~is_own) <= _MOST_TARGETS:
+    if (
+        figure.joint_regressor is None
+        and shapes.is_linear
+        and np.sum(is_used & ~is_own) <= _MOST_TARGETS
+    ):
         return Shape(figure, used, weights[:, used])
     row = weights[min(reference, len(weights) - 1)]
     whole = replace(shaped(figure, row), blend_shapes=None)

@@ -19,7 +19,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import Frames, frames_between, pose_of, world_frames
-from viewer.rig.shape import joint_directions
+from viewer.rig.shape import joint_shifts
 from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
 from viewer.rig.skinning import Skinning, deform, skin_used
 from viewer.rig.skinning.lbs import move
@@ -130,7 +130,9 @@ def figure_side(
     def exact(row: int) -> Floats:
         return deform(figure, pose_of(figure, frames, row), how)[0]
 
+    shapes = figure.blend_shapes
     is_linear = how.method == "lbs" or not figure.is_attached
+    is_linear &= shapes is None or shapes.is_linear or len(chosen) == 0
     return Side(body, poses, None if is_linear or body is None else exact)
 
 
@@ -157,8 +159,10 @@ def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
     if shapes is not None and len(columns):
         directions = shapes.direction_values()[columns]
     correctives = None
-    if figure.correctives is not None and how.correctives and figure.is_attached:
-        correctives = figure.correctives.values()
+    # Correctives with a feature of their own are not measured, as neither side has them.
+    given = figure.correctives if how.correctives and figure.is_attached else None
+    if given is not None and given.feature is None:
+        correctives = given.values()
     skin = None if figure.skin is None else skin_used(figure.skin, how)
     return Body(
         positions,
@@ -193,7 +197,7 @@ def _skinning(figure: Figure, frames: Frames, world: Floats) -> Floats:
     bound = figure.skin.inverse_bind
     if not frames.shape_weights.any():
         return world @ bound
-    moved = np.einsum("fs,sjc->fjc", frames.shape_weights, joint_directions(figure))
+    moved = joint_shifts(figure, frames.shape_weights)
     bound = np.tile(bound, (len(moved), 1, 1, 1))
     bound[..., :3, 3] -= np.einsum("fjab,fjb->fja", bound[..., :3, :3], moved)
     return world @ bound

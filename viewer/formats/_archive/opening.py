@@ -1,14 +1,17 @@
-"""Opens archives: pickles, ``.npz`` and ``.npy`` files, detected by their first bytes."""
+"""Opens archives: pickles, ``.npz``, ``.npy`` and torch files, detected by their first bytes."""
 
 from __future__ import annotations
 
 import re
 
+from viewer.formats._archive.file_window import Data, FileWindow
 from viewer.formats._archive.values import Archive
+from viewer.formats._joblib.compression import is_compressed
 from viewer.formats._source import Source
 
 __all__ = ["is_archive", "open_archive"]
 
+_LARGE = 32 << 20  # bytes; smaller pickles are read at once
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
@@ -25,17 +28,17 @@ def is_archive(head: bytes) -> bool:
     >>> is_archive(b"\x80\x02}q\x01."), is_archive(b"positions 4 {")
     (True, False)
     """
-    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None
+    return head.startswith((*_ZIP, _NPY)) or _PICKLE.match(head) is not None or is_compressed(head)
 
 
 def open_archive(source: Source) -> Archive:
-    """Open a pickle, ``.npz`` or ``.npy`` file, detected by its first bytes.
+    """Open a pickle, ``.npz``, ``.npy`` or torch file, detected by its first bytes.
 
     Parameters
     ----------
     source : Source
         The file. Harmless errors are added to its warnings. Its ``max_size`` also limits the total
-        unpacked size of all members of an ``.npz``.
+        unpacked size of compressed files.
 
     Raises
     ------
@@ -44,16 +47,61 @@ def open_archive(source: Source) -> Archive:
     """
     # Imported late, so that readers of other formats do not import them.
     from viewer.formats._archive.npz import open_npy, open_npz
-    from viewer.formats._pickle.reading import open_pickle
+    from viewer.formats._archive.zip_directory import open_directory
+    from viewer.formats._joblib.compression import unpacked
+    from viewer.formats._torch.zipped import is_torch, open_torch
 
     head = source.peek(4096)
     if head.startswith(_ZIP):
-        return open_npz(source)
+        with open_directory(source) as directory:
+            return open_torch(directory) if is_torch(directory) else open_npz(directory)
     if head.startswith(_NPY):
-        return open_npy(source)
+        return open_npy(source, _open_objects)
     if head.startswith(_LFS):
         raise source.fault("F002.archive-pointer")
+    if is_compressed(head):
+        return _open_pickle(source, unpacked(source))
     if not is_archive(head):
         looks = source.looks_like() or "an unknown format"
         raise source.fault("F002.archive", found=looks)
-    return open_pickle(source)
+    return _open_pickle(source, _pickle_data(source))
+
+
+def _pickle_data(source: Source) -> Data:
+    """Return the bytes of a pickle; those of a large file are read where they are needed."""
+    from viewer.formats._archive.stored_file import StoredFile
+
+    if source._data is None:
+        storage = StoredFile(source)
+        if storage.size > _LARGE:
+            return FileWindow(storage)
+    return source.data
+
+
+def _open_pickle(source: Source, data: Data) -> Archive:
+    """Open a pickle, or a legacy file of torch, which begins like one."""
+    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.reading import named_archive, warn_of_rest
+    from viewer.formats._pickle.steps import run
+    from viewer.formats._torch.legacy import MAGIC, read_bytes, read_stream
+
+    machine = Machine(source, data)
+    machine.load_bytes = read_bytes
+    whole = read_stream(machine) if data[: len(MAGIC)] == MAGIC else run(machine)
+    warn_of_rest(machine)
+    return named_archive(source, "pickle", len(data), whole)
+
+
+def _open_objects(source: Source, offset: int) -> Archive | None:
+    """Open the dict, or list of dicts, in an array of objects; None for other objects."""
+    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.reading import has_names, named_archive, warn_of_rest
+    from viewer.formats._pickle.steps import run
+    from viewer.formats._torch.legacy import read_bytes
+
+    data = _pickle_data(source)
+    machine = Machine(source, data, offset)
+    machine.load_bytes = read_bytes
+    whole = run(machine)
+    warn_of_rest(machine)
+    return named_archive(source, "npy", len(data), whole) if has_names(whole) else None

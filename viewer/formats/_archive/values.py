@@ -156,14 +156,26 @@ class Archive:
         Keys in the order of the file.
     load : callable
         Returns the value of a key; called once for each.
+    branch : callable, optional
+        Returns the archive of a key whose value is a dict or a list of dicts, None for others.
+    label : str
+        Where the names lie in the file, for messages: ``"people.3."``.
     """
 
     def __init__(
-        self, source: Source, kind: str, keys: tuple[str, ...], load: Callable[[str], Value]
+        self,
+        source: Source,
+        kind: str,
+        keys: tuple[str, ...],
+        load: Callable[[str], Value],
+        branch: Callable[[str], Archive | None] | None = None,
+        label: str = "",
     ) -> None:
         self.source, self.kind, self.keys = source, kind, keys
-        self._load = load
+        self.label = label
+        self._load, self._branch = load, branch
         self._values: dict[str, Value] = {}
+        self._branches: dict[str, Archive | None] = {}
 
     def has(self, key: str) -> bool:
         """Return whether the file has a value with this name."""
@@ -185,6 +197,25 @@ class Archive:
                 raise self.fault("F002.no-key", item=key)
             self._values[key] = self._load(key)
         return self._values[key]
+
+    def inside(self, key: str) -> Archive | None:
+        """Return a nested dict as an archive of its own, without reading its values.
+
+        The items of a list of dicts are called "0", "1" …; None if the value is neither.
+        """
+        if key not in self._branches:
+            found = self._branch(key) if self._branch is not None and key in self.keys else None
+            self._branches[key] = found
+        return self._branches[key]
+
+    def unread(self) -> set[str]:
+        """Return the names of values that nobody has asked for, also in the dicts inside."""
+        found = {
+            key for key in self.keys if key not in self._values and not self._branches.get(key)
+        }
+        for branch in self._branches.values():
+            found |= branch.unread() if branch is not None else set()
+        return found
 
     def array(self, key: str, shape: Axes | None = None, kinds: str = "biuf") -> Deferred:
         """Return an array of the given shape and kinds of values.
@@ -266,11 +297,12 @@ class Archive:
         **values: Any,
     ) -> None:
         """Record an error in the value called ``item``; see ``Source.refuse``."""
-        self.source.refuse(key, None, count, part, places, item=printable(item, 60), **values)
+        item = printable(self.label + item, 60)
+        self.source.refuse(key, None, count, part, places, item=item, **values)
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
         """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
-        return self.source.fault(key, item=printable(item, 60), **values)
+        return self.source.fault(key, item=printable(self.label + item, 60), **values)
 
 
 def describe(value: Value) -> Phrase:

@@ -8,16 +8,22 @@ known to exist, and the budget limits time and memory for any sequence of opcode
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
+from viewer.formats._archive.file_window import Data
 from viewer.formats._pickle.values import Span
 from viewer.formats._source import Source
 
 __all__ = ["Machine"]
 
-# Items; a body model needs a few hundred, a motion in plain lists some 100,000.
+# Items; a body model needs a few hundred, a motion in plain lists some 100,000. Results of
+# trackers, which write a dict per frame and person, need one for every eight bytes.
 _MAX_STEPS = 1_000_000
+_BYTES_PER_STEP = 4
+_MOST_STEPS = 20_000_000
+_DEEPEST = 3  # pickles inside pickles; real files have two
 _LONGEST_LINE = 256  # characters of a name or number in the text protocols
 _INTEGER = re.compile(rb"[+-]?[0-9]+")
 
@@ -27,7 +33,7 @@ class Machine:
 
     Attributes
     ----------
-    data : bytes
+    data : bytes or FileWindow
         The file.
     at : int
         Offset of the next byte.
@@ -35,15 +41,30 @@ class Machine:
         Values; those below the last mark are currently inaccessible.
     memo : dict
         Values by index; a dict, so that a large index takes no memory.
+    end : int
+        Offset of the end of the pickle's bytes.
+    depth : int
+        Number of pickles that contain this one.
+    persistent, load_bytes : callable or None
+        Return the value of a persistent id, and that of torch's storages saved as bytes; None
+        where the file must not have any.
     """
 
-    def __init__(self, source: Source) -> None:
-        self.source, self.data, self.at = source, source.data, 0
+    def __init__(
+        self, source: Source, data: Data | None = None, start: int = 0, end: int | None = None
+    ) -> None:
+        self.source, self.at = source, start
+        self.data: Data = source.data if data is None else data
+        self.end = len(self.data) if end is None else end
+        self.depth = 0
+        self.persistent: Callable[[object], object] | None = None
+        self.load_bytes: Callable[[Machine, Span], object] | None = None
         self.stack: list[object] = []
         self.memo: dict[int, object] = {}
         self._marks: list[int] = []
         self._floor = 0  # height of the stack at the last mark
-        self._budget = _MAX_STEPS
+        self._most = max(_MAX_STEPS, min((self.end - start) // _BYTES_PER_STEP, _MOST_STEPS))
+        self._budget = self._most
         self._step_at = 0
 
     def fail(self, problem: Phrase) -> FormatError:
@@ -53,7 +74,7 @@ class Machine:
     def next_step(self) -> int:
         """Return the next opcode, and deduct it from the budget."""
         self._step_at = self.at
-        if self.at >= len(self.data):
+        if self.at >= self.end:
             raise self.cut_short(1, 0)
         self.spend(1)
         self.at += 1
@@ -63,7 +84,25 @@ class Machine:
         """Deduct a number of items from the budget; reject a pickle that exceeds it."""
         self._budget -= count
         if self._budget < 0:
-            raise self.fail(Phrase("pickle-steps", most=_MAX_STEPS))
+            raise self.fail(Phrase("pickle-steps", most=self._most))
+
+    def nested(self, data: Data, start: int, end: int) -> Machine:
+        """Return a machine for a pickle inside this one, which continues its budget.
+
+        Raises
+        ------
+        FormatError
+            If pickles are nested too deeply.
+        """
+        if self.depth >= _DEEPEST:
+            raise self.fail(Phrase("pickle-nested", most=_DEEPEST))
+        inner = Machine(self.source, data, start, end)
+        inner.depth, inner._budget, inner._most = self.depth + 1, self._budget, self._most
+        return inner
+
+    def rejoin(self, inner: Machine) -> None:
+        """Continue with the budget that a nested machine has left."""
+        self._budget = inner._budget
 
     # Reading bytes.
 
@@ -75,8 +114,8 @@ class Machine:
     def skip(self, size: int) -> int:
         """Skip bytes, which must exist, and return the offset of the first."""
         start = self.at
-        if size < 0 or size > len(self.data) - start:
-            raise self.cut_short(size, len(self.data) - start)
+        if size < 0 or size > self.end - start:
+            raise self.cut_short(size, self.end - start)
         self.at = start + size
         return start
 
@@ -88,7 +127,7 @@ class Machine:
     def line(self, longest: int | None = _LONGEST_LINE) -> tuple[int, int]:
         """Skip a line, and return the start and end of its text."""
         start = self.at
-        end = self.data.find(b"\n", start)
+        end = self.data.find(b"\n", start, self.end)
         if end < 0:
             raise self.fail(Phrase("pickle-line-end"))
         if longest is not None and end - start > longest:

@@ -1,8 +1,8 @@
 """Allowlist of the names that a pickle may use, and of their permitted uses.
 
 ``find`` looks up a pair of module and name in a literal table. It imports nothing and returns a
-stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy and Python
-themselves write. All four raise ``MisfitError`` for anything else.
+stand-in. ``call``, ``create`` and ``build`` accept exactly what numpy, scipy, chumpy, torch, joblib
+and Python themselves write. All four raise ``MisfitError`` for anything else.
 """
 
 from __future__ import annotations
@@ -13,6 +13,8 @@ from typing import TypeGuard
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import Opaque
 from viewer.formats._misfit import MisfitError
+from viewer.formats._pickle.tensors import CALLS as TORCH_CALLS
+from viewer.formats._pickle.tensors import ROLES as TORCH_ROLES
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.phrases import printable
 
@@ -20,6 +22,7 @@ __all__ = ["as_key", "build", "call", "create", "find"]
 
 # Numpy 2 and scipy 1.8 renamed modules; files keep the old names. A rule for prefixes would be
 # unsafe: numpy.testing.runstring executes any string.
+_FACTORIES = ("dict", "list", "int", "float")  # of defaultdict
 _ROLES = {
     ("numpy", "ndarray"): "ndarray",
     ("numpy", "dtype"): "dtype",
@@ -53,14 +56,21 @@ _ROLES = {
     ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" like this in old protocols
     ("builtins", "bytes"): "bytes",
     ("collections", "OrderedDict"): "dict",
+    ("collections", "defaultdict"): "defaultdict",
+    **{("builtins", name): "type" for name in _FACTORIES},
+    **{("__builtin__", name): "type" for name in _FACTORIES},
     ("_codecs", "encode"): "encode",
+    ("joblib.numpy_pickle", "NumpyArrayWrapper"): "joblib",
+    **TORCH_ROLES,
 }
-_CLASSES = {"csc", "csr", "Ch", "Select", "expression"}
+# Wrappers of joblib before 0.10, which keep each array in a file of its own.
+_OLD_WRAPPERS = ("NDArrayWrapper", "ZNDArrayWrapper")
+_CLASSES = {"csc", "csr", "Ch", "Select", "expression", "joblib"}
 _ORDERS = {"<", ">", "=", "|"}
 _LONGEST_NAME = 200
 _LONGEST_KEY = 1 << 16
 _LARGEST_KEY = 1 << 60
-_MOST_ARGUMENTS = 6
+_MOST_ARGUMENTS = 8
 _WRONG = object()  # returned for a call with unusual arguments
 
 
@@ -74,6 +84,8 @@ def find(module: str, name: str) -> StandIn:
     """
     full = ".".join(printable(part[:_LONGEST_NAME]) for part in (module, name))
     role = _ROLES.get((module, name))
+    if module.startswith("joblib.numpy_pickle") and name in _OLD_WRAPPERS:
+        raise MisfitError(Phrase("joblib-old", name=full))
     if role is None:
         raise MisfitError(Phrase("pickle-global", name=full))
     return StandIn(full, role)
@@ -89,16 +101,23 @@ def call(function: object, arguments: object) -> tuple[object, int]:
     arguments : object
         A tuple; anything else is refused.
     """
-    if not isinstance(function, StandIn) or function.role not in _CALLS:
+    if not isinstance(function, StandIn) or function.role not in (*_CALLS, *TORCH_CALLS):
         raise MisfitError(Phrase("pickle-call", found=noun(function)))
     if isinstance(arguments, tuple) and len(arguments) <= _MOST_ARGUMENTS:
-        made = _CALLS[function.role](arguments)
+        made = _called(function.role, arguments)
         if made is not _WRONG:
             copies = function.role in ("dict", "scalar", "set")
             sizes = [len(each) for each in arguments if isinstance(each, list | Span)]
             return made, sum(sizes) if copies else 0
     found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
     raise MisfitError(Phrase("pickle-arguments", name=function.name, found=found))
+
+
+def _called(role: str, arguments: tuple[object, ...]) -> object:
+    if role in _CALLS:
+        return _CALLS[role](arguments)
+    made = TORCH_CALLS[role](arguments)
+    return _WRONG if made is None else made
 
 
 def create(of: object, arguments: object) -> Instance:
@@ -223,6 +242,14 @@ def _dict(arguments: tuple[object, ...]) -> object:
     return _WRONG
 
 
+def _defaultdict(arguments: tuple[object, ...]) -> object:
+    """Return a plain dict: nothing asks for a missing key, so its factory is never called."""
+    match arguments:
+        case () | (None,) | (StandIn(role="type" | "dict" | "set"),):
+            return {}
+    return _WRONG
+
+
 def _encode(arguments: tuple[object, ...]) -> object:
     match arguments:
         case (Span(coding="utf-8" | "raw-unicode-escape") as text, coding):
@@ -248,6 +275,7 @@ _CALLS: dict[str, Callable[[tuple[object, ...]], object]] = {
     "frombuffer": _frombuffer,
     "set": _set,
     "dict": _dict,
+    "defaultdict": _defaultdict,
     "encode": _encode,
     "bytes": _bytes,
     "reconstructor": _reconstructor,
@@ -261,7 +289,7 @@ def _build_array(target: Array, state: object) -> None:
                 target.fill(shape, dtype, bool(order), payload)
                 return
             if isinstance(payload, list) and dtype.code.startswith("O"):
-                target.what = dtype.what()
+                target.what, target.items = dtype.what(), payload
                 return
     raise MisfitError(Phrase("pickle-array-state", found=noun(state)))
 

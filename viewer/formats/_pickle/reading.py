@@ -2,12 +2,14 @@
 
 ::
 
-    reading.py this file: the pickle must be a dict of named values
-    steps.py        the opcodes of protocols 0 to 5
-    machine.py      bytes, stack, memo and budget of the machine that executes them
-    names.py        the allowed names and their arguments values.py       inert values that
-    represent these names resolving.py    conversion of values to arrays, sparse matrices and plain
-    data, key by key
+    reading.py        this file: the pickle must be a dict of named values, or a list of such dicts
+    steps.py          the opcodes of protocols 0 to 5
+    machine.py        bytes, stack, memo and budget of the machine that executes them
+    names.py          the allowed names and their arguments
+    values.py         inert values that represent these names
+    tensors.py        tensors of torch
+    joblib_arrays.py  arrays that follow their description, as joblib writes them
+    resolving.py      conversion of values to arrays, sparse matrices and plain data, key by key
 
 Arrays are views of the file's bytes. They are often unaligned, so an array that is used in a loop
 should be copied first.
@@ -15,48 +17,112 @@ should be copied first.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._pickle.machine import Machine
 from viewer.formats._pickle.resolving import resolve
-from viewer.formats._pickle.steps import run
-from viewer.formats._pickle.values import noun
+from viewer.formats._pickle.values import Array, noun
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-__all__ = ["open_pickle"]
+__all__ = ["has_names", "named_archive", "warn_of_rest"]
 
 
-def open_pickle(source: Source) -> Archive:
-    """Open a pickle; raises as ``open_archive`` does.
+def warn_of_rest(machine: Machine) -> None:
+    """Record a note about bytes after the end of a pickle."""
+    rest = machine.end - machine.at
+    if rest:
+        machine.source.warn("F006.pickle-rest", n=rest)
+
+
+def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
+    """Return the values that a pickle built as an archive.
 
     Parameters
     ----------
     source : Source
-        Pickle, whose bytes stay in memory as long as any of the arrays exists.
+        Its file, whose bytes stay in memory as long as any of the arrays exists.
+    kind : str
+        As for ``Archive``.
+    size : int
+        Bytes from which the values were read, which limit their number.
+    whole : object
+        The value on the machine's stack.
+
+    Raises
+    ------
+    FormatError
+        If it is neither a dict with string keys, nor a list or dict of dicts.
     """
-    machine = Machine(source)
-    whole = run(machine)
-    rest = len(source.data) - machine.at
-    if rest:
-        source.warn("F006.pickle-rest", n=rest)
-    values = _named(source, whole)
-    path, size = source.path, len(source.data)
+    return _archive(source, kind, size, _named(source, _objects(whole)), "")
+
+
+def has_names(whole: object) -> bool:
+    """Return whether an array of objects contains one dict, or only dicts."""
+    return _items(_objects(whole)) is not None
+
+
+def _objects(whole: object) -> object:
+    """Return the objects of an array of them; a single one as it is."""
+    if not isinstance(whole, Array) or whole.items is None:
+        return whole
+    return whole.items[0] if len(whole.items) == 1 else whole.items
+
+
+def _archive(
+    source: Source, kind: str, size: int, values: dict[str, object], label: str
+) -> Archive:
+    path = source.path
 
     def load(key: str) -> Value:
-        return resolve(path, size, key, values[key])
+        return resolve(path, size, label + key, values[key])
 
-    return Archive(source, "pickle", tuple(values), load)
+    def branch(key: str) -> Archive | None:
+        found = _items(values[key])
+        if found is None:
+            return None
+        return _archive(source, kind, size, _strings(source, found), f"{label}{key}.")
+
+    return Archive(source, kind, tuple(values), load, branch, label)
+
+
+def _items(value: object) -> Mapping[str | bytes | int, object] | None:
+    """Return a dict, or by index the dicts of a list, or its lists of dicts; else None."""
+    if isinstance(value, dict):
+        return value
+    if isinstance(value, list | tuple) and any(map(_has_dict, value)) and all(map(_is_nest, value)):
+        return dict(enumerate(value))
+    return None
+
+
+def _has_dict(item: object) -> bool:
+    return isinstance(item, dict) or (isinstance(item, list | tuple) and len(item) > 0)
+
+
+def _is_nest(item: object) -> bool:
+    """Return whether an item of a list is a dict, or a list of dicts, which may be empty."""
+    if isinstance(item, list | tuple):
+        return all(isinstance(inner, dict) for inner in item)
+    return isinstance(item, dict)
 
 
 def _named(source: Source, whole: object) -> dict[str, object]:
-    """Return the values by name; names may be bytes, as Python 3 writes strings of Python 2."""
-    if not isinstance(whole, dict):
+    """Return the values by name; numbers are names only of dicts, such as people."""
+    found = _items(whole)
+    if found is None:
         raise source.fault("F002.pickle-named", found=noun(whole))
-    values: dict[str, object] = {}
-    for key, value in whole.items():
-        if isinstance(key, int):
+    for key, value in found.items():
+        if isinstance(key, int) and not isinstance(value, dict | list | tuple):
             raise source.fault("F002.pickle-key", found=key)
-        name = key if isinstance(key, str) else key.decode("latin-1")
+    return _strings(source, found)
+
+
+def _strings(source: Source, found: Mapping[str | bytes | int, object]) -> dict[str, object]:
+    """Return values by name; names may be bytes, as Python 3 writes strings of Python 2."""
+    values: dict[str, object] = {}
+    for key, value in found.items():
+        name = key.decode("latin-1") if isinstance(key, bytes) else str(key)
         if name in values:
             raise source.fault("F002.pickle-twice", item=printable(name, 60))
         values[name] = value

@@ -18,6 +18,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Opaque, Sparse, Value
 from viewer.formats._misfit import MisfitError
+from viewer.formats._pickle.tensors import Storage, Tensor
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred
@@ -95,6 +96,12 @@ class _Resolver:
     def thing(self, value: object) -> Deferred | Sparse | Opaque:
         if isinstance(value, Array):
             return value.deferred(self.fail) or Opaque(value.what)
+        if isinstance(value, Tensor):
+            return value.deferred(self.fail)
+        if isinstance(value, Storage):
+            return Opaque(Phrase("unread-storage"))
+        if isinstance(value, Instance) and value.of.role == "joblib":
+            return Opaque(Phrase("unread-name", name=value.of.name))
         if isinstance(value, Instance) and value.of.role in ("csc", "csr"):
             return self.sparse(value)
         if isinstance(value, Instance):

@@ -1,7 +1,8 @@
 r"""Opcodes of pickles, protocols 0 to 5.
 
 They are named as in Python's ``pickletools``. Opcodes that reach outside the file are refused:
-persistent ids, extension codes and out-of-band buffers. Names are resolved in ``names.py``.
+extension codes, out-of-band buffers, and persistent ids except in files of torch. Names are
+resolved in ``names.py``.
 """
 
 from __future__ import annotations
@@ -15,8 +16,9 @@ from typing import TypeVar
 from viewer.diagnostics import Phrase
 from viewer.formats._misfit import MisfitError
 from viewer.formats._pickle import names as names
+from viewer.formats._pickle.joblib_arrays import take_array
 from viewer.formats._pickle.machine import Machine
-from viewer.formats._pickle.values import Span, noun
+from viewer.formats._pickle.values import Instance, Span, StandIn, noun
 
 __all__ = ["run"]
 
@@ -112,7 +114,7 @@ def _float_text(machine: Machine) -> None:
 
 
 def _float(machine: Machine) -> None:
-    machine.push(struct.unpack_from(">d", machine.data, machine.skip(8))[0])
+    machine.push(struct.unpack(">d", machine.data[machine.skip(8) : machine.at])[0])
 
 
 # Strings.
@@ -221,11 +223,34 @@ def _stack_global(machine: Machine) -> None:
     machine.push(_find(machine, module, name))
 
 
+def _persistent(machine: Machine) -> None:
+    """Replace a persistent id by its value, where the file's kind gives it one."""
+    found = machine.pop()
+    if machine.persistent is None:
+        _refused(Phrase("noun-persistent"))(machine)
+        return
+    ask = machine.persistent
+    machine.push(_guarded(machine, lambda: ask(found)))
+
+
 def _reduce(machine: Machine) -> None:
     arguments, function = machine.pop(), machine.pop()
+    if isinstance(function, StandIn) and function.role == "torch-bytes":
+        machine.push(_loaded_bytes(machine, function, arguments))
+        return
     value, copied = _guarded(machine, lambda: names.call(function, arguments))
     machine.spend(copied)
     machine.push(value)
+
+
+def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> object:
+    """Return what torch saved as bytes inside the pickle."""
+    match arguments:
+        case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
+            return machine.load_bytes(machine, data)
+    found = [*map(noun, arguments)] if isinstance(arguments, tuple) else []
+    problem = Phrase("pickle-arguments", name=function.name, found=found)
+    raise machine.source.fault("F002.pickle", problem=problem)
 
 
 def _create(machine: Machine, of: object, arguments: object) -> None:
@@ -257,6 +282,9 @@ def _object(machine: Machine) -> None:
 def _build(machine: Machine) -> None:
     state, target = machine.pop(), machine.top()
     _guarded(machine, lambda: names.build(target, state))
+    if isinstance(target, Instance) and target.of.role == "joblib":
+        machine.pop()
+        machine.push(_guarded(machine, lambda: take_array(machine, target, run)))
 
 
 # Framing.
@@ -270,8 +298,8 @@ def _protocol(machine: Machine) -> None:
 
 def _frame(machine: Machine) -> None:
     size = machine.number(8)
-    if size > len(machine.data) - machine.at:
-        raise machine.cut_short(size, len(machine.data) - machine.at)
+    if size > machine.end - machine.at:
+        raise machine.cut_short(size, machine.end - machine.at)
 
 
 _STEPS: dict[int, Step] = {
@@ -344,7 +372,7 @@ _STEPS: dict[int, Step] = {
     0x95: _frame,
     # Opcodes that reach outside the file
     ord("P"): _refused(Phrase("noun-persistent")),
-    ord("Q"): _refused(Phrase("noun-persistent")),
+    ord("Q"): _persistent,
     0x82: _refused(Phrase("noun-extension")),
     0x83: _refused(Phrase("noun-extension")),
     0x84: _refused(Phrase("noun-extension")),

@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.npz import array_dtype, item_count, shaped
+from viewer.formats._archive.element_types import array_dtype, item_count, shaped
+from viewer.formats._archive.file_window import Data
 from viewer.formats._misfit import MisfitError
 from viewer.rig.arrays import Deferred
 
@@ -33,7 +34,7 @@ class Span:
 
     Parameters
     ----------
-    data : bytes
+    data : bytes or FileWindow
         The file, or bytes decoded from it.
     start, stop : int
         The range of the bytes.
@@ -43,7 +44,7 @@ class Span:
 
     __slots__ = ("_packed", "_text", "coding", "data", "start", "stop")
 
-    def __init__(self, data: bytes, start: int, stop: int, coding: str | None = None) -> None:
+    def __init__(self, data: Data, start: int, stop: int, coding: str | None = None) -> None:
         self.data, self.start, self.stop, self.coding = data, start, stop, coding
         self._text: str | None = None
         self._packed: Span | None = None
@@ -54,6 +55,12 @@ class Span:
     def raw(self) -> bytes:
         """Return a copy of the bytes."""
         return self.data[self.start : self.stop]
+
+    def view(self) -> memoryview:
+        """Return the bytes, without copying them if they are in memory."""
+        if isinstance(self.data, bytes):
+            return memoryview(self.data)[self.start : self.stop]
+        return memoryview(self.raw())
 
     def text(self) -> str:
         """Return the string, which is decoded only once.
@@ -142,6 +149,8 @@ class Array:
         Element type; None if the array is not evaluated, with the reason in ``what``.
     axes : tuple of int, optional
         Order of the stored axes in the array.
+    items : list, optional
+        Objects of an object array, which is not evaluated otherwise.
     """
 
     shape: tuple[int, ...] = ()
@@ -149,6 +158,7 @@ class Array:
     payload: Span | None = None
     is_fortran: bool = False
     axes: tuple[int, ...] | None = None
+    items: list[object] | None = None
     what: Phrase = field(default_factory=lambda: Phrase("unread-unset"))
 
     def fill(self, shape: tuple[int, ...], dtype: Dtype, is_fortran: bool, payload: Span) -> None:
@@ -193,7 +203,11 @@ class Array:
         flat = np.empty(0, self.dtype)
         if len(self.payload):  # numpy cannot create a view of zero bytes
             n_items = len(self.payload) // self.dtype.itemsize
-            flat = np.frombuffer(self.payload.data, self.dtype, n_items, self.payload.start)
+            payload = self.payload
+            if isinstance(payload.data, bytes):
+                flat = np.frombuffer(payload.data, self.dtype, n_items, payload.start)
+            else:
+                flat = np.frombuffer(payload.raw(), self.dtype, n_items)
         array = shaped(flat, self.shape, self.is_fortran)
         return array if self.axes is None else np.ascontiguousarray(array.transpose(self.axes))
 

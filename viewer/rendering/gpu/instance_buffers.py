@@ -39,7 +39,7 @@ from viewer.rig.motion.instances import local_rotations, placements, posed_world
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import pose_weights, shaped
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
 from viewer.rig.skinning.dqs import split_palette
@@ -170,8 +170,8 @@ class InstanceBuffers:
             self._rigid_rows[rows, :, :2] = duals.reshape(*shape, 2, 4)
             self._rigid_rows[rows, :, 2:] = stretches.reshape(*shape, 3, 4)
             write_stacked(self._rigid, self._rigid_rows[: self.count])
-        active = how.correctives and figure.correctives is not None
-        self._offsets.update(rotations if active else None, rows, self.count)
+        weights = _pose_weights(figure, poses, rotations) if how.correctives else None
+        self._offsets.update(weights, rows, self.count)
 
     def place(self, actors: Sequence[Actor], view: View) -> None:
         """Upload the actors' placements, relative to a camera, and their colours.
@@ -265,3 +265,16 @@ class InstanceBuffers:
         self._release_textures()
         self._offsets.release()
         self._rest.release()
+
+
+def _pose_weights(figure: Figure, poses: Sequence[Pose], rotations: Floats) -> Floats | None:
+    """Return the weights of the pose correctives, (C, P), or None if there are none.
+
+    ``rotations`` (C, J, 3, 3): rotations of the joints relative to their parents.
+    """
+    correctives, skeleton = figure.correctives, figure.require_skeleton()
+    if correctives is None:
+        return None
+    if correctives.feature is None:
+        return (rotations[:, 1:] - np.eye(3)).reshape(len(poses), -1)
+    return np.stack([pose_weights(correctives, skeleton, pose) for pose in poses])

@@ -189,6 +189,11 @@ class MeshBuffers:
         return self._offsets
 
     @property
+    def block(self) -> int:
+        """Number of pose correctives that are skipped together, see ``Correctives.block``."""
+        return 1 if self.figure.correctives is None else self.figure.correctives.block
+
+    @property
     def product(self) -> np.ndarray:
         """The pose correctives as float32, (P, 3 V), for sums on the processor."""
         if self._product is None:

@@ -15,15 +15,18 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import active_rows, corrective_weights
+from viewer.rig.blendshapes import active_rows
 from viewer.rig.figure import Figure
-from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.pose import Pose
+from viewer.rig.shape import pose_weights
 from viewer.rig.skinning import Skinning
 
 __all__ = ["WAYS", "RestBuffers"]
 
 WAYS = ("texture", "product")
 """Methods of summing pose correctives."""
+
+_MOST_TEXELS = 24 << 20  # offsets in a texture, 12 bytes each; more are summed on the processor
 
 
 class RestBuffers:
@@ -48,7 +51,7 @@ class RestBuffers:
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
         self.context, self.mesh = context, mesh
-        self.way = way or ("product" if is_software(context) else "texture")
+        self.way = way or _usual_way(context, mesh)
         self.positions, self.normals = mesh.positions, mesh.normals
         self.n_offsets = 0
         self._own: tuple[moderngl.Buffer, moderngl.Buffer] | None = None
@@ -81,7 +84,7 @@ class RestBuffers:
     def _weights(self, figure: Figure, pose: Pose) -> Floats:
         if figure.correctives is None or figure.skeleton is None:
             return np.zeros(0)
-        return corrective_weights(joint_rotations(figure.skeleton, pose))
+        return pose_weights(figure.correctives, figure.skeleton, pose)
 
     def _write_list(self, weights: Floats) -> None:
         rows = np.flatnonzero(weights)
@@ -104,7 +107,7 @@ class RestBuffers:
         rest = float32(shape.positions - self.mesh.center)
         if weights is not None:
             product = self.mesh.product
-            for rows in active_rows(weights):
+            for rows in active_rows(weights, self.mesh.block):
                 rest += (float32(weights[rows]) @ product[rows]).reshape(-1, 3)
         self.positions.write(rest[self.mesh.sources])
         if normals:
@@ -143,3 +146,9 @@ class RestBuffers:
         for item in (*(self._own or ()), self._list):
             if item is not None:
                 item.release()
+
+
+def _usual_way(context: moderngl.Context, mesh: MeshBuffers) -> str:
+    correctives = mesh.figure.correctives
+    count = 0 if correctives is None else correctives.offsets.shape[0] * correctives.n_vertices
+    return "product" if is_software(context) or count > _MOST_TEXELS else "texture"

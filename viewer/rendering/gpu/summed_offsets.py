@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.upload import (
     empty_offsets,
-    float32,
     pair_texture,
     write_pairs,
     write_stacked,
@@ -51,24 +50,22 @@ class SummedOffsets:
         self._list: moderngl.Texture | None = None
         self._summed: moderngl.Texture | None = None
 
-    def update(self, rotations: Floats | None, rows: NDArray[np.intp], count: int) -> None:
+    def update(self, weights: Floats | None, rows: NDArray[np.intp], count: int) -> None:
         """Update to new poses.
 
         Parameters
         ----------
-        rotations : (C, J, 3, 3) or None
-            Rotations of the joints relative to their parents, for changed instances; None for no
-            correctives.
+        weights : (C, P) or None
+            Weights of the correctives, for changed instances; None for no correctives.
         rows : (C,)
             Indices of these instances.
         count : int
             Number of all instances, A.
         """
         self.n_listed = self.n_summed = 0
-        if rotations is None:
+        if weights is None:
             self._weights = np.zeros((0, 0), "f4")
             return
-        weights = float32((rotations[:, 1:] - np.eye(3)).reshape(len(rows), -1))
         if len(self._weights) < count or self._weights.shape[1] != weights.shape[1]:
             grown = np.zeros((count, weights.shape[1]), "f4")
             if self._weights.shape[1] == weights.shape[1]:
@@ -101,7 +98,7 @@ class SummedOffsets:
             self._sums, rows = np.zeros((count, size), "f4"), np.arange(count)
         weights = self._weights[rows]
         total = np.zeros((len(rows), size), "f4")
-        for run in active_rows(np.abs(weights).max(axis=0)):
+        for run in active_rows(np.abs(weights).max(axis=0), self.mesh.block):
             total += weights[:, run] @ product[run]
         self._sums[rows] = total
         texels = count * size // 3

@@ -35,9 +35,11 @@ _LARGEST = 0.012  # radius relative to the size of all points: 2 cm on a person
 _SMALLEST = 0.0015  # minimum of this radius: coincident points stay visible
 _SPACING = 0.3  # maximum radius relative to the distance of the nearest point, for fingers
 _LIMB = 0.5  # radius of a limb relative to its thinner end
+_MANY = 1000  # points; comparing more of them pair by pair takes too much memory
+_CELLS = 48  # cells of a grid along the longest side of the points
 _SAMPLES = 32  # frames of a clip that determine the radii
 _CERTAIN = 0.999  # confidence above which a point is drawn opaque
-_SIDES, _RINGS = 12, 3  # subdivisions of a capsule: around, and from equator to pole
+_FINE, _COARSE = (12, 3), (6, 1)  # subdivisions of a capsule: around, and from equator to pole
 _FLOATS = 11  # numbers of an instance
 
 
@@ -64,10 +66,8 @@ def point_radii(points: Floats) -> Floats:
             continue
         places = frame[seen, :3]
         sizes.append(box_size(bounding_box(places)))
-        apart = np.linalg.norm(places[:, None] - places[None], axis=2)
-        apart[apart == 0.0] = np.inf
         row = np.full(frame.shape[0], np.nan)
-        row[seen] = apart.min(axis=1)
+        row[seen] = _gaps(places) if len(seen) <= _MANY else _mean_gaps(places)
         gaps.append(row)
     if not sizes:
         return np.zeros(points.shape[1])
@@ -76,6 +76,26 @@ def point_radii(points: Floats) -> Floats:
     widest = np.full(points.shape[1], np.inf)
     widest[seen_ever] = np.nanmedian(np.array(gaps)[:, seen_ever], axis=0)
     return np.clip(_SPACING * widest, _SMALLEST * size, _LARGEST * size)
+
+
+def _gaps(places: Floats) -> Floats:
+    """Return the distance of each point (N, 3) from the nearest other one: (N,)."""
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2)
+    apart[apart == 0.0] = np.inf
+    return np.asarray(apart.min(axis=1))
+
+
+def _mean_gaps(places: Floats) -> Floats:
+    """Return the mean distance of the points on a surface near each of many points: (N,).
+
+    n points in a cell of a grid are about as far apart as the cell's side divided by sqrt(n).
+    """
+    low, high = bounding_box(places)
+    side = max(float((high - low).max()), 1e-30) / _CELLS
+    cells = np.floor((places - low) / side).astype(np.int64)
+    numbers = (cells[:, 0] * (_CELLS + 1) + cells[:, 1]) * (_CELLS + 1) + cells[:, 2]
+    _, where, counts = np.unique(numbers, return_inverse=True, return_counts=True)
+    return np.asarray(side / np.sqrt(counts[where]))
 
 
 def _radii_of(actor: Actor, points: Floats) -> Floats:
@@ -201,14 +221,20 @@ class PointPass:
 
     Attributes
     ----------
-    capsule : (moderngl.Buffer, moderngl.Buffer)
-        Vertices and indices, shared by all instances.
+    capsule, coarse : (moderngl.Buffer, moderngl.Buffer)
+        Vertices and indices, shared by all instances; the coarse ones are for many points.
     """
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        vertices, triangles = _capsule()
-        self.capsule = buffer(context, vertices, "f4"), buffer(context, triangles, "u4")
+        self.capsule, self.coarse = (
+            (buffer(context, vertices, "f4"), buffer(context, triangles, "u4"))
+            for vertices, triangles in (_capsule(*_FINE), _capsule(*_COARSE))
+        )
+
+    def shape(self, points: PointBuffers) -> tuple[moderngl.Buffer, moderngl.Buffer]:
+        """Return the vertices and indices of an actor's capsules."""
+        return self.capsule if len(points.layout.names) <= _MANY else self.coarse
 
     def draw(
         self,
@@ -241,7 +267,7 @@ class PointPass:
         set_model(program, view, placement, points.center)
         set_lights(program, view, options.lights)
         set_uniforms(program, {"u_flat": False, "u_textured": False, "u_opacity": 1.0})
-        array, count = points.array(program, self.capsule), len(points.elements)
+        array, count = points.array(program, self.shape(points)), len(points.elements)
         # Cull back faces, so that translucent capsules show one layer; a reflection flips winding.
         is_reflected = bool(np.linalg.det(placement[:3, :3]) < 0.0)
         self.context.front_face = "cw" if is_reflected else "ccw"
@@ -260,7 +286,7 @@ class PointPass:
         if len(points.elements):
             program = self.programs.drawing("point", fragment=fragment)
             set_model(program, view, placement, points.center)
-            array = points.array(program, self.capsule)
+            array = points.array(program, self.shape(points))
             array.render(moderngl.TRIANGLES, instances=len(points.elements))
 
     def _draw_hidden(self, array: moderngl.VertexArray, count: int, opacity: float) -> None:
@@ -273,26 +299,26 @@ class PointPass:
 
     def release(self) -> None:
         """Free the capsule."""
-        for item in self.capsule:
+        for item in (*self.capsule, *self.coarse):
             item.release()
 
 
-def _capsule() -> tuple[Floats, Ints]:
+def _capsule(n_sides: int, n_rings: int) -> tuple[Floats, Ints]:
     """Return two hemispheres and the tube between them: vertices (N, 4) and triangles (T, 3).
 
     The last column is 0 for vertices at the start of the capsule and 1 for those at its end.
     """
     rows = []
     for end in (0.0, 1.0):
-        tilts = np.linspace(0.0, math.pi / 2, _RINGS + 1)
+        tilts = np.linspace(0.0, math.pi / 2, n_rings + 1)
         for tilt in tilts[::-1] if end == 0.0 else tilts:
-            around = 2.0 * math.pi * np.arange(_SIDES) / _SIDES
+            around = 2.0 * math.pi * np.arange(n_sides) / n_sides
             flat, height = math.cos(tilt), (2.0 * end - 1.0) * math.sin(tilt)
             x, y = flat * np.cos(around), flat * np.sin(around)
-            rows.append(np.stack([x, y, np.full(_SIDES, height), np.full(_SIDES, end)], axis=1))
-    ring, side = np.divmod(np.arange((len(rows) - 1) * _SIDES), _SIDES)
-    here, right = ring * _SIDES + side, ring * _SIDES + (side + 1) % _SIDES
-    above, corner = here + _SIDES, right + _SIDES
+            rows.append(np.stack([x, y, np.full(n_sides, height), np.full(n_sides, end)], axis=1))
+    ring, side = np.divmod(np.arange((len(rows) - 1) * n_sides), n_sides)
+    here, right = ring * n_sides + side, ring * n_sides + (side + 1) % n_sides
+    above, corner = here + n_sides, right + n_sides
     triangles = np.concatenate(
         [np.stack([here, right, corner], axis=1), np.stack([here, corner, above], axis=1)]
     )

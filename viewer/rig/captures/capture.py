@@ -6,12 +6,17 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from viewer.diagnostics import Diagnostic
+from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImages
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.parameter_clip import ParameterMotion
 
-__all__ = ["Capture", "CapturePart"]
+__all__ = ["Capture", "CapturePart", "RestRoots"]
+
+RestRoots = Callable[[Floats | None], Floats]
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,6 +31,9 @@ class CapturePart:
         Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
         The same for keypoints.
+    parameters : mapping of person to ParameterMotion
+        The same for model parameters; people who have both are shown as bodies if the figure of
+        the bodies has model parameters, otherwise as points.
     warnings : tuple of Diagnostic
         Messages from the reader about these frames.
     """
@@ -34,6 +42,7 @@ class CapturePart:
     bodies: dict[int, BodyMotion] = field(default_factory=dict)
     points: dict[int, tuple[PointLayout, PointClip]] = field(default_factory=dict)
     warnings: tuple[Diagnostic, ...] = ()
+    parameters: dict[int, ParameterMotion] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,12 +66,16 @@ class Capture:
         Calibrated cameras.
     images : CameraImages or None
         Images of the cameras, if available.
+    views_of : callable or None
+        Returns further cameras, whose places depend on the figure that shows the bodies.
+    facts : tuple of (str, str)
+        What was recognised in the file, for ``viewer info``.
     space : "world", "camera" or ""
         The space of its bodies, of those that the file contains; empty if it has only one.
     in_space : callable or None
         Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str
-        The member of the SMPL family that its bodies use, e.g. ``"SMPL+H"``; empty for none.
+        The model that its people use, e.g. ``"SMPL+H"`` or ``"MHR"``; empty if unknown.
     warnings : tuple of Diagnostic
         Messages from opening the sequence.
     """
@@ -76,5 +89,7 @@ class Capture:
     model: str = ""
     warnings: tuple[Diagnostic, ...] = ()
     images: CameraImages | None = None
+    views_of: Callable[[RestRoots], tuple[CameraView, ...]] | None = None
+    facts: tuple[tuple[str, str], ...] = ()
     space: str = ""
     in_space: Callable[[str], Capture] | None = None

@@ -6,13 +6,12 @@ import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import corrective_weights
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.pose import Pose, joint_rotations, placement_matrix, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.pose import Pose, placement_matrix, rest_pose
+from viewer.rig.shape import pose_weights, shaped
 from viewer.rig.skinning import Skinning, skinned
 
 __all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
@@ -81,7 +80,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     rest = figure.require_mesh().positions[vertices]
     if not correct or figure.correctives is None or figure.skeleton is None:
         return rest
-    weights = corrective_weights(joint_rotations(figure.skeleton, pose))
+    weights = pose_weights(figure.correctives, figure.skeleton, pose)
     active = np.flatnonzero(weights)
     if len(active) == 0:
         return rest

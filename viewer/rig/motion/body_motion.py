@@ -16,9 +16,9 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.hands import Hand
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
-from viewer.rig.shape import joint_directions, rest_joints
+from viewer.rig.shape import joint_shifts, rest_joints
 
-__all__ = ["BodyMotion", "body_clip", "root_positions"]
+__all__ = ["BodyMotion", "body_clip", "rest_roots", "root_positions"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,8 +156,18 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 
 def root_positions(figure: Figure, weights: Floats) -> Floats:
     """Return the rest position of the root joint of many shapes: (N, 3) for weights (N, S)."""
-    directions = joint_directions(figure)[:, 0]
-    return rest_joints(figure)[0] + weights[:, : len(directions)] @ directions
+    return rest_joints(figure)[0] + joint_shifts(figure, weights)[:, 0]
+
+
+def rest_roots(figure: Figure, shape: Floats | None) -> Floats:
+    """Return the rest position of the root joint for shape coefficients (N, S): (N, 3)."""
+    groups = figure.blend_shapes.groups if figure.blend_shapes else ()
+    weights = np.zeros((1 if shape is None else len(shape), len(groups)))
+    if shape is not None:
+        columns = [index for index, name in enumerate(groups) if name == "shape"]
+        used = min(len(columns), shape.shape[1])
+        weights[:, columns[:used]] = shape[:, :used]
+    return root_positions(figure, weights)
 
 
 def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:

@@ -26,7 +26,7 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, dof_rotations, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Motion, figure_pose
-from viewer.rig.shape import joint_directions, moved_rest_translations, rest_joints
+from viewer.rig.shape import joint_shifts, moved_rest_translations, rest_joints
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 from viewer.rig.transforms.posing import apply_transforms
 from viewer.rig.transforms.rate import key_rate
@@ -371,5 +371,5 @@ def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:
     skeleton = figure.require_skeleton()
     if not shape_weights.any():
         return skeleton.rest_translations[None]
-    shifts = np.einsum("fs,sjc->fjc", shape_weights, joint_directions(figure))
+    shifts = joint_shifts(figure, shape_weights)
     return moved_rest_translations(skeleton, rest_joints(figure) + shifts)

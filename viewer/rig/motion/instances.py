@@ -182,6 +182,8 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
         dofs = np.stack([pose.dofs[moves] for pose in poses])
         every = np.arange(len(poses))[:, None]
         np.add.at(shifts, (every, skeleton.dof_joints[moves], skeleton.dof_kinds[moves]), dofs)
+    if skeleton.posing is not None:
+        shifts += skeleton.posing.translations(np.stack([pose.dofs for pose in poses]))
     local[..., :3, 3] = np.swapaxes(skeleton.rest_translations + shifts, 0, 1)
     turns = np.swapaxes(rotations, 0, 1)
     turns = constrained_matrices(skeleton, turns, local[..., :3, 3], scales)

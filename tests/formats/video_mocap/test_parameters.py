@@ -1,0 +1,144 @@
+"""SMPL parameters in dicts of any layout: spellings, forms of rotations, people and frames."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from formats.capture_files import waves
+from formats.joblib.joblib_bytes import joblib_file
+from formats.npz_bytes import npz
+from formats.torch.torch_bytes import torch_zip
+from formats.video_mocap.tool_files import matrices, six_of
+from numpy.testing import assert_allclose
+
+from viewer.formats import Source, detect
+from viewer.formats.video_mocap import open_results
+
+VECTORS = waves(4, 24, 3) / 2
+PLACES = waves(4, 3, seed=1.0)
+TURNED = matrices(VECTORS)
+SIX = six_of(TURNED)
+
+
+def source(given: dict[Any, Any] | list[Any]) -> Source:
+    return Source("a.pkl", joblib_file(given))
+
+
+def bodies(given: Any) -> dict[int, Any]:
+    return next(iter(open_results(source(given)).parts())).bodies
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"rotmat": TURNED, "trans": PLACES},
+        {"pred_rotmat": TURNED, "pred_cam_t": PLACES[:, None]},
+        {"poses": TURNED, "transl": PLACES},
+        {"pose": TURNED.reshape(4, -1), "trans": PLACES},
+        {"pred_pose": SIX.reshape(4, -1), "cam_t": PLACES},
+        {"pose": SIX.reshape(4, 24, 6), "cam_trans": PLACES},
+        {"thetas": VECTORS, "translation": PLACES},
+        {"global_orient": TURNED[:, :1], "body_pose": TURNED[:, 1:], "trans": PLACES},
+        {"global_orient": TURNED[:, 0], "body_pose": TURNED[:, 1:], "cam_t": PLACES},
+        {"root_orient": VECTORS[:, 0], "pose_body": VECTORS[:, 1:].reshape(4, 69),
+         "cam_t": PLACES},
+        {"pred_global_orient": SIX.reshape(4, 24, 6)[:, 0],
+         "pred_body_pose": SIX.reshape(4, 24, 6)[:, 1:], "root_trans": PLACES},
+        {"smpl": {"poses": VECTORS.reshape(4, 72), "trans": PLACES}},
+        {"result": {"params": {"rotmat": TURNED, "trans": PLACES}}},
+        [{"rotmat": TURNED[frame], "trans": PLACES[frame]} for frame in range(4)],
+        {f"f{frame}": {"pose": VECTORS[frame].ravel(), "cam_t": PLACES[frame]}
+         for frame in range(4)},
+    ],
+)  # fmt: skip
+def test_spellings_and_forms(given: Any) -> None:
+    assert detect(source(given)) == "video_mocap"
+    ((person, body),) = bodies(given).items()
+    assert person == 0
+    assert body.timing.n_frames == 4
+    assert_allclose(body.vectors, VECTORS, atol=1e-9)
+    assert_allclose(body.translations, PLACES, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("place", "up", "space"), [("cam_t", "-y", ""), ("pred_cam_t", "-y", ""), ("trans", "", "")]
+)
+def test_cameras_have_y_down_and_worlds_are_judged(place: str, up: str, space: str) -> None:
+    capture = open_results(source({"rotmat": TURNED, place: PLACES}))
+    assert (capture.up, capture.space) == (up, space)
+
+
+def test_people_frames_and_shapes() -> None:
+    one = {"rotmat": TURNED, "trans": PLACES, "betas": waves(10), "frames": np.array([5, 6, 8, 9])}
+    two = {"rotmat": TURNED[:2], "trans": PLACES[:2], "shape": waves(2, 10)}
+    found = bodies({7: one, 9: two})
+    assert {person: body.timing.present.tolist() for person, body in found.items()} == {
+        7: [False] * 5 + [True, True, False, True, True],
+        9: [True, True] + [False] * 8,
+    }
+    assert [body.shape.shape for body in found.values()] == [(1, 10), (2, 10)]
+
+
+@pytest.mark.parametrize(
+    ("count", "names"), [(22, "SMPL"), (24, "SMPL"), (52, "SMPL+H"), (55, "SMPL-X")]
+)
+def test_members_of_the_family(count: int, names: str) -> None:
+    given = {"rotmat": np.tile(np.eye(3), (3, count, 1, 1)), "trans": np.zeros((3, 3))}
+    assert open_results(source(given)).model == names
+
+
+def test_what_was_recognised_and_ignored_is_said() -> None:
+    opened = source({"rotmat": TURNED, "cam_t": PLACES, "verts": waves(4, 9, 3), "note": "x"})
+    capture = open_results(opened)
+    (found,) = [one for one in opened.diagnostics.warnings if one.key == "F007.video-parameters"]
+    assert found.values == {
+        "n": 1,
+        "recognised": ["rotmat (matrices of 24 joints)", "cam_t"],
+        "ignored": "verts, note",
+    }
+    assert dict(capture.facts) == {
+        "capture": "SMPL parameters: 1 person, in camera space",
+        "recognised": "rotmat (matrices of 24 joints), cam_t",
+        "not needed": "note, verts",
+    }
+
+
+def test_places_that_are_missing_are_a_note() -> None:
+    opened = source({"rotmat": TURNED})
+    open_results(opened)
+    assert "F007.motion-place" in [one.key for one in opened.diagnostics.warnings]
+
+
+@pytest.mark.parametrize(
+    ("given", "kind"),
+    [
+        ({"poses": VECTORS.reshape(4, 72), "trans": PLACES, "betas": waves(10)}, "amass"),
+        ({"global_orient": VECTORS[:, 0], "body_pose": VECTORS[:, 1:].reshape(4, 69)}, "amass"),
+        ({"pose": VECTORS[0].ravel(), "betas": waves(10)}, "pose"),
+        ({"poses": TURNED, "trans": PLACES}, "video_mocap"),
+        ({"poses": VECTORS.reshape(4, 72), "cam_t": PLACES}, "video_mocap"),
+    ],
+)
+def test_layouts_of_amass_stay_with_its_reader(given: Any, kind: str) -> None:
+    assert detect(Source("a.npz", npz(**given))) == kind
+    single = {key: np.asarray(value, dtype=np.float32) for key, value in given.items()}
+    assert detect(Source("a.pt", torch_zip(single))) == kind
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"rotmat": np.zeros((4, 23, 3, 3))},
+        {"global_orient": VECTORS[:3, 0], "body_pose": VECTORS[:, 1:]},
+        {"body_pose": TURNED[:, 1:]},
+        {"a": {"b": {"c": {"d": {"rotmat": TURNED}}}}},
+        {"rotmat": "x"},
+    ],
+)
+def test_other_dicts_are_not_recognised(given: Any) -> None:
+    from viewer.formats._archive.checking import archive_of
+    from viewer.formats._video_mocap.tools import tool_of
+
+    assert tool_of(archive_of(source(given))) is None

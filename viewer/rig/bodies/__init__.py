@@ -1,0 +1,1 @@
+"""Mathematics of parametric body models beyond SMPL: STAR, SUPR, SKEL, MHR and Anny."""

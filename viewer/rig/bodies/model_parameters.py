@@ -1,0 +1,93 @@
+"""Model parameters of Momentum rigs: a linear map to the parameters of all joints.
+
+Each joint has seven parameters: translation, rotation about x, y and z in this order, and scale::
+
+    joint parameters = transform @ model parameters        scale factor = 2 ** s
+    local matrix = T(offset + t) R(prerotation) Rz Ry Rx S(2 ** s)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints, frozen
+from viewer.rig.pose import Pose
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["PER_JOINT", "ModelParameters", "driven_dofs"]
+
+PER_JOINT = 7
+"""Parameters of a joint."""
+
+_SCALE = 6  # index of the scale among them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelParameters:
+    """The parameters that pose and scale a figure.
+
+    Attributes
+    ----------
+    names : tuple of P str
+        Names of the model parameters.
+    transform : (7 J, P)
+        Joint parameters per unit of each model parameter: lengths, radians and octaves.
+    """
+
+    names: tuple[str, ...]
+    transform: Floats
+
+    def __post_init__(self) -> None:
+        values = frozen("transform", self.transform, (None, len(self.names)))
+        object.__setattr__(self, "transform", values)
+
+    @property
+    def count(self) -> int:
+        """Number of model parameters, P."""
+        return len(self.names)
+
+    def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
+        """Set DOFs, translations and scales of a pose, in place.
+
+        Parameters
+        ----------
+        skeleton : Skeleton
+            Skeleton with a DOF for each joint parameter that the transform drives.
+        pose : Pose
+            Modified, except for its shape and placement.
+        values : (P,)
+            Model parameters.
+
+        Raises
+        ------
+        RigError
+            If the number of values is wrong.
+        """
+        if len(values) != self.count:
+            raise RigError(f"expected {self.count} model parameters, found {len(values)}")
+        joints = (self.transform @ values).reshape(-1, PER_JOINT)
+        pose.dofs[:] = joints[skeleton.dof_joints, skeleton.dof_kinds]
+        pose.translations[:] = 0.0
+        pose.rotations[:] = skeleton.rest_rotations
+        pose.scales[:] = 2.0 ** joints[:, _SCALE:]
+
+
+def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
+    """Return joint and kind of each joint parameter, other than scales, that is ever not 0.
+
+    Parameters
+    ----------
+    transform : (7 J, P)
+        See ``ModelParameters``.
+
+    Returns
+    -------
+    joints, kinds : (D,) int32
+        Rows of a DOF table.
+    """
+    driven = transform.any(axis=1).reshape(-1, PER_JOINT)[:, :_SCALE]
+    joints, kinds = np.nonzero(driven)
+    return joints.astype(np.int32), kinds.astype(np.int32)
