@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Callable
 from pathlib import Path
 
+from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._motion_export import (
     add_motion_arguments,
     check_frame_field,
@@ -62,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_motion_arguments(parser)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser)
+    add_cleanup_arguments(parser)
     add_pose_arguments(parser)
     add_skinning_arguments(parser)
 

@@ -10,6 +10,7 @@ CODES = {
     "X003": Code("note", "data that is not written", "choose a format that can store it"),
     "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
     "X005": Code("note", "data that is written in another form", "none if intentional"),
+    "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
 }
 
 _INFLUENCES = "up to {most} influences per vertex, all of them written, strongest first"
