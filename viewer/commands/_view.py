@@ -169,7 +169,8 @@ def camera_of(
 ) -> Camera:
     """Return the requested camera; it frames the points unless its distance is given."""
     if arguments.view is not None:
-        camera = camera_from_view(_find_view(scene, arguments.view), size, scene.up)
+        view = _find_view(scene, arguments.view)
+        camera = camera_from_view(view, size, scene.up, seconds=scene.time or 0.0)
         camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
         return camera
     camera = facing_camera(_front_of(arguments, scene), scene.up, arguments.orthographic)

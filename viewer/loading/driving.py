@@ -17,6 +17,7 @@ from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.settings import MotionSettings
+from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
@@ -232,8 +233,7 @@ def _begin_capture(
     # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
-    to_capture = builder.placement[:3, :3].T
-    cast.views += [replace(view, rotation=view.rotation @ to_capture) for view in capture.views]
+    cast.views += [placed_view(view, builder.placement) for view in capture.views]
     cast.images = cast.images or capture.images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)

@@ -86,7 +86,7 @@ def look_through(state: AppState, index: int) -> None:
     view = state.scene.views[index]
     size = (max(round(state.view_rect[2]), 1), max(round(state.view_rect[3]), 1))
     try:
-        seen = camera_from_view(view, size, state.scene.up, state.box)
+        seen = camera_from_view(view, size, state.scene.up, state.box, state.clock.time)
     except ViewerError as problem:
         state.error = str(problem)
         return
