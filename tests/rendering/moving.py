@@ -15,7 +15,7 @@ from viewer.rig.scene import Actor
 
 RATE, SPEED, MISSING = 10.0, 2.0, 5
 FILMED, SIZE = 5, (160, 120)
-K = np.array([[150.0, 0.0, 79.5], [0.0, 150.0, 59.5], [0.0, 0.0, 1.0]])
+K = np.array([[300.0, 0.0, 79.5], [0.0, 300.0, 59.5], [0.0, 0.0, 1.0]])
 _UPRIGHT = np.diag([1.0, -1.0, -1.0])  # looks along -z, y up in the scene
 
 

@@ -96,7 +96,13 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         "--images",
         metavar="FOLDER",
         help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
-        "the capture)",
+        "the capture); for a single camera also a folder of its numbered images",
+    )
+    group.add_argument(
+        "--video",
+        metavar="FILE",
+        help="video of a capture's camera, drawn behind the scene with --view; also gives the "
+        "frame rate of captures that have none (needs PyAV)",
     )
     group.add_argument(
         "--legacy-expression",
@@ -136,6 +142,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
+        video=None if arguments.video is None else Path(arguments.video),
         animation=arguments.animation or "",
     )
 

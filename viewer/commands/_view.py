@@ -268,8 +268,9 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
         notes += lens_notes(scene, seen)
     if options.cameras and not scene.views:
         notes.append("--cameras: no file has calibrated cameras")
-    if arguments.images is not None and scene.images is None:
-        notes.append("--images: no file is a capture with calibrated cameras")
+    for option, given in (("--images", arguments.images), ("--video", arguments.video)):
+        if given is not None and scene.images is None:
+            notes.append(f"{option}: no file is a capture with calibrated cameras")
     return notes
 
 

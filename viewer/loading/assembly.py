@@ -95,8 +95,8 @@ def begin(
     found = (*contents.diagnostics, *cast.diagnostics)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views))
     scene.files, scene.images = contents.files, cast.images
-    if settings is not None and settings.model is not None:
-        scene.files += (settings.model,)
+    if settings is not None:
+        scene.files += tuple(filter(None, (settings.model, settings.video)))
     return scene, cast.builders
 
 

@@ -184,7 +184,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
 
         return open_capture(
             source,
-            frame_rate=settings.frame_rate or DEFAULT_RATE,
+            frame_rate=settings.frame_rate or _video_rate(settings) or DEFAULT_RATE,
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
@@ -192,6 +192,15 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             images=settings.images,
         )
     return read(source)
+
+
+def _video_rate(settings: MotionSettings) -> float | None:
+    """Return the frame rate of the video of a capture's camera, if one is given."""
+    if settings.video is None:
+        return None
+    from viewer.formats._footage.video_images import video_rate
+
+    return video_rate(settings.video)
 
 
 def _is_picture(source: Source) -> bool:

@@ -16,6 +16,7 @@ from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
+from viewer.loading.filming import filmed
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
@@ -24,7 +25,9 @@ from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.clip import Clip, misfit, suits
+from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
@@ -233,8 +236,16 @@ def _begin_capture(
     # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
-    cast.views += [placed_view(view, builder.placement) for view in capture.views]
-    cast.images = cast.images or capture.images
+    rate = _rate(builder.actors, settings)
+    views, images, notes = filmed(capture, capture.views, settings, rate)
+    cast.diagnostics += notes
+    cast.views += [placed_view(view, builder.placement) for view in views]
+    cast.images = cast.images or images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
+
+
+def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
+    """Return the frame rate of a capture."""
+    return scene_rate(actors) if actors else settings.frame_rate or DEFAULT_RATE
