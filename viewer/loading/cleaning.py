@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
@@ -100,7 +101,16 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
     time = _start(scene.actors) if scene.time is None else scene.time
     for actor in scene.actors:
         pose_actor(actor, time)
+    if scene.in_space is not None:
+        scene.in_space = partial(_cleaned_in, scene.in_space, wanted)
     return notes
+
+
+def _cleaned_in(in_space: Callable[[str], Scene], wanted: CleanUp, space: str) -> Scene:
+    """Return a scene in another space, cleaned up in the same way."""
+    scene = in_space(space)
+    clean_up(scene, wanted)
+    return scene
 
 
 def _start(actors: Iterable[Actor]) -> float:
