@@ -12,6 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.errors import RigError
 from viewer.loading.cleaning import CleanUp, clean_up
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.clip import Clip
 from viewer.rig.scene import Actor, Scene
 
@@ -114,6 +115,34 @@ def test_displacement_is_measured_in_millimetres():
     (note,) = clean_up(Scene([actor]), CleanUp(smoothing=SavitzkyGolay(window=5)))
     largest = 100 * 18 / 35
     assert f"by {largest:.3g} mm at most (pelvis, frame 130)" in str(note)
+
+
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_feet_are_moved_to_the_ground(upside_down):
+    actor = person(0, 0, 60)
+    places = np.tile([0.3, 0.25, 0.0], (60, 1))  # the ankles are 0.1 above the origin
+    if upside_down:  # the world of the capture is; its placement makes it upright
+        actor.placement = rotation_transform(0, np.pi)
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (60, 1))
+        rotations = actor.clip.rotations.copy()
+        rotations[:, 0] = turn
+        # The pelvis at height 1 rotates in place; then it is 1.25 below the origin of the file.
+        places = np.tile([0.3, -2.25, 0.0], (60, 1))
+        actor.clip = replace(actor.clip, rotations=rotations)
+    actor.clip = replace(actor.clip, figure_translations=places)
+    scene = Scene([actor], world_up="y")
+    (note,) = clean_up(scene, CleanUp(grounds=True))
+    assert str(note).endswith("lowered by 350 mm: its feet rest at height 0")
+    expected = -1.9 if upside_down else -0.1
+    found = scene.actors[0].clip.figure_translations
+    assert_allclose(found, np.tile([0.3, expected, 0.0], (60, 1)), atol=1e-12)
+
+
+def test_actors_without_feet_stay_where_they_are():
+    figure, clip = keypoints()
+    scene = Scene([Actor(figure, clip=clip)])
+    assert keys(clean_up(scene, CleanUp(grounds=True))) == ["X006.no-feet"]
+    assert scene.actors[0].clip is clip
 
 
 def test_clips_of_keys_are_refused_alone_and_reported_beside_captures():

@@ -50,6 +50,11 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         "per m/s)",
     )
     group.add_argument(
+        "--ground",
+        action="store_true",
+        help="move people up or down until their feet rest at height 0, z = 0 or y = 0",
+    )
+    group.add_argument(
         "--trim", metavar="A:B", help="keep frames A to B - 1; A or B may be omitted"
     )
     group.add_argument(
@@ -78,6 +83,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         interpolates=arguments.fill_gaps is not None,
         longest_gap=arguments.fill_gaps or None,
         smoothing=arguments.smooth,
+        grounds=arguments.ground,
         frames=frames,
         rate=arguments.resample,
     )

@@ -6,12 +6,12 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._ground import Ground, ground_of
-from viewer.lint._soles import extent
 from viewer.lint._track import Track
 from viewer.lint._tracks import track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.ground_height import Ground, ground_of
+from viewer.rig.inspection.soles import extent
 from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+
+import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
@@ -18,6 +20,7 @@ from viewer.rig.cleanup.resampling import resampled
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
 from viewer.rig.cleanup.smoothing import smoothed
 from viewer.rig.cleanup.trimming import trimmed
+from viewer.rig.inspection.resting_height import resting_height
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.scalars import length_text
@@ -28,6 +31,8 @@ from viewer.rig.units import METRES
 __all__ = ["CleanUp", "clean_up"]
 
 Smoothing = OneEuro | SavitzkyGolay
+
+_ROUNDING = 1e-9  # scene units
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,8 @@ class CleanUp:
         Longest gap to interpolate, frames; None for one second.
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
+    grounds : bool
+        Whether people are moved up or down until their feet rest at height 0.
     frames : (int or None, int or None) or None
         First frame to keep and the frame after the last one, with the numbers of the file; None for
         the motion's own ends.
@@ -55,6 +62,7 @@ class CleanUp:
     interpolates: bool = False
     longest_gap: int | None = None
     smoothing: Smoothing | None = None
+    grounds: bool = False
     frames: tuple[int | None, int | None] | None = None
     rate: float | None = None
 
@@ -96,7 +104,7 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
             if clip is not None:
                 notes.append(Diagnostic("X006.keys", values={"figure": actor.name}))
             continue
-        actor.clip, said = _cleaned(actor, clip, wanted)
+        actor.clip, said = _cleaned(scene, actor, clip, wanted)
         notes += said
     time = _start(scene.actors) if scene.time is None else scene.time
     for actor in scene.actors:
@@ -117,13 +125,18 @@ def _start(actors: Iterable[Actor]) -> float:
     return min((a.clip.start + a.offset for a in actors if a.clip is not None), default=0.0)
 
 
-def _cleaned(actor: Actor, clip: Captured, wanted: CleanUp) -> tuple[Captured, list[Diagnostic]]:
+def _cleaned(
+    scene: Scene, actor: Actor, clip: Captured, wanted: CleanUp
+) -> tuple[Captured, list[Diagnostic]]:
     """Return the cleaned motion of one actor, and notes about it."""
     notes: list[Diagnostic] = []
     if wanted.interpolates:
         clip, notes = _interpolated(actor, clip, wanted.longest_gap)
     if wanted.smoothing is not None:
         clip, said = _smoothed(actor, clip, wanted.smoothing)
+        notes.append(said)
+    if wanted.grounds:
+        clip, said = _grounded(scene, actor, clip)
         notes.append(said)
     if wanted.frames is not None:
         clip, said = _trimmed(actor, clip, wanted.frames)
@@ -138,6 +151,27 @@ def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured
     found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
     values = {"filter": _filter_phrase(chosen, clip.timing.frame_rate)}
     return found, _note("X006.smoothed", actor, values, clip, found)
+
+
+def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
+    """Return a motion whose feet rest at height 0 of the scene."""
+    found = resting_height(replace(actor, clip=clip), scene.up)
+    if found is None or isinstance(clip, PointClip):
+        return clip, Diagnostic("X006.no-feet", values={"figure": actor.name})
+    height = 0.0 if abs(found.height) < _ROUNDING else found.height
+    lift = np.zeros(3)
+    lift[2 if scene.up == "z" else 1] = -height
+    moved = np.linalg.solve(actor.placement[:3, :3], lift)
+    place = np.zeros((clip.n_rows, 3)) if actor.pose is None else actor.pose.figure_translation
+    own = clip.figure_translations
+    places = moved + (np.broadcast_to(place, (clip.n_rows, 3)) if own is None else own)
+    values = {
+        "figure": actor.name,
+        "height": length_text(actor.figure, abs(height)),
+        "way": Phrase("lowered" if height > 0.0 else "raised"),
+    }
+    key = "X006.grounded" if found.is_clear else "X006.grounded-lowest"
+    return replace(clip, figure_translations=places), Diagnostic(key, values=values)
 
 
 def _resampled(actor: Actor, clip: Captured, rate: float) -> tuple[Captured, Diagnostic]:

@@ -46,6 +46,11 @@ MESSAGES = {
     "{longest} ({seconds:.2g} s)",
     "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
     "{gaps:list}",
+    "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
+    "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
+    "lowest positions are at height 0",
+    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh or "
+    "joints of known names",
     "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",
@@ -75,5 +80,7 @@ PHRASES = {
     "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
     "moved-joints": "joints",
     "moved-points": "points",
+    "raised": "raised",
+    "lowered": "lowered",
     "joint-in-frame": "{joint:text}, frame {frame}",
 }
