@@ -134,6 +134,14 @@ EXPORTERS = {
         writes_motion=True,
         keeps_world=True,
     ),
+    "smplx": Exporter(
+        "SMPL-X for robots (GMR, PHC)",
+        (".npz",),
+        "pose, place and mean shape of an SMPL body, z up",
+        "scale, hands of SMPL",
+        writes_pose=False,
+        writes_motion=True,
+    ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
         ("/",),
