@@ -45,6 +45,8 @@ CHECKS = {
     "clips": Check("clip", of_motion=True),
     "feet": Check("feet", of_motion=True),
     "captures": Check("captured points", of_motion=True),
+    "people": Check("people", of_motion=True),
+    "jitter": Check("jitter", of_motion=True),
 }
 """Modules in this folder with a function ``check(subject)``, in order of execution."""
 
@@ -76,11 +78,12 @@ def lint_scene(
     """
     chosen = options or LintOptions()
     counting = counting_of(scene, chosen.frame_rate or scene_rate(scene.actors))
+    people = tuple(actor for actor in scene.actors if actor.person is not None)
     known: set[int] = set()
     steps: list[tuple[Subject, str]] = []
     for index, actor in enumerate(scene.actors):
         lost = invalid[index] if index < len(invalid) else {}
-        subject = Subject(actor, index, scene.up, chosen, counting, lost)
+        subject = Subject(actor, index, scene.up, chosen, counting, lost, people)
         is_new = id(actor.figure) not in known
         known.add(id(actor.figure))
         steps += [(subject, name) for name, kind in CHECKS.items() if is_new or kind.of_motion]
