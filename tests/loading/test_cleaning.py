@@ -138,10 +138,21 @@ def test_feet_are_moved_to_the_ground(upside_down):
     assert_allclose(found, np.tile([0.3, expected, 0.0], (60, 1)), atol=1e-12)
 
 
+def test_feet_that_slide_are_held():
+    actor = person(0, 0, 60)
+    places = np.zeros((60, 3))
+    places[:, 2] = 0.1 * np.arange(60) / 59
+    actor.clip = replace(actor.clip, figure_translations=places)
+    (note,) = clean_up(Scene([actor]), CleanUp(locks_feet=True))
+    assert note.key == "X006.locked" and note.values["n"] == 2
+    assert (note.values["before"], note.values["after"]) == ("200 mm", "0 mm")
+
+
 def test_actors_without_feet_stay_where_they_are():
     figure, clip = keypoints()
     scene = Scene([Actor(figure, clip=clip)])
-    assert keys(clean_up(scene, CleanUp(grounds=True))) == ["X006.no-feet"]
+    wanted = CleanUp(locks_feet=True, grounds=True)
+    assert keys(clean_up(scene, wanted)) == ["X006.no-legs", "X006.no-feet"]
     assert scene.actors[0].clip is clip
 
 

@@ -49,11 +49,7 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         "number of frames, the degree), one-euro or one-euro:cutoff=3,beta=2 (Hz; Hz per rad/s and "
         "per m/s)",
     )
-    group.add_argument(
-        "--ground",
-        action="store_true",
-        help="move people up or down until their feet rest at height 0, z = 0 or y = 0",
-    )
+    _add_feet(group)
     group.add_argument(
         "--trim", metavar="A:B", help="keep frames A to B - 1; A or B may be omitted"
     )
@@ -62,6 +58,21 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         type=rate,
         metavar="R",
         help="interpolate at R frames per second (--fps instead changes the speed)",
+    )
+
+
+def _add_feet(group: argparse._ArgumentGroup) -> None:
+    """Add the options that put feet on the ground."""
+    group.add_argument(
+        "--lock-feet",
+        action="store_true",
+        help="hold feet in place while they stand; legs and, where they are too short, the body "
+        "follow",
+    )
+    group.add_argument(
+        "--ground",
+        action="store_true",
+        help="move people up or down until their feet rest at height 0, z = 0 or y = 0",
     )
 
 
@@ -83,6 +94,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         interpolates=arguments.fill_gaps is not None,
         longest_gap=arguments.fill_gaps or None,
         smoothing=arguments.smooth,
+        locks_feet=arguments.lock_feet,
         grounds=arguments.ground,
         frames=frames,
         rate=arguments.resample,

@@ -13,6 +13,7 @@ from viewer.errors import RigError
 from viewer.loading.merging import merge_people
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
+from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
 from viewer.rig.cleanup.frame_rows import Captured
 from viewer.rig.cleanup.gap_filling import interpolate_gaps
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -23,6 +24,7 @@ from viewer.rig.cleanup.trimming import trimmed
 from viewer.rig.inspection.resting_height import resting_height
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.upright import own_up
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import joint_labels
@@ -32,7 +34,7 @@ __all__ = ["CleanUp", "clean_up"]
 
 Smoothing = OneEuro | SavitzkyGolay
 
-_ROUNDING = 1e-9  # scene units
+_ROUNDING = 1e-9  # scene or figure units
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,8 @@ class CleanUp:
         Longest gap to interpolate, frames; None for one second.
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
+    locks_feet : bool
+        Whether feet that stand are held in place.
     grounds : bool
         Whether people are moved up or down until their feet rest at height 0.
     frames : (int or None, int or None) or None
@@ -62,6 +66,7 @@ class CleanUp:
     interpolates: bool = False
     longest_gap: int | None = None
     smoothing: Smoothing | None = None
+    locks_feet: bool = False
     grounds: bool = False
     frames: tuple[int | None, int | None] | None = None
     rate: float | None = None
@@ -135,6 +140,9 @@ def _cleaned(
     if wanted.smoothing is not None:
         clip, said = _smoothed(actor, clip, wanted.smoothing)
         notes.append(said)
+    if wanted.locks_feet:
+        clip, said = _locked(scene, actor, clip)
+        notes.append(said)
     if wanted.grounds:
         clip, said = _grounded(scene, actor, clip)
         notes.append(said)
@@ -151,6 +159,22 @@ def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured
     found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
     values = {"filter": _filter_phrase(chosen, clip.timing.frame_rate)}
     return found, _note("X006.smoothed", actor, values, clip, found)
+
+
+def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
+    """Return a motion whose feet do not slide while they stand."""
+    figure = actor.figure
+    if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
+        return clip, Diagnostic("X006.no-legs", values={"figure": actor.name})
+    axis, hangs = own_up(scene, actor)
+    found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
+    values = {
+        "n": lock.n_contacts,
+        "before": length_text(figure, lock.before),
+        "after": length_text(figure, lock.after if lock.after > _ROUNDING else 0.0),
+        "lowered": length_text(figure, lock.lowered) if lock.lowered > _ROUNDING else "",
+    }
+    return found, _note("X006.locked", actor, values, clip, found)
 
 
 def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:

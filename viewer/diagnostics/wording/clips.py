@@ -11,7 +11,7 @@ CODES = {
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
     "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or record again"),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
-    "C007": Code("warning", "foot sliding", "lock the foot or adjust the root motion"),
+    "C007": Code("warning", "foot sliding", "lock the feet (--lock-feet of viewer convert)"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
     "C009": Code("error", "clip for another skeleton", "open it with the skeleton it was made for"),
     "C010": Code("note", "zero-length clip", "add keys at different times"),

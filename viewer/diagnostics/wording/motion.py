@@ -46,6 +46,9 @@ MESSAGES = {
     "{longest} ({seconds:.2g} s)",
     "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
     "{gaps:list}",
+    "X006.locked": "{figure:text}: feet held in {n:#contact}, in which they slide by {after} "
+    f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
+    "X006.no-legs": "{figure:text}: feet not held, since it has no legs with joints of known names",
     "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
     "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
     "lowest positions are at height 0",
