@@ -129,3 +129,16 @@ def test_a_point_is_filtered_only_while_it_is_visible():
     clip = PointClip("points", turning(np.zeros(12)).timing, points)
     found = smoothed(clip, OneEuro())
     assert_allclose(found.points, points, atol=EXACT)
+
+
+def test_points_with_different_visibility_are_filtered_independently():
+    rng = np.random.default_rng(6)
+    points = np.ones((20, 3, 4))
+    points[..., :3] = rng.normal(size=(20, 3, 3))
+    points[8:10, 1, 3] = 0.0
+    timing = turning(np.zeros(20)).timing
+    together = smoothed(PointClip("points", timing, points), SavitzkyGolay(window=5)).points
+    for point in range(3):
+        alone = PointClip("points", timing, points[:, [point]])
+        found = smoothed(alone, SavitzkyGolay(window=5)).points[:, 0]
+        assert_allclose(together[:, point], found, atol=EXACT)

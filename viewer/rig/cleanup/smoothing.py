@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import replace
 from typing import Protocol
 
@@ -78,8 +79,12 @@ def _points(
     result = points.copy()
     for rows in runs:
         part = result[rows]
+        # Points that are visible in the same frames are filtered together.
+        together = defaultdict[tuple[int, int], list[int]](list)
         for point in range(points.shape[1]):
-            for start, stop in runs_of(part[:, point, 3] > 0.0):
-                seen = part[start:stop, point, None, :3]
-                part[start:stop, point, :3] = chosen.positions(seen, rate, metres)[:, 0]
+            for span in runs_of(part[:, point, 3] > 0.0):
+                together[span].append(point)
+        for (start, stop), numbers in together.items():
+            seen = part[start:stop, numbers, :3]
+            part[start:stop, numbers, :3] = chosen.positions(seen, rate, metres)
     return result
