@@ -168,6 +168,8 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagn
         return clip, Diagnostic("X006.no-legs", values={"figure": actor.name})
     axis, hangs = own_up(scene, actor)
     found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
+    if not lock.n_contacts:
+        return clip, Diagnostic("X006.no-contacts", values={"figure": actor.name})
     values = {
         "n": lock.n_contacts,
         "before": length_text(figure, lock.before),

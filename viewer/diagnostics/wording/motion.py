@@ -48,6 +48,7 @@ MESSAGES = {
     "{gaps:list}",
     "X006.locked": "{figure:text}: feet held in {n:#contact}, in which they slide by {after} "
     f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
+    "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
     "X006.no-legs": "{figure:text}: feet not held, since it has no legs with joints of known names",
     "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
     "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "

@@ -49,7 +49,7 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
         rotations[rows] = chosen.rotations(rotations[rows], rate)
 
     def filtered(positions: Floats | None) -> Floats | None:
-        if positions is None or not np.ptp(positions, axis=0).any():
+        if positions is None or not len(positions) or not np.ptp(positions, axis=0).any():
             return positions
         found = positions.copy()
         for rows in runs:
