@@ -87,7 +87,7 @@ HOMES = {
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
     },
-    "av": {"media/video.py"},
+    "av": {"media/video.py", "media/video_frames.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
 }

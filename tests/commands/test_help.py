@@ -28,17 +28,18 @@ def test_every_option_is_documented(command):
     [
         (
             "render",
-            "files, output, captures and BVH, frames, videos, shape and pose, camera, "
+            "files, output, captures and BVH, clean-up, frames, videos, shape and pose, camera, "
             "display, skinning",
         ),
         (
             "convert",
             "files, output, writing motions, writing VRM characters, frames, captures and BVH, "
-            "shape and pose, skinning",
+            "clean-up, shape and pose, skinning",
         ),
         (
             "view",
-            "files, window, captures and BVH, frames, shape and pose, camera, display, skinning",
+            "files, window, captures and BVH, clean-up, frames, shape and pose, camera, display, "
+            "skinning",
         ),
     ],
 )

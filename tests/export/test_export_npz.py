@@ -154,7 +154,7 @@ def test_points_of_all_frames(tmp_path):
 @pytest.mark.parametrize(
     ("options", "present", "message"),
     [
-        (MotionOptions(up="z"), True, 'up axis of arrays: expected y, as in the scene, found "z"'),
+        (MotionOptions(up="x"), True, 'up axis of arrays: expected y or z, found "x"'),
         (
             MotionOptions(unit="cm"),
             True,
@@ -174,3 +174,17 @@ def test_points_at_one_time(tmp_path):
     arrays = write(tmp_path, Actor(Figure("two", points=LAYOUT, up="z"), points=points))
     assert str(arrays["up"]) == "z" and arrays["confidences"].tolist() == [0.5, 0.0]
     assert_array_equal(arrays["points"], [[1.0, 2.0, 3.0], [np.nan] * 3])
+
+
+def test_points_are_rotated_to_another_up_axis(tmp_path):
+    layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), np.zeros(2))
+    rows = np.array([[[1.0, 2.0, 3.0], [np.nan] * 3]])
+    animation = SampledPoints(
+        "two 4", layout, 30.0, 0, np.zeros(1), np.ones(1, bool), rows, np.array([[1.0, 0.0]])
+    )
+    export_points(animation, tmp_path / "p.npz", MotionOptions(up="z", world_up="y"))
+    with np.load(tmp_path / "p.npz") as arrays:
+        assert str(arrays["up"]) == "z"
+        # y, which points up, becomes z: (x, y, z) to (x, -z, y).
+        assert_array_equal(arrays["points"][0, 0], [1.0, -3.0, 2.0])
+        assert np.isnan(arrays["points"][0, 1]).all()

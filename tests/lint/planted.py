@@ -171,6 +171,35 @@ def float_about(root: np.ndarray, _: np.ndarray) -> None:
     root[:, 1] = 2.0 + 0.3 * np.sin(2.0 * np.pi * np.arange(FRAMES) / 20)
 
 
+def hover(root: np.ndarray, _: np.ndarray) -> None:
+    root[50:, 1] = 0.05
+
+
+def shake(root: np.ndarray, _: np.ndarray) -> None:
+    root[:, [0, 2]] = np.random.default_rng(4).normal(0.0, 0.02, (FRAMES, 2))
+
+
+def shaking_point(points: np.ndarray) -> None:
+    points[:, 1, :3] += np.random.default_rng(5).normal(0.0, 0.05, (FRAMES, 3))
+
+
+def people(*places: np.ndarray) -> Scene:
+    """Return people of one capture at given x in each frame, NaN where they are absent."""
+    found = []
+    for number, x in enumerate(places):
+        scene = moving(lambda root, _, x=x: np.copyto(root[:, 0], np.nan_to_num(x)))
+        actor, there = scene.actors[0], ~np.isnan(x)
+        rows = np.where(there, np.arange(FRAMES), -1)
+        clip = replace(actor.clip, timing=replace(actor.clip.timing, rows=rows, holds=False))
+        found.append(replace(actor, clip=clip, person=number, called="take"))
+    return Scene(found)
+
+
+def exchanged() -> Scene:
+    step = np.where(np.arange(FRAMES) < 20, 0.0, 2.0)
+    return people(step, 2.0 - step)
+
+
 def gaps() -> Timing:
     rows = np.arange(FRAMES)
     rows[10:13] = rows[30] = -1
@@ -341,6 +370,10 @@ FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     ),
     "sliding": (lambda: moving(slide), "C007", "joints", [3]),
     "sinking": (lambda: moving(sink), "C008", "frames", list(range(140, 160))),
+    "floating": (lambda: moving(hover), "C016", "frames", list(range(150, 160))),
+    "jitter": (lambda: moving(shake), "C014", "joints", list(range(7))),
+    "shaking point": (lambda: captured(shaking_point), "C014", "joints", [1]),
+    "exchanged people": (exchanged, "C015", "frames", [120]),
     "no ground": (lambda: moving(float_about), "C013", "frames", []),
     "no duration": (lambda: keyed({}, end=0.0), "C010", "frames", []),
     "low confidence": (lambda: captured(low_confidence), "C011", "joints", [2]),

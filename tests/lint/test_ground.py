@@ -12,7 +12,7 @@ from lint.sound import FRAMES, RATE, legs, scene_of, standing
 
 from viewer.diagnostics.phrase import Phrase
 from viewer.lint import Finding, LintOptions, lint_scene
-from viewer.lint._ground import Ground, ground_of
+from viewer.rig.inspection.ground_height import Ground, ground_of
 from viewer.rig.motion.timing import Timing
 
 Change = Callable[[np.ndarray], np.ndarray]
@@ -131,9 +131,10 @@ SOUND = {
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("name", SOUND)
 def test_valid_motions_have_no_findings(name: str, floor: float) -> None:
-    assert {f.code for f in found(SOUND[name], floor)} <= {"C013"}
+    jitter = {"C014"} if name == "noise" else set()
+    assert {f.code for f in found(SOUND[name], floor)} - {"C013"} == jitter
     if "stairs" not in name:
-        assert found(SOUND[name], floor) == []
+        assert {f.code for f in found(SOUND[name], floor)} == jitter
 
 
 def test_a_single_noisy_frame_is_ignored_unless_deep() -> None:
@@ -147,8 +148,23 @@ def test_the_ground_can_be_given_or_left_out() -> None:
     half = np.where(_K >= 30, -0.1, 0.0)
     (sunk,) = found(half, 0.8, ground=0.9)
     assert sunk.code == "C008" and len(sunk.frames) == 30
-    assert found(half, 0.8, ground=0.8) == []
+    (floats,) = found(half, 0.8, ground=0.8)
+    assert floats.code == "C016" and len(floats.frames) == 30
     assert found(half, 0.8, ground="none") == []
+
+
+@pytest.mark.parametrize("floor", [0.0, 0.8])
+@pytest.mark.parametrize("height", [0.03, 0.05])
+def test_a_rest_slightly_above_the_ground_is_found(height: float, floor: float) -> None:
+    # Too high for soles, too low for a step: 3 to 6 % of a height of 0.9.
+    (floats,) = found(np.where(_K >= 48, height, 0.0), floor)
+    values = {"n": 12, "all": 60, "height": f"{1000 * height:g} mm", "frame": 148}
+    assert told([floats.diagnostic]) == [("C016.foot", values)]
+    assert floats.frames.tolist() == list(range(148, 160))
+
+
+def test_a_short_rest_above_the_ground_is_no_floating() -> None:
+    assert found(np.where((_K >= 40) & (_K < 47), 0.05, 0.0), 0.0) == []
 
 
 def test_a_body_that_floats_and_turns_has_no_ground() -> None:

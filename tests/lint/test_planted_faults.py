@@ -33,6 +33,8 @@ COMPANIONS = {
     "triangle twice": {"M006"},
     "stray vertex": {"Y001", "M001"},  # triangles to it are slivers
     "vertex a hundred sizes away": {"Y001", "M003"},  # it turns the volume inside out
+    "jitter": {"C007"},  # by 20 mm back and forth
+    "exchanged people": {"C003"},  # both jump
     "fast turn": {"C003"},  # the ankle follows the knee's rotation
 }
 

@@ -70,7 +70,8 @@ def test_the_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> 
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
 def test_synthetic_models_and_captures_have_no_findings(shared_data: Path, name: str) -> None:
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
-    assert heavy(findings) == []
+    # One of the two captured people has a different pose in every frame.
+    assert {code for code, _ in heavy(findings)} == ({"C014"} if name == "easymocap" else set())
 
 
 @pytest.mark.usefixtures("quick_fits")

@@ -1,4 +1,4 @@
-"""An arm that moves along x, with a frame missing."""
+"""An arm that moves along x, with a frame missing, and a moving camera."""
 
 from __future__ import annotations
 
@@ -7,11 +7,16 @@ import math
 import numpy as np
 from rendering.drawn_figures import arm
 
+from viewer.rig.captures.camera_view import CameraMotion, CameraView
+from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
 RATE, SPEED, MISSING = 10.0, 2.0, 5
+FILMED, SIZE = 5, (160, 120)
+K = np.array([[300.0, 0.0, 79.5], [0.0, 300.0, 59.5], [0.0, 0.0, 1.0]])
+_UPRIGHT = np.diag([1.0, -1.0, -1.0])  # looks along -z, y up in the scene
 
 
 def moving_arm(turns: bool = True) -> Actor:
@@ -31,3 +36,23 @@ def moving_arm(turns: bool = True) -> Actor:
     places[:, 0] = SPEED * frames / RATE
     clip = SampledClip("moves", Timing(RATE, rows), rotations, figure_translations=places)
     return Actor(arm(3), clip=clip)
+
+
+def moving_camera() -> CameraView:
+    """Return a camera 5 in front of the origin that moves by 0.2 and rotates by 3 degrees a frame.
+
+    It moves to the right and rotates to the left, so the origin stays in the picture.
+    """
+    frames = np.arange(FILMED)
+    turns = axis_rotations(1, np.radians(3.0) * frames)
+    centers = np.stack([0.2 * frames, 0.5 + 0.0 * frames, 5.0 + 0.0 * frames], axis=1)
+    rotations = turns @ _UPRIGHT
+    translations = -np.einsum("nab,nb->na", rotations, centers)
+    motion = CameraMotion(Timing(RATE, frames.astype(np.int32)), rotations, translations)
+    return CameraView("video", K, rotations[0], translations[0], SIZE, motion=motion)
+
+
+def pixel(view: CameraView, frame: int, point: np.ndarray) -> np.ndarray:
+    """Return the pixel of a scene point in one frame, from K (R X + T)."""
+    seen = K @ (view.motion.rotations[frame] @ point + view.motion.translations[frame])
+    return seen[:2] / seen[2]

@@ -10,6 +10,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.commands._cleanup import clean_up_of
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import Progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
@@ -17,11 +18,13 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
+from viewer.loading.cleaning import CleanUp, clean_up
 from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
+from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
@@ -107,7 +110,13 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         "--images",
         metavar="FOLDER",
         help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
-        "the capture)",
+        "the capture); for a single camera also a folder of its numbered images",
+    )
+    group.add_argument(
+        "--video",
+        metavar="FILE",
+        help="video of a capture's camera, drawn behind the scene with --view; also gives the "
+        "frame rate of captures that have none (needs PyAV)",
     )
     group.add_argument(
         "--legacy-expression",
@@ -166,6 +175,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         legacy_expression=arguments.legacy_expression,
         drives=not arguments.beside,
         images=None if arguments.images is None else Path(arguments.images),
+        video=None if arguments.video is None else Path(arguments.video),
         animation=arguments.animation or "",
         motions=tuple(Path(resolve(file)) for file in arguments.motion),
         springs=arguments.springs == "on",
@@ -194,11 +204,22 @@ def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
 
 def open_scene(arguments: argparse.Namespace) -> Scene:
     """Load the files completely, print their readers' warnings, and pose them as requested."""
+    changes = clean_up_of(arguments)
     scene, builders = begin_scene(arguments)
     for builder in builders:
         finish(builder, scene)
+    if not changes.is_empty:
+        clean(scene, changes, getattr(arguments, "output", None))
+        arguments.fps = changes.rate or arguments.fps  # the rate of the frames
     print_warnings(apply_pose(scene, arguments))
     return scene
+
+
+def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
+    """Clean up captured motions in place, and print the changes unless they are the output."""
+    stream = sys.stdout if output is None else summary_stream(output)
+    for note in clean_up(scene, changes):
+        print(note, file=stream)
 
 
 def finish(builder: Builder, scene: Scene) -> None:

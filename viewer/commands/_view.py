@@ -180,7 +180,8 @@ def camera_of(
 ) -> Camera:
     """Return the requested camera; it frames the points unless its distance is given."""
     if arguments.view is not None:
-        camera = camera_from_view(_find_view(scene, arguments.view), size, scene.up)
+        view = _find_view(scene, arguments.view)
+        camera = camera_from_view(view, size, scene.up, seconds=scene.time or 0.0)
         camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
         return camera
     camera = facing_camera(_front_of(arguments, scene), scene.up, arguments.orthographic)
@@ -278,8 +279,9 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
         notes += lens_notes(scene, seen)
     if options.cameras and not scene.views:
         notes.append("--cameras: no file has calibrated cameras")
-    if arguments.images is not None and scene.images is None:
-        notes.append("--images: no file is a capture with calibrated cameras")
+    for option, given in (("--images", arguments.images), ("--video", arguments.video)):
+        if given is not None and scene.images is None:
+            notes.append(f"{option}: no file is a capture with calibrated cameras")
     return notes
 
 

@@ -7,18 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from viewer.commands._baked_springs import bake_springs
-from viewer.commands._motion_export import (
-    add_motion_arguments,
-    check_frame_field,
-    check_kind,
-    check_numbered,
-    is_motion,
-    left_out_notes,
-    pose_or_point_actors,
-    write_motions,
-    writes_keys,
-)
+from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._one_pose import check_frame_options
 from viewer.commands._output import inputs_of
 from viewer.commands._pose import (
@@ -32,7 +21,19 @@ from viewer.commands._scene import (
     open_scene,
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
-from viewer.commands._vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.commands._writing.baked_springs import bake_springs
+from viewer.commands._writing.motion_export import (
+    add_motion_arguments,
+    check_frame_field,
+    check_kind,
+    check_numbered,
+    is_motion,
+    left_out_notes,
+    pose_or_point_actors,
+    write_motions,
+    writes_keys,
+)
+from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
@@ -69,6 +70,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser)
+    add_cleanup_arguments(parser)
     add_pose_arguments(parser)
     add_skinning_arguments(parser)
 

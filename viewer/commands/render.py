@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
 from viewer.commands._scalar import choose_subject, scalar_text
@@ -51,6 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_file_arguments(parser)
     _add_output_arguments(parser)
     add_capture_arguments(parser)
+    add_cleanup_arguments(parser)
     add_frame_arguments(parser, "A:B[:STEP]")
     add_sequence_arguments(parser)
     add_pose_arguments(parser)

@@ -25,7 +25,7 @@ from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
-from viewer.commands._vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
 from viewer.commands._numbers import number
 from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, apply_pose
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
     begin_scene,
+    clean,
     finish,
     motion_settings,
     print_warnings,
@@ -49,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--scale", type=_scale, metavar="S", help="scale of the interface, such as 1.5"
     )
     add_capture_arguments(parser)
+    add_cleanup_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)
     add_camera_arguments(parser)
@@ -70,9 +73,11 @@ def run(arguments: argparse.Namespace) -> int:
     _fill_in(arguments)
     options = display_of(arguments)
     scene, builders = begin_scene(arguments)
-    if arguments.time is not None or arguments.frame is not None:
+    changes = clean_up_of(arguments)
+    if arguments.time is not None or arguments.frame is not None or not changes.is_empty:
         for builder in builders:
             finish(builder, scene)  # only now is it known who is present at that time
+    clean(scene, changes)
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))

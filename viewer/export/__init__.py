@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import Any
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import RigError, UnsupportedFormatError
+from viewer.errors import UnsupportedFormatError
 from viewer.export._exporter import Exporter
 from viewer.export._options import MotionOptions, VrmMeta
 from viewer.rig.figure import Figure
@@ -118,6 +118,14 @@ EXPORTERS = {
         writes_pose=False,
         writes_motion=True,
         keeps_world=True,
+    ),
+    "smplx": Exporter(
+        "SMPL-X for robots (GMR, PHC)",
+        (".npz",),
+        "pose, place and mean shape of an SMPL body, z up",
+        "scale, hands of SMPL",
+        writes_pose=False,
+        writes_motion=True,
     ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
@@ -315,7 +323,7 @@ def suited_exporter(path: str | Path, figure: Figure) -> str:
 def export_animation(
     animation: SampledAnimation, path: str | Path, key: str, options: MotionOptions
 ) -> list[Diagnostic]:
-    """Write a motion; the actor's placement in the scene is omitted.
+    """Write a motion without its placement; returns notes and raises as ``export`` does.
 
     Parameters
     ----------
@@ -327,8 +335,6 @@ def export_animation(
         A key of ``EXPORTERS``, see ``motion_exporters``.
     options : MotionOptions
         Options of the export.
-
-    Returns notes, and raises errors, as ``export`` does.
     """
     module = import_module(f"{__name__}.{key}")
     notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
@@ -376,12 +382,6 @@ def files_written(path: str | Path) -> list[Path]:
     if Path(path).suffix.lower() == ".gltf":
         return [Path(path), Path(path).with_suffix(".bin")]
     return [Path(path)]
-
-
-def require_mesh(actor: Actor, what: str) -> None:
-    """Raise RigError for a figure without a mesh; the message names the format."""
-    if actor.figure.mesh is None:
-        raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")
 
 
 class _CallableModule(ModuleType):

@@ -1,10 +1,13 @@
-"""Properties of an exporter."""
+"""Properties of an exporter, and a check that several share."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-__all__ = ["Exporter"]
+from viewer.errors import RigError
+from viewer.rig.scene import Actor
+
+__all__ = ["Exporter", "require_mesh"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,3 +44,9 @@ class Exporter:
     keeps_world: bool = False
     writes_keys: bool = False
     writes_several: bool = False
+
+
+def require_mesh(actor: Actor, what: str) -> None:
+    """Raise RigError for a figure without a mesh; the message names the format."""
+    if actor.figure.mesh is None:
+        raise RigError(f"figure {actor.figure.name} has no mesh to write as {what}")

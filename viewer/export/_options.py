@@ -9,6 +9,9 @@ from viewer.rig.skinning import Skinning
 ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
 
+QUATERNIONS = ("xyzw", "wxyz")
+"""Orders of the components of quaternions in arrays."""
+
 GAPS = {
     "hold": "hold the last pose",
     "interpolate": "interpolate between the frames around the gap, rotations along the shorter arc",
@@ -50,6 +53,8 @@ class MotionOptions:
         Up axis of the file; empty for the format's default.
     rotation_order : str
         One of ``ROTATION_ORDERS``.
+    quaternions : str
+        One of ``QUATERNIONS``.
     gaps : str
         A key of ``GAPS``; empty for the format's default: missing frames are omitted if the
         format allows it, and held otherwise.
@@ -69,6 +74,7 @@ class MotionOptions:
     unit: str = ""
     up: str = ""
     rotation_order: str = "zyx"
+    quaternions: str = "xyzw"
     gaps: str = ""
     rest_frame: bool = False
     digits: int = 6

@@ -11,6 +11,7 @@ own order. ``up``, and ``present`` if frames are missing, are extensions.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +35,12 @@ from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
-__all__ = ["export_animation"]
+__all__ = ["export_animation", "padded", "write_layout"]
+
+Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
 
 _FEWEST = 16  # shape coefficients that readers of AMASS require
 _CLOSED = {
@@ -75,8 +78,22 @@ def export_animation(
     OutputError
         If a file cannot be written.
     """
-    check_unit(options, "AMASS")
-    member = member_of_figure(animation.figure, "an AMASS motion", ("pelvis",))
+    notes = write_layout(animation, path, options, "AMASS", _arrays)
+    if len(animation.frames.shape_weights) > 1:
+        notes.append(Diagnostic("X005.shape-rows"))
+    return notes
+
+
+def write_layout(
+    animation: SampledAnimation, path: Path, options: MotionOptions, title: str, layout: Layout
+) -> list[Diagnostic]:
+    """Write a motion as arrays of the family in some layout; see ``export_animation``.
+
+    ``title``: name of the layout, for messages.
+    ``layout``: returns the arrays of some rows.
+    """
+    check_unit(options, title)
+    member = member_of_figure(animation.figure, f"an {title} motion", ("pelvis",))
     present = animation.frames.present
     if options.closing not in GAPS:
         raise RigError(
@@ -93,13 +110,13 @@ def export_animation(
     written = []
     with keeping_written() as saved, all_or_none(paths):
         for file, (start, stop) in zip(paths, spans, strict=True):
-            arrays = _arrays(body, slice(start, stop), animation.frame_rate, up)
+            arrays = layout(body, slice(start, stop), animation.frame_rate, up)
             if not is_split and not present.all():
                 arrays["present"] = present
             save_arrays(file, arrays)
             values = {
                 "n": stop - start,
-                "model": member.title,
+                "model": member.title if title == "AMASS" else title,
                 "rate": animation.frame_rate,
                 "up": up,
             }
@@ -109,11 +126,16 @@ def export_animation(
         again = read_frames(read(Source(file, saved[file])), animation, options)
         lost += frames_losses(file, animation, again, options.skinning, span)
     lost += resampling_losses(path, animation, options.skinning)
-    return [*written, *lost, *_remarks(body, animation, present, options), *notes]
+    return [
+        *written,
+        *lost,
+        *gaps_note(present, animation.first_frame, options.closing, **_CLOSED),
+        *notes,
+    ]
 
 
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
-    shape = _padded(body.shape)
+    shape = padded(body.shape)
     vectors = body.vectors[part]
     arrays: dict[str, NDArray[Any]] = {
         "poses": vectors.reshape(len(vectors), -1),
@@ -132,19 +154,10 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
     return arrays
 
 
-def _padded(shape: Floats) -> Floats:
+def padded(shape: Floats) -> Floats:
     """Return shape coefficients padded to the usual number, without trailing zeros beyond it."""
     used = np.flatnonzero(shape.any(axis=0))
     count = max(_FEWEST, int(used[-1]) + 1 if len(used) else 0)
     padded = np.zeros((len(shape), count))
     padded[:, : shape.shape[1]] = shape[:, :count]
     return padded
-
-
-def _remarks(
-    body: FamilyFrames, animation: SampledAnimation, present: Bools, options: MotionOptions
-) -> list[Diagnostic]:
-    notes = []
-    if len(body.shape) > 1:
-        notes.append(Diagnostic("X005.shape-rows"))
-    return notes + gaps_note(present, animation.first_frame, options.closing, **_CLOSED)

@@ -7,8 +7,10 @@
     own_numbers (N,)  shape_weights (S,)   up   unit   name
 
 For a motion of F frames: ``vertices`` (F, V, 3), ``joints`` (F, J, 3), ``world`` (F, J, 4, 4),
-``rotations`` (F, J, 4) relative to the parents as (x, y, z, w), ``shape_weights`` (F, S) or (1, S),
-``times`` (F,), ``frames`` (F,), ``present`` (F,), ``frame_rate``. Rows of missing frames are NaN.
+``rotations`` (F, J, 4) relative to the parents, in the order that ``quaternions`` states,
+``"xyzw"`` or ``"wxyz"``; ``shape_weights`` (F, S) or (1, S), ``times`` (F,), ``frames`` (F,),
+``present`` (F,), ``frame_rate``. Rows of missing frames are NaN. Another up axis rotates the whole
+motion about x.
 If gaps are held or interpolated, ``present`` is true for all frames.
 
 For K captured points: ``points`` (K, 3) or (F, K, 3), NaN where they are not visible,
@@ -28,12 +30,15 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
+from viewer.export._options import QUATERNIONS
 from viewer.formats import save_arrays
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
+from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.motion.evaluation import pose_of, world_frames
-from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.sampled_animation import SampledAnimation, rotated_frames
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform, joint_matrices
@@ -79,17 +84,22 @@ def export_animation(
     """Write float64 arrays of all frames; see ``viewer.export.export_animation``."""
     figure = animation.figure
     _check(animation.name, animation.frames.present, figure.unit, options)
+    up = options.up or options.world_up
     if options.gaps == "split":
         raise RigError('gaps of arrays: expected hold or interpolate, found "split"')
     frames, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     skeleton = figure.require_skeleton()
+    if up != options.world_up:
+        frames = rotated_frames(figure, frames, rotation_vector_to_quaternion(_turn(up)))
     world = world_frames(figure, frames)
     world[~frames.present] = np.nan
-    rotations = frames.rotations.copy()
+    order = [options.quaternions.index(part) for part in "xyzw"]
+    rotations = np.empty_like(frames.rotations)
+    rotations[..., order] = frames.rotations
     rotations[~frames.present] = np.nan
     arrays = {
         "name": np.array(animation.name),
-        "up": np.array(options.world_up),
+        "up": np.array(up),
         "unit": np.array(figure.unit),
         "frame_rate": np.array(animation.frame_rate),
         "times": frames.times,
@@ -98,6 +108,7 @@ def export_animation(
         "joints": world[:, :, :3, 3],
         "world": world,
         "rotations": rotations,
+        "quaternions": np.array(options.quaternions),
         "joint_names": np.array(skeleton.names),
         "parents": skeleton.parents,
         "shape_weights": frames.shape_weights,
@@ -139,34 +150,43 @@ def export_points(animation: SampledPoints, path: Path, options: MotionOptions) 
         If the file cannot be written.
     """
     _check(animation.name, animation.present, "", options)
+    up, points = options.up or options.world_up, animation.points
+    if up != options.world_up:
+        points = points @ np.round(rotation_vector_to_matrix(_turn(up))).T
     arrays: dict[str, NDArray[Any]] = {
         "name": np.array(animation.name),
-        "up": np.array(options.world_up),
+        "up": np.array(up),
         "frame_rate": np.array(animation.frame_rate),
         "times": animation.times,
         "frames": animation.first_frame + np.arange(len(animation.times)),
         "present": animation.present,
     }
-    arrays |= _point_arrays(animation.layout, animation.points, animation.confidences)
+    arrays |= _point_arrays(animation.layout, points, animation.confidences)
     save_arrays(path, arrays)
     values = {
         **_counts(animation.present, animation.frame_rate),
-        "up": options.world_up,
+        "up": up,
         "names": [*arrays],
     }
     return [Diagnostic("X001.point-arrays", path, values=values)]
 
 
+def _turn(up: str) -> Floats:
+    """Return the rotation vector from the other up axis, y or z, to ``up``."""
+    return np.array([np.pi / 2 if up == "z" else -np.pi / 2, 0.0, 0.0])
+
+
 def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None:
-    """Raise RigError if an option needs a conversion, or no frame is present."""
-    for what, requested, own in (
-        ("unit", options.unit, unit),
-        ("up axis", options.up, options.world_up),
-    ):
-        if requested not in ("", own):
-            raise RigError(
-                f'{what} of arrays: expected {own or "none"}, as in the scene, found "{requested}"'
-            )
+    """Raise RigError if another unit or an unknown axis is requested, or no frame is present."""
+    if options.unit not in ("", unit):
+        raise RigError(
+            f'unit of arrays: expected {unit or "none"}, as in the scene, found "{options.unit}"'
+        )
+    if options.up not in ("", "y", "z"):
+        raise RigError(f'up axis of arrays: expected y or z, found "{options.up}"')
+    if options.quaternions not in QUATERNIONS:
+        known = " or ".join(QUATERNIONS)
+        raise RigError(f'quaternions: expected {known}, found "{options.quaternions}"')
     if not present.any():
         raise RigError(f"{name}: every frame is missing: there is nothing to write")
 

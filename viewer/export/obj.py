@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.export import MotionOptions, require_mesh
+from viewer.export import MotionOptions
+from viewer.export._exporter import require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._motion_paths import numbered_paths

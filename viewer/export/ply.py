@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.export import require_mesh
+from viewer.export._exporter import require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.formats import save_bytes
 from viewer.phrases import printable

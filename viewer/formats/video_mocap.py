@@ -31,6 +31,7 @@ def open_results(
     space: str = "",
     up: str = "",
     average_shape: bool = False,
+    video_rate: float | None = None,
 ) -> Capture:
     """Open results of a tool.
 
@@ -46,6 +47,8 @@ def open_results(
         Up axis of the space; that of the tool by default.
     average_shape : bool
         Average each person's shape over time.
+    video_rate : float, optional
+        Frames per second of the video, for tools that do not store a rate.
 
     Returns
     -------
@@ -59,7 +62,7 @@ def open_results(
         have the requested space.
     """
     results = _folder(source) if source.is_folder else _file(source)
-    return capture_of(source, results, Options(frame_rate, space, up, average_shape))
+    return capture_of(source, results, Options(frame_rate, space, up, average_shape, video_rate))
 
 
 def _file(source: Source) -> Results:

@@ -208,6 +208,8 @@ class Subject:
         Data that a reader replaced because the data in the file is invalid: vertices by
         ``"positions"`` and ``"weights"``, ``"triangles"``, joints by ``"bindings"`` and
         ``"joints"``, rows by ``"frames"``.
+    people : tuple of Actor
+        All captured people of the scene, in its order.
     tracks : list of Track
         Cached track of the actor's clip; may be empty.
     """
@@ -218,6 +220,7 @@ class Subject:
     options: LintOptions = field(default_factory=LintOptions)
     counting: Counting | None = None
     invalid: Mapping[str, Ints] = field(default_factory=dict)
+    people: tuple[Actor, ...] = ()
     # Results that several checks need are computed once: ``track_of`` caches them here.
     tracks: list[Track] = field(default_factory=list)
 

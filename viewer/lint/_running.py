@@ -50,6 +50,8 @@ CHECKS = {
     "clips": Check("clip", of_motion=True, of_animations=True),
     "feet": Check("feet", of_motion=True, of_animations=True),
     "captures": Check("captured points", of_motion=True),
+    "people": Check("people", of_motion=True),
+    "jitter": Check("jitter", of_motion=True),
 }
 """Modules in this folder with a function ``check(subject)``, in order of execution."""
 
@@ -83,10 +85,11 @@ def lint_scene(
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
     counting = counting_of(scene, chosen.frame_rate or rate)
+    people = tuple(actor for actor in scene.actors if actor.person is not None)
     subjects = []
     for index, actor in enumerate(scene.actors):
         lost = invalid[index] if index < len(invalid) else {}
-        subjects.append(Subject(actor, index, scene.up, chosen, counting, lost))
+        subjects.append(Subject(actor, index, scene.up, chosen, counting, lost, people))
     # The rate of the playing animation's keys is no choice for the frames of others.
     others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
     steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]

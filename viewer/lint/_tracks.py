@@ -8,11 +8,11 @@ import numpy as np
 
 from viewer.lint._counting import Counting
 from viewer.lint._finding import Subject
-from viewer.lint._soles import soles_of
 from viewer.lint._track import Track
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.soles import soles_of
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (

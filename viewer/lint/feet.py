@@ -1,4 +1,4 @@
-"""Checks of a body's feet: sliding while they stand, and sinking into the ground."""
+"""Checks of a body's feet: sliding while they stand, sinking into the ground, and floating."""
 
 from __future__ import annotations
 
@@ -6,18 +6,21 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._ground import Ground, ground_of
-from viewer.lint._soles import extent
 from viewer.lint._track import Track
 from viewer.lint._tracks import track_of
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
+from viewer.rig.inspection.ground_height import Ground, ground_of, resting_frames
+from viewer.rig.inspection.soles import extent
 from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check"]
 
 # Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
+_FLOATS = 0.03  # height above the ground relative to the height at rest: 51 mm for a person
+_STEPS = 0.06  # 100 mm for a person: higher, it may stand on a step unless the ground is given
+_RESTS = 0.3  # seconds for which the lower foot rests there: at the top of a jump, it is 0.1
 _FACTOR = 3.0  # at this multiple of the limit even a single frame is reported
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
 _TOUCHES = 0.02  # above the ground
@@ -55,6 +58,7 @@ def check(subject: Subject) -> list[Finding]:
     labels = [joint_labels(figure.skeleton)[joint] for joint in feet]
     return [
         *_sunk(subject, track, feet, labels, heights - ground, sinks * height),
+        *_floating(subject, track, feet, heights - ground, height, given == "auto"),
         *_slipped(subject, track, feet, labels, heights - ground, up),
     ]
 
@@ -108,6 +112,44 @@ def _sunk(
             frame=int(track.numbers[frames[0]]),
             part="clip",
             joints=[feet[worst]],
+            frames=track.numbers[each],
+            times=track.times[each],
+            at=("frames", int(frames[0])),
+        )
+    ]
+
+
+def _floating(
+    subject: Subject,
+    track: Track,
+    feet: list[int],
+    heights: Floats,
+    height: float,
+    may_step: bool,
+) -> list[Finding]:
+    """Report a body whose lower foot rests above the ground.
+
+    ``height``: height of the figure.
+    ``may_step``: whether it may rest on something that is as high as a step.
+    """
+    lowest, size = heights.min(axis=1), track.scale * height
+    step = float(track.times[1] - track.times[0])
+    rests = resting_frames(lowest, track.present, step, size, _RESTS)
+    most = _STEPS * size if may_step else np.inf
+    frames = np.flatnonzero(rests & (lowest > _FLOATS * size) & (lowest < most))
+    if len(frames) == 0:
+        return []
+    frames = frames[np.argsort(-lowest[frames], kind="stable")]
+    each = track.of_each(frames)
+    return [
+        subject.found(
+            "C016.foot",
+            n=len(each),
+            all=track.n_frames,
+            height=subject.length(float(lowest[frames[0]] / track.scale)),
+            frame=int(track.numbers[frames[0]]),
+            part="clip",
+            joints=feet,
             frames=track.numbers[each],
             times=track.times[each],
             at=("frames", int(frames[0])),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,9 +99,29 @@ def begin(
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
     scene.files, scene.images = contents.files, cast.images
-    if settings is not None and settings.model is not None:
-        scene.files += (settings.model,)
+    if settings is not None:
+        scene.files += tuple(filter(None, (settings.model, settings.video)))
+    switched = [capture for _, capture in contents.captures if capture.in_space is not None]
+    if switched:
+        scene.space = switched[0].space
+        scene.in_space = partial(_assembled_in, contents, settings, cast.builders)
     return scene, cast.builders
+
+
+def _assembled_in(
+    contents: Contents, settings: MotionSettings | None, builders: Sequence[Builder], space: str
+) -> Scene:
+    """Return the scene with captured people in another space, where their files contain it.
+
+    ``builders``: captures of the scene that is replaced; their reading ends.
+    """
+    for builder in builders:
+        builder.is_cut = True
+    captures = [
+        (path, capture if capture.in_space is None else capture.in_space(space))
+        for path, capture in contents.captures
+    ]
+    return assemble(replace(contents, captures=captures), settings)
 
 
 def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:

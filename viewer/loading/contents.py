@@ -201,7 +201,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
 
         return open_capture(
             source,
-            frame_rate=settings.frame_rate or DEFAULT_RATE,
+            frame_rate=settings.frame_rate or _video_rate(settings) or DEFAULT_RATE,
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
@@ -212,7 +212,12 @@ def _read(source: Source, settings: MotionSettings) -> Content:
         from viewer.formats.video_mocap import open_results
 
         return open_results(
-            source, settings.frame_rate, settings.space, settings.up, settings.average_shape
+            source,
+            settings.frame_rate,
+            settings.space,
+            settings.up,
+            settings.average_shape,
+            _video_rate(settings),
         )
     return read(source)
 
@@ -228,6 +233,15 @@ def _add_motion(source: Source, contents: Contents, settings: MotionSettings) ->
 
     motion = motion_in(source, content, settings.animation)
     contents.skeleton_motions.append((source.path, motion))
+
+
+def _video_rate(settings: MotionSettings) -> float | None:
+    """Return the frame rate of the video of a capture's camera, if one is given."""
+    if settings.video is None:
+        return None
+    from viewer.formats._footage.video_images import video_rate
+
+    return video_rate(settings.video)
 
 
 def _is_picture(source: Source) -> bool:

@@ -19,16 +19,18 @@ from viewer.loading.carrying import carried_clip, has_joints
 from viewer.loading.cast import Cast
 from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
+from viewer.loading.filming import filmed
 from viewer.loading.settings import MotionSettings
-from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
+from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
@@ -279,14 +281,6 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
     return up
 
 
-def _turned(view: CameraView, to_capture: Floats) -> CameraView:
-    """Return a camera of a capture that was rotated upright."""
-    motion = view.motion
-    if motion is not None:
-        motion = replace(motion, rotations=motion.rotations @ to_capture)
-    return replace(view, rotation=view.rotation @ to_capture, motion=motion)
-
-
 def _with_cameras(capture: Capture, model: Figure, is_bundled: bool) -> Capture:
     """Return a capture with the cameras that depend on the figure that shows its bodies."""
     if capture.views_of is None:
@@ -321,9 +315,11 @@ def _begin_capture(
     _carry(builder, cast, target, drives=is_bundled and settings.drives)
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
-    to_capture = builder.placement[:3, :3].T
-    cast.views += [_turned(view, to_capture) for view in capture.views]
-    cast.images = cast.images or capture.images
+    rate = _rate(builder.actors, settings)
+    views, images, notes = filmed(capture, capture.views, settings, rate)
+    cast.diagnostics += notes
+    cast.views += [placed_view(view, builder.placement) for view in views]
+    cast.images = cast.images or images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
@@ -349,3 +345,8 @@ def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) ->
                 cast.diagnostics += builder.carry_to(actor.figure)
                 cast.take(index)
                 return
+
+
+def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
+    """Return the frame rate of a capture."""
+    return scene_rate(actors) if actors else settings.frame_rate or DEFAULT_RATE

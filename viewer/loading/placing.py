@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from viewer.loading.cast import Cast
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView, placed_view
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box
@@ -67,10 +65,8 @@ def placed_views(cast: Cast) -> list[CameraView]:
         for actor, group in zip(cast.actors, cast.groups, strict=True)
         if group is not None
     }
-    found = []
-    for group, placement in placements.items():
-        for view in group.views:
-            rotation = view.rotation @ placement[:3, :3].T
-            moved = view.translation - rotation @ placement[:3, 3]
-            found.append(replace(view, rotation=rotation, translation=moved))
-    return found
+    return [
+        placed_view(view, placement)
+        for group, placement in placements.items()
+        for view in group.views
+    ]

@@ -41,6 +41,8 @@ class MotionSettings:
     images : Path or None
         Folder with an image folder for each camera of a capture; None for ``images`` beside the
         capture.
+    video : Path or None
+        Video of a capture's camera; also gives the frame rate of captures that have none.
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
@@ -69,6 +71,7 @@ class MotionSettings:
     legacy_expression: bool = False
     drives: bool = True
     images: Path | None = None
+    video: Path | None = None
     animation: str = ""
     motions: tuple[Path, ...] = ()
     springs: bool = False

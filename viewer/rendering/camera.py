@@ -11,7 +11,7 @@ from pyrr import matrix44
 
 from viewer.rendering.pinhole import picture_size, pinhole_projection, pinhole_view
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView, view_at
 from viewer.rig.mesh import bounding_box, box_size
 
 __all__ = [
@@ -22,6 +22,7 @@ __all__ = [
     "eye",
     "facing_camera",
     "fit",
+    "follow_view",
     "front_azimuth",
     "look_from",
     "orbit",
@@ -69,6 +70,8 @@ class Camera:
         again when this field is None.
     front : float
         Azimuth of the front view; named views are relative to it.
+    seconds : float
+        Time of the scene, which determines where a moving calibrated camera is.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -80,6 +83,7 @@ class Camera:
     up: Literal["y", "z"] = "y"
     fixed: CameraView | None = None
     front: float = 0.0
+    seconds: float = 0.0
 
     def copy(self) -> Camera:
         """Return an independent copy."""
@@ -93,7 +97,13 @@ class Camera:
             self.up,
             self.fixed,
             self.front,
+            self.seconds,
         )
+
+    @property
+    def pinhole(self) -> CameraView | None:
+        """The calibrated camera to look through as it is at ``seconds``; None without one."""
+        return None if self.fixed is None else view_at(self.fixed, self.seconds)
 
     @property
     def is_parallel(self) -> bool:
@@ -102,14 +112,16 @@ class Camera:
 
     def rotation(self) -> Floats:
         """Return the rotation from scene to camera space, for column vectors: (3, 3)."""
-        if self.fixed is not None:
-            return pinhole_view(self.fixed)[:3, :3]
+        pinhole = self.pinhole
+        if pinhole is not None:
+            return pinhole_view(pinhole)[:3, :3]
         return np.array(camera_axes(self))
 
     def view_matrix(self) -> Floats:
         """Return the matrix from scene to camera space, for column vectors: (4, 4)."""
-        if self.fixed is not None:
-            return pinhole_view(self.fixed)
+        pinhole = self.pinhole
+        if pinhole is not None:
+            return pinhole_view(pinhole)
         _, up, _ = camera_axes(self)
         # pyrr's matrices are for row vectors.
         return np.array(matrix44.create_look_at(eye(self), self.target, up, dtype="f8")).T
@@ -129,8 +141,9 @@ class Camera:
         (4, 4)
             OpenGL clip space, z in -1..1.
         """
-        if self.fixed is not None:
-            return pinhole_projection(self.fixed, aspect, box)
+        pinhole = self.pinhole
+        if pinhole is not None:
+            return pinhole_projection(pinhole, aspect, box)
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
         reach = reach or self.distance  # even an empty scene needs a depth range
         far = self.distance + 20.0 * reach
@@ -206,7 +219,11 @@ def eye(camera: Camera) -> Floats:
 
 
 def camera_from_view(
-    view: CameraView, size: tuple[int, int], up: Literal["y", "z"], box: Floats | None = None
+    view: CameraView,
+    size: tuple[int, int],
+    up: Literal["y", "z"],
+    box: Floats | None = None,
+    seconds: float = 0.0,
 ) -> Camera:
     """Return a camera that looks through a calibrated one.
 
@@ -223,12 +240,15 @@ def camera_from_view(
         The scene's up axis.
     box : (2, 3), optional
         Bounds of the objects to orbit, scene space; the origin if omitted.
+    seconds : float
+        Time of the scene, for a moving camera.
 
     Raises
     ------
     RigError
         If the size of the camera's images is unknown.
     """
+    fixed, view = view, view_at(view, seconds)
     width, height = picture_size(view)
     aspect = size[0] / size[1]
     seen = max(height, width / aspect)  # rows of the image and the margins above and below
@@ -247,8 +267,31 @@ def camera_from_view(
         inclination=math.degrees(math.atan2(y, math.hypot(x, z))),
         fov=math.degrees(2.0 * math.atan2(0.5 * seen, focal)),
         up=up,
-        fixed=view,
+        fixed=fixed,
+        seconds=seconds,
     )
+
+
+def follow_view(
+    camera: Camera, size: tuple[int, int], seconds: float, box: Floats | None = None
+) -> None:
+    """Move a camera to a time of the scene, in place, with the calibrated one it looks through.
+
+    If ``fixed`` is reset to None later, the camera continues from where that one is now.
+
+    Parameters
+    ----------
+    camera : Camera
+        Any camera; without a moving calibrated one, only its time changes.
+    size, seconds, box
+        As for ``camera_from_view``.
+    """
+    camera.seconds, fixed = seconds, camera.fixed
+    if fixed is None or fixed.motion is None:
+        return
+    seen = camera_from_view(fixed, size, camera.up, box, seconds)
+    camera.target, camera.distance = seen.target, seen.distance
+    camera.azimuth, camera.inclination, camera.fov = seen.azimuth, seen.inclination, seen.fov
 
 
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:

@@ -12,7 +12,7 @@ from viewer.rendering.pinhole import picture_size
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImage
-from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.camera_view import CameraView, motion_times, view_at
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene
 
@@ -26,16 +26,18 @@ __all__ = [
     "with_cameras",
 ]
 
+_FRAMED = 24  # number of places on the way of a moving camera that are framed
 _TOLERANCE = 0.01  # relative difference of aspect ratios: one pixel of a small image
 
 
 def drawn_cameras(
     scene: Scene, view_through: CameraView | None, options: DisplayOptions
 ) -> list[CameraView]:
-    """Return the cameras whose frusta are drawn: all except the one in use."""
+    """Return the cameras whose frusta are drawn, at the scene's time: all except the one in use."""
     if not options.cameras:
         return []
-    return [camera for camera in scene.views if camera is not view_through]
+    seconds = scene.time or 0.0
+    return [view_at(camera, seconds) for camera in scene.views if camera is not view_through]
 
 
 def reach_of(
@@ -73,10 +75,17 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 
 
 def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
-    """Return the points to frame: those of the figures, and of the cameras' frusta if drawn."""
-    cameras = drawn_cameras(scene, None, options)
-    if not cameras:
+    """Return the points to frame: those of the figures, and of the cameras' frusta if drawn.
+
+    Moving cameras are framed along their whole way.
+    """
+    if not options.cameras or not scene.views:
         return points
+    cameras = [
+        view_at(camera, seconds)
+        for camera in scene.views
+        for seconds in motion_times(camera, _FRAMED).tolist()
+    ]
     return np.concatenate([points, frusta_points(cameras, bounding_box(points))])
 
 
@@ -84,7 +93,7 @@ def draw_image_behind(
     late: LatePasses, scene: Scene, view: View, options: DisplayOptions, size: tuple[int, int]
 ) -> None:
     """Draw the image of the camera through which the scene is seen, if there is one."""
-    camera = view.camera.fixed
+    camera = view.camera.pinhole
     if camera is None or options.image_brightness <= 0.0 or scene.images is None:
         return
     image = _image(scene, camera)

@@ -355,6 +355,7 @@ class _Cameras:
     def at(self, frame: int, scene: Scene) -> Camera:
         recording = self._recording
         camera, follow = recording.camera.copy(), recording.follow
+        camera.seconds = scene.time or 0.0
         if recording.turntable:
             rotated = camera.azimuth + recording.turntable * frame / recording.n_frames
             camera.azimuth = (rotated + 180.0) % 360.0 - 180.0

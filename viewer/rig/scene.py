@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
@@ -207,6 +207,11 @@ class Scene:
         Current time of its motions, seconds; None for their start.
     files : tuple of Path
         All files from which it was read, including images; no output may overwrite them.
+    space : "world", "camera" or ""
+        The space of its captured people, if their files contain both; empty otherwise.
+    in_space : callable or None
+        Returns the same scene with people in ``"world"`` or ``"camera"`` space, read completely;
+        None if there is only one space.
     """
 
     actors: list[Actor]
@@ -217,6 +222,8 @@ class Scene:
     time: float | None = None
     files: tuple[Path, ...] = ()
     images: CameraImages | None = None
+    space: str = ""
+    in_space: Callable[[str], Scene] | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -5,6 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from formats.filmed_capture import write_filmed
+from numpy.testing import assert_allclose
+from rendering.moving import moving_camera
+
+from viewer.app.view.camera_actions import look_through
+from viewer.rendering.camera import eye
 
 
 @pytest.fixture
@@ -51,3 +56,15 @@ def test_image_brightness_dims_the_image_of_the_camera(filmed):
         grey.append(np.median(shown[:, shown.shape[1] // 2 - 60]))
     # 100 of 255 in the file, dimmed to 60 % at first; without an image the background is white.
     assert grey == [60, 100, 25, 255]
+
+
+def test_the_camera_follows_a_moving_one_while_time_passes(filmed):
+    state = filmed.state
+    view = moving_camera()
+    state.scene.views = (view,)
+    look_through(state, 0)
+    state.clock.seek(1 / 30)
+    filmed.step(2)
+    # A third of the way from its first to its second frame.
+    assert_allclose(eye(state.camera)[0], 0.2 / 3.0, atol=1e-9)
+    assert state.camera.fixed is view and state.camera.seconds == state.clock.time

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.captures.camera_view import CameraMotion, CameraView, view_at
+from viewer.rig.captures.camera_view import (
+    CameraMotion,
+    CameraView,
+    motion_times,
+    placed_view,
+    view_at,
+)
 from viewer.rig.geometry.rotation import axis_rotations
 from viewer.rig.motion.timing import Timing
 
@@ -38,3 +44,27 @@ def test_halfway_between_frames_it_is_rotated_by_half_and_its_centre_is_the_mean
     assert_allclose(view.rotation, axis_rotations(1, np.array(np.pi / 4)), atol=1e-12)
     assert_allclose(-view.rotation.T @ view.translation, [1.0, 1.0, 0.0], atol=1e-12)
     assert view.motion is None
+
+
+def test_a_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
+    placement = np.eye(4)
+    placement[:3, :3] = axis_rotations(0, np.array(np.pi)) @ axis_rotations(2, np.array(0.3))
+    placement[:3, 3] = 4.0, -1.0, 2.5
+    point = np.array([0.4, 0.2, 7.0])
+    before = moving([0, -1, 1])
+    after = placed_view(before, placement)
+    for seconds in (0.0, 0.1, 0.17):
+        old, new = view_at(before, seconds), view_at(after, seconds)
+        moved = placement[:3, :3] @ point + placement[:3, 3]
+        seen = new.rotation @ moved + new.translation
+        assert_allclose(seen, old.rotation @ point + old.translation, atol=1e-12)
+    assert_allclose(after.rotation, view_at(after, 0.0).rotation)
+
+
+def test_times_of_a_motion_skip_gaps_and_include_both_ends() -> None:
+    assert_allclose(motion_times(moving([-1, 0, -1, 1]), 5), [0.1, 0.3])
+    rotations = np.tile(np.eye(3), (11, 1, 1))
+    motion = CameraMotion(Timing(10.0, np.arange(11)), rotations, np.zeros((11, 3)))
+    view = CameraView("video", np.eye(3), np.eye(3), np.zeros(3), motion=motion)
+    assert_allclose(motion_times(view, 3), [0.0, 0.5, 1.0])
+    assert_allclose(motion_times(CameraView("1", np.eye(3), np.eye(3), np.zeros(3)), 3), [0.0])

@@ -7,6 +7,7 @@ from imgui_bundle import imgui
 from viewer.app.actors.following import Following, start_following, stop_following
 from viewer.app.actors.springs import toggle_springs
 from viewer.app.core.fields import begin_field, drag_float, in_row
+from viewer.app.core.spaces import draw_space
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -35,6 +36,7 @@ _LOOK = (
 def draw(state: AppState) -> None:
     """Draw the panel."""
     _draw_list(state)
+    draw_space(state)
     actor = state.actor
     imgui.separator()
     _draw_place(state, actor)

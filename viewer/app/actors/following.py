@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from viewer.app.core.calibrated import follow_calibrated
 from viewer.app.core.state import AppState
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
@@ -34,8 +35,10 @@ class Following:
 def follow_actor(state: AppState) -> None:
     """Keep the camera's target on the followed actor or joint at the same distance.
 
-    The camera moves only with the clock: it stays still while a pose is edited by hand.
+    The camera moves only with the clock: it stays still while a pose is edited by hand. A camera
+    that looks through a moving calibrated one moves with that one.
     """
+    follow_calibrated(state)
     following, n_posed = state.of(Following), state.clock.n_posed
     if following.target is None or following.n_posed == n_posed:
         return

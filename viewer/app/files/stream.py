@@ -50,6 +50,8 @@ class Stream:
         try:
             for builder in self.builders:
                 for part in builder.parts():
+                    if builder.is_cut:
+                        break
                     if not self._hand_over(builder, part):
                         return
         except ViewerError as problem:
@@ -94,6 +96,8 @@ class Stream:
                 builder, part = self._parts.get_nowait()
             except queue.Empty:
                 return new, notes, grew
+            if builder.is_cut:
+                continue
             known = builder.actors
             more, said = builder.add(part)
             # The user may have changed the frame rate since the first person appeared.

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.app.core.calibrated import look_through_view
 from viewer.app.core.fitting import fit_again, fit_points, fit_shown
 from viewer.app.core.state import AppState
 from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.errors import ViewerError
-from viewer.rendering.camera import Camera, camera_from_view, look_from
+from viewer.rendering.camera import look_from
 from viewer.rendering.camera_notes import image_notes, lens_notes
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import Front
@@ -84,15 +85,11 @@ def look_through(state: AppState, index: int) -> None:
         state.camera.fixed = None
         return
     view = state.scene.views[index]
-    size = (max(round(state.view_rect[2]), 1), max(round(state.view_rect[3]), 1))
     try:
-        seen = camera_from_view(view, size, state.scene.up, state.box)
+        look_through_view(state, view)
     except ViewerError as problem:
         state.error = str(problem)
         return
-    seen.front = state.camera.front
-    for name in Camera.__slots__:
-        setattr(state.camera, name, getattr(seen, name))
     for note in (*image_notes(state.scene, view), *lens_notes(state.scene, view)):
         state.say(note[0].upper() + note[1:])
 

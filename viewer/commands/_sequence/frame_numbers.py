@@ -159,8 +159,8 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
     parser.set_defaults(frame_option="--frame")
 
 
-def parse_range(text: str) -> Range:
-    """Parse ``A:B`` or ``A:B:STEP``; A and B may be omitted.
+def parse_range(text: str, option: str = "--frames") -> Range:
+    """Parse ``A:B`` or ``A:B:STEP``; A and B may be omitted. ``option`` is for messages.
 
     >>> parse_range("10:20:2"), parse_range(":5")
     (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
@@ -172,7 +172,7 @@ def parse_range(text: str) -> Range:
         if step >= 1 and (stop is None or (first or 0) < stop):
             return Range(first, stop, step)
     raise ViewerError(
-        f'--frames: expected A:B or A:B:STEP with A below B, as in 0:100, found "{printable(text)}"'
+        f'{option}: expected A:B or A:B:STEP with A below B, as in 0:100, found "{printable(text)}"'
     )
 
 

@@ -9,17 +9,24 @@ CODES = {
         "warning", "joint jumps between frames", "look for a bad frame or a cut at that time"
     ),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
-    "C005": Code(
-        "warning", "missing frames", "interpolate them (--interpolate-gaps) or record again"
-    ),
+    "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or record again"),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
-    "C007": Code("warning", "foot sliding", "lock the foot or adjust the root motion"),
+    "C007": Code("warning", "foot sliding", "lock the feet (--lock-feet of viewer convert)"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
     "C009": Code("error", "clip for another skeleton", "open it with the skeleton it was made for"),
     "C010": Code("note", "zero-length clip", "add keys at different times"),
     "C011": Code("warning", "low-confidence keypoints", "omit them or record again"),
     "C012": Code("note", "keypoints that are never visible", "none if the camera cannot see them"),
     "C013": Code("note", "unclear ground height", "specify it (--ground)"),
+    "C014": Code("warning", "jitter", "smooth the motion (--smooth of viewer convert)"),
+    "C015": Code(
+        "warning", "people exchanged", "cut the motion there, or join tracks (--merge-ids)"
+    ),
+    "C016": Code(
+        "warning",
+        "floating feet",
+        "lower the motion (--ground), none if the person stands on something",
+    ),
 }
 
 MESSAGES = {
@@ -48,6 +55,14 @@ MESSAGES = {
     "checked",
     "C013.no-height": "feet never rest long enough at one height: ground height unclear, feet not "
     "checked",
+    "C014.jitter": "{n:#frame/{all}}: {joint:text} jitters by {noise} from frame to frame (limit "
+    "{limit}), most around frame {frame}",
+    "C015.exchanged": "jumps by {distance} to the place of {other}, who jumps to the place of this "
+    "person, in {n:#frame}: {frames_text:list}",
+    "C015.continued": "appears in frame {first}, {distance} from where {other} disappears in frame "
+    "{last}: may be one person (--merge-ids {ids} of viewer convert)",
+    "C016.foot": "{n:#frame/{all}}: rests up to {height} above the ground with both feet, most "
+    "at frame {frame}",
 }
 
 PHRASES = {

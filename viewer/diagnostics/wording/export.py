@@ -10,6 +10,7 @@ CODES = {
     "X003": Code("note", "data that is not written", "choose a format that can store it"),
     "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
     "X005": Code("note", "data that is written in another form", "none if intentional"),
+    "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
 }
 
 _INFLUENCES = "up to {most} influences per vertex, all of them written, strongest first"
@@ -128,6 +129,9 @@ MESSAGES = {
     "X005.scale-changes": "the figure's scale changes from {low:g} to {high:g}: bone lengths are "
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
+    "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
+    "X005.as-smplx": "{figure:text} is not SMPL-X, whose pelvis is elsewhere at rest and whose "
+    "shape coefficients differ: for exact translations and shapes use --model with an SMPL-X model",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",

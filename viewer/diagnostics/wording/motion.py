@@ -1,4 +1,6 @@
-"""Messages about poses and motions applied to figures."""
+"""Messages about poses and motions applied to figures, and about the clean-up of motions."""
+
+_MOVED = "{part} move by {mean} on average, by {largest} at most{where:+ ({})}"
 
 MESSAGES = {
     "F004.body-joint": "{motion:text} moves the joint {joint:text}, which {figure:text} does not "
@@ -38,6 +40,28 @@ MESSAGES = {
     "F007.body-joints-left-out": "{n:#joint} in the pose beyond the body's {own} omitted",
     "F007.part-left-out": "{part} omitted: {figure:text} has no such joint",
     "F007.hand-part-left-out": "{part} omitted: {figure:text} has no hand components",
+    # Clean-up of captured motions
+    "X006.smoothed": f"{{figure:text}}: smoothed ({{filter}}): {_MOVED}",
+    "X006.gaps": "{figure:text}: {n:#missing frame} in {gaps:#gap} interpolated; the longest is "
+    "{longest} ({seconds:.2g} s)",
+    "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
+    "{gaps:list}",
+    "X006.locked": "{figure:text}: feet held in {n:#contact}, in which they slide by {after} "
+    f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
+    "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
+    "X006.no-legs": "{figure:text}: feet not held, since it has no legs with joints of known names",
+    "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
+    "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
+    "lowest positions are at height 0",
+    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh or "
+    "joints of known names",
+    "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",
+    "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
+    f"{{after}}: at the times of the original frames, {_MOVED}",
+    "X006.merged": "{other}: {n:#frame} joined to {kept}",
+    "X006.overlap": "{other} and {kept} are both present in {n:#frame} ({frames:list}), {distance} "
+    "apart: those of {kept} are used",
+    "X006.keys": "{figure:text}: its motion has keys instead of captured frames and is unchanged",
 }
 
 PHRASES = {
@@ -55,4 +79,12 @@ PHRASES = {
     "scale-not-positive": "scale: expected a positive number, found {found:g}",
     "scale-out-of-range": "scale: expected {low:g} to {high:g}, found {found:g}",
     "translation-too-far": "translation: expected at most {most:g}, found {found:g}",
+    # Clean-up of captured motions
+    "one-euro": "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
+    "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
+    "moved-joints": "joints",
+    "moved-points": "points",
+    "raised": "raised",
+    "lowered": "lowered",
+    "joint-in-frame": "{joint:text}, frame {frame}",
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -17,6 +18,7 @@ __all__ = ["ImageFolders", "find_images"]
 
 _FOLDER = "images"
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
+_PLAIN, _ENDING = re.compile(r"[0-9]+"), re.compile(r"([0-9]{1,9})$")
 _MOST_NAMED = 5  # missing frames in a message
 
 
@@ -35,7 +37,7 @@ class ImageFolders:
 
     def __init__(self, folders: dict[str, Path], frame_rate: float, frames: range) -> None:
         self._rate, self._frames = frame_rate, frames
-        self._files = {name: _numbered(folder) for name, folder in folders.items()}
+        self._files = {name: _from_first(_numbered(f), frames) for name, f in folders.items()}
         self._folders = folders
         self._shown: dict[str, tuple[int, CameraImage | None]] = {}
         self._faults: dict[Path, str] = {}
@@ -111,7 +113,7 @@ def find_images(
     frames : range
         Numbers of the capture's frames.
     given : Path, optional
-        Folder to use instead.
+        Folder to use instead; for a single camera, it may contain the images themselves.
 
     Raises
     ------
@@ -121,6 +123,8 @@ def find_images(
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
         folders = {view.name: parent / view.name for view in views if _is_name(view.name)}
         there = {name: folder for name, folder in folders.items() if folder.is_dir()}
+        if not there and given is not None and len(views) == 1 and _numbered(given):
+            there = {views[0].name: given}
         if there:
             return ImageFolders(there, frame_rate, frames)
     if given is not None:
@@ -141,8 +145,16 @@ def _numbered(folder: Path) -> dict[int, Path]:
         files = sorted(folder.iterdir())
     except OSError:
         return {}  # reported as missing frames
-    return {
-        int(path.stem): path
-        for path in files
-        if path.suffix.lower() in _SUFFIXES and path.stem.isdecimal() and path.stem.isascii()
-    }
+    pictures = [path for path in files if path.suffix.lower() in _SUFFIXES]
+    plain = {int(path.stem): path for path in pictures if _PLAIN.fullmatch(path.stem)}
+    ends = ((_ENDING.search(path.stem), path) for path in pictures)
+    return plain or {int(found[1]): path for found, path in ends if found}
+
+
+def _from_first(files: dict[int, Path], frames: range) -> dict[int, Path]:
+    """Return images with the numbers of a capture's frames.
+
+    Programs that save the frames of a video often count from 1, captures from 0.
+    """
+    is_shifted = files and min(files) == frames.start + 1 == 1 and max(files) == frames.stop
+    return {number - 1: path for number, path in files.items()} if is_shifted else files

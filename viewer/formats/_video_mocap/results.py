@@ -33,6 +33,7 @@ class Options:
     space: str = ""
     up: str = ""
     average_shape: bool = False
+    video_rate: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +155,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     first, last = int(np.concatenate(frames).min()), int(np.concatenate(frames).max())
     if first < 0 or last - first >= _MOST_FRAMES or last >= 1 << 30:
         raise source.fault("F002.video-frames", most=_MOST_FRAMES, low=first, high=last)
-    rate = options.frame_rate or results.frame_rate
+    rate = options.frame_rate or results.frame_rate or options.video_rate
     if rate is None:
         rate = DEFAULT_RATE
         if last > first:

@@ -11,7 +11,7 @@ from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.motion.timing import Timing
 
-__all__ = ["CameraMotion", "CameraView", "view_at"]
+__all__ = ["CameraMotion", "CameraView", "motion_times", "placed_view", "view_at"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -116,3 +116,45 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
     return replace(
         view, intrinsic=intrinsic, rotation=rotation, translation=-rotation @ center, motion=None
     )
+
+
+def motion_times(view: CameraView, most: int) -> Floats:
+    """Return some times at which a camera is placed, the first and the last among them: (T,).
+
+    Parameters
+    ----------
+    view : CameraView
+        Fixed or moving camera; a fixed one has the time 0.
+    most : int
+        Maximum number of times, at least 2.
+    """
+    if view.motion is None:
+        return np.zeros(1)
+    timing = view.motion.timing
+    there = np.flatnonzero(timing.present)
+    chosen = np.linspace(0, max(len(there) - 1, 0), min(max(len(there), 1), most)).round()
+    frames = there[chosen.astype(int)] if len(there) else np.zeros(1)
+    return timing.start + frames / timing.frame_rate
+
+
+def placed_view(view: CameraView, placement: Floats) -> CameraView:
+    """Return a camera that is moved together with the scene that it shows.
+
+    With the placement X' = P X + p: R' = R P^T and T' = T - R' p.
+
+    Parameters
+    ----------
+    view : CameraView
+        Fixed or moving camera.
+    placement : (4, 4)
+        Rotation and translation.
+    """
+    turn, place = placement[:3, :3], placement[:3, 3]
+    rotation = view.rotation @ turn.T
+    moved = replace(view, rotation=rotation, translation=view.translation - rotation @ place)
+    if view.motion is None:
+        return moved
+    rotations = view.motion.rotations @ turn.T
+    translations = view.motion.translations - rotations @ place
+    motion = replace(view.motion, rotations=rotations, translations=translations)
+    return replace(moved, motion=motion)

@@ -10,6 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import (
     Frames,
@@ -23,7 +24,14 @@ from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
 
-__all__ = ["SampledAnimation", "frame_range", "frames_at", "sample_animation", "upright_animation"]
+__all__ = [
+    "SampledAnimation",
+    "frame_range",
+    "frames_at",
+    "rotated_frames",
+    "sample_animation",
+    "upright_animation",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -165,15 +173,30 @@ def upright_animation(
 
 
 def _rotated_upright(figure: Figure, frames: Frames) -> Frames:
-    """Return the frames rotated by 180 degrees about x: the root's rotation and its path.
+    """Return the frames rotated by 180 degrees about x."""
+    return rotated_frames(figure, frames, np.array([1.0, 0.0, 0.0, 0.0]))
+
+
+def rotated_frames(figure: Figure, frames: Frames, rotation: Floats) -> Frames:
+    """Return frames in a rotated world: the root's rotation and its path.
 
     With the root joint at p = s (rest + t) + T in the figure, R' = Q R and T' = Q p - s (rest + t).
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton.
+    frames : Frames
+        Its poses.
+    rotation : (4,)
+        Q, a unit quaternion of a rotation by a multiple of 90 degrees about an axis.
     """
-    half = np.array([1.0, 0.0, 0.0, 0.0])
     rotations = frames.rotations.copy()
     roots = np.flatnonzero(figure.require_skeleton().parents < 0)
-    rotations[:, roots] = multiply(half, rotations[:, roots])
+    rotations[:, roots] = multiply(rotation, rotations[:, roots])
     rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
     inner = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
-    place = (inner + frames.figure_translations) * np.array([1.0, -1.0, -1.0]) - inner
+    # A rotation by a multiple of 90 degrees has integer entries.
+    matrix = np.round(quaternion_to_matrix(rotation))
+    place = (inner + frames.figure_translations) @ matrix.T - inner
     return replace(frames, rotations=rotations, figure_translations=place)

@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from viewer.commands._baked_springs import add_spring_argument
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
+from viewer.commands._writing.baked_springs import add_spring_argument
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
@@ -22,7 +22,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import animation_files, motion_paths
-from viewer.export._options import GAPS, ROTATION_ORDERS
+from viewer.export._options import GAPS, QUATERNIONS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import printable
@@ -60,10 +60,16 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--to-unit", choices=METRES, help="unit of the file (default: cm in BVH)")
     group.add_argument(
-        "--to-up", choices=("y", "z"), help="up axis of the file (default: y in BVH)"
+        "--to-up", choices=("y", "z"), help="up axis of the file (default: y in BVH, z in SMPL-X)"
     )
     group.add_argument(
         "--rotation-order", choices=ROTATION_ORDERS, default="zyx", help="BVH (default: zyx)"
+    )
+    group.add_argument(
+        "--quaternions",
+        choices=QUATERNIONS,
+        default="xyzw",
+        help="arrays (.npz): order of the components (default: xyzw)",
     )
     group.add_argument(
         "--rest-frame", action="store_true", help="BVH: begin with a rest pose frame"
@@ -126,6 +132,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         unit=arguments.to_unit or "",
         up=arguments.to_up or "",
         rotation_order=arguments.rotation_order,
+        quaternions=arguments.quaternions,
         gaps="interpolate" if arguments.interpolate_gaps else arguments.gaps or "",
         rest_frame=arguments.rest_frame,
         digits=digits,

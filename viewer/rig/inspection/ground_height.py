@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["Ground", "ground_of"]
+__all__ = ["Ground", "ground_of", "resting_frames"]
 
 Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
 
@@ -73,7 +73,7 @@ def ground_of(
     likely : sequence of float
         Conventional ground heights, the most likely first.
     """
-    rests = lowest[_resting(lowest, present, step, size)]
+    rests = lowest[resting_frames(lowest, present, step, size)]
     levels = _levels(rests, size) if len(rests) > _RESTS * present.sum() else ()
     if not levels:
         return Ground(_guess(lowest[present], size, likely))
@@ -117,10 +117,20 @@ def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -
     return bool(long or steps)
 
 
-def _resting(lowest: Floats, present: Bools, step: float, size: float) -> Bools:
-    """Return the frames in which the lower foot is at constant height for some time: (F,)."""
+def resting_frames(
+    lowest: Floats, present: Bools, step: float, size: float, seconds: float = _LONG
+) -> Bools:
+    """Return the frames in which the lower foot is at constant height for some time: (F,).
+
+    Parameters
+    ----------
+    lowest, present, step, size
+        As for ``ground_of``.
+    seconds : float
+        Minimum duration.
+    """
     rests = np.zeros(len(lowest), dtype=np.bool_)
-    width = max(1, round(_LONG / step))
+    width = max(1, round(seconds / step))
     count = len(lowest) - width
     if count < 1:
         return rests

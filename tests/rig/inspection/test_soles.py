@@ -7,9 +7,9 @@ import pytest
 from lint.sound import legs, scene_of, standing
 
 import viewer
-from viewer.lint._soles import extent, soles_of
 from viewer.loading import bundled_body
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
+from viewer.rig.inspection.soles import extent, soles_of
 from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.skinning import deform, joint_matrices

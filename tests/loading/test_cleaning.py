@@ -1,0 +1,171 @@
+"""Clean-up of a scene: order of changes, notes, merging of people, refusals."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import keypoints, legs, standing
+from numpy.testing import assert_allclose, assert_array_equal
+
+from viewer.errors import RigError
+from viewer.loading.cleaning import CleanUp, clean_up
+from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+from viewer.rig.geometry.transform import rotation_transform
+from viewer.rig.motion.clip import Clip
+from viewer.rig.scene import Actor, Scene
+
+FIGURE = legs()
+
+
+def person(number: int, first: int, stop: int, x: float = 0.0) -> Actor:
+    """Return a person at x who is present in some of the frames 0 to 59, numbered from 100."""
+    frames = np.arange(60)
+    there = (frames >= first) & (frames < stop)
+    clip = standing(FIGURE)
+    timing = replace(clip.timing, rows=np.where(there, frames, -1).astype(np.int32), holds=False)
+    places = np.tile([x, 0.0, 0.0], (60, 1))
+    return Actor(
+        FIGURE, clip=replace(clip, timing=timing, figure_translations=places), person=number
+    )
+
+
+def keys(notes) -> list[str]:
+    return [note.key for note in notes]
+
+
+def test_nothing_is_changed_unless_requested():
+    scene = Scene([person(0, 0, 60)])
+    clip = scene.actors[0].clip
+    assert clean_up(scene, CleanUp()) == [] and scene.actors[0].clip is clip
+
+
+def test_tracks_are_merged_then_interpolated_then_trimmed_then_resampled():
+    scene = Scene([person(3, 0, 20), person(7, 24, 60, x=0.4)])
+    wanted = CleanUp(
+        merged=((3, 7),), interpolates=True, smoothing=SavitzkyGolay(), frames=(110, 131), rate=60.0
+    )
+    notes = clean_up(scene, wanted)
+    assert keys(notes) == [
+        "X006.merged", "X006.gaps", "X006.smoothed", "X006.trimmed", "X006.resampled",
+    ]  # fmt: skip
+    (actor,) = scene.actors
+    assert actor.person == 3
+    timing = actor.clip.timing
+    assert timing.n_frames == 41 and timing.present.all() and timing.frame_rate == 60.0
+    assert actor.clip.start == pytest.approx(10 / 30, abs=1e-12)
+    assert actor.is_present
+    assert str(notes[1]).endswith(
+        "4 missing frames in 1 gap interpolated; the longest is frames 120 to 123 (0.13 s)"
+    )
+
+
+def test_longer_gaps_remain_and_are_reported():
+    scene = Scene([person(0, 0, 10), person(1, 45, 60)])
+    notes = clean_up(scene, CleanUp(merged=((0, 1),), interpolates=True))
+    assert keys(notes) == ["X006.merged", "X006.gaps-left"]  # 35 frames are more than a second
+    assert notes[1].values["n"] == 1
+    scene = Scene([person(0, 0, 10), person(1, 45, 60)])
+    clean_up(scene, CleanUp(merged=((0, 1),), interpolates=True, longest_gap=35))
+    assert scene.actors[0].clip.timing.present.all()
+
+
+def test_one_person_tracked_twice_is_merged_with_the_frames_of_the_first():
+    scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=0.1)])
+    notes = clean_up(scene, CleanUp(merged=((1, 0),)))
+    assert keys(notes) == ["X006.merged", "X006.overlap"]
+    assert "2 frames (frames 128 to 129), 100 mm apart: those of person 1 are used" in str(notes[1])
+    (actor,) = scene.actors
+    places = actor.clip.figure_translations[actor.clip.timing.rows, 0]
+    assert_array_equal(places, [0.0] * 28 + [0.1] * 32)
+
+
+def test_two_people_are_not_merged():
+    scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=1.0)])
+    with pytest.raises(RigError, match="two people"):
+        clean_up(scene, CleanUp(merged=((0, 1),)))
+    assert len(scene.actors) == 2
+
+
+def test_missing_people_are_refused_with_the_known_numbers():
+    scene = Scene([person(0, 0, 30)])
+    with pytest.raises(RigError, match="among 0, found 5"):
+        clean_up(scene, CleanUp(merged=((0, 5),)))
+
+
+def test_keypoints_are_cleaned_too():
+    figure, clip = keypoints()
+    rows = clip.timing.rows.copy()
+    rows[5] = -1
+    clip = replace(clip, timing=replace(clip.timing, rows=rows))
+    scene = Scene([Actor(figure, clip=clip, person=2)])
+    notes = clean_up(scene, CleanUp(interpolates=True, smoothing=SavitzkyGolay()))
+    assert keys(notes) == ["X006.gaps", "X006.smoothed"]
+    found = scene.actors[0].clip
+    assert_allclose(found.points[found.timing.rows[5]], clip.points[0], atol=1e-12)
+
+
+def test_displacement_is_measured_in_millimetres():
+    # A spike of 100 mm in one frame: 5 points and degree 2 leave 17 / 35 of it.
+    actor = person(0, 0, 60)
+    places = np.zeros((60, 3))
+    places[30, 2] = 0.1
+    actor.clip = replace(actor.clip, figure_translations=places)
+    (note,) = clean_up(Scene([actor]), CleanUp(smoothing=SavitzkyGolay(window=5)))
+    largest = 100 * 18 / 35
+    assert f"by {largest:.3g} mm at most (pelvis, frame 130)" in str(note)
+
+
+@pytest.mark.parametrize("upside_down", [False, True])
+def test_feet_are_moved_to_the_ground(upside_down):
+    actor = person(0, 0, 60)
+    places = np.tile([0.3, 0.25, 0.0], (60, 1))  # the ankles are 0.1 above the origin
+    if upside_down:  # the world of the capture is; its placement makes it upright
+        actor.placement = rotation_transform(0, np.pi)
+        turn = np.tile([1.0, 0.0, 0.0, 0.0], (60, 1))
+        rotations = actor.clip.rotations.copy()
+        rotations[:, 0] = turn
+        # The pelvis at height 1 rotates in place; then it is 1.25 below the origin of the file.
+        places = np.tile([0.3, -2.25, 0.0], (60, 1))
+        actor.clip = replace(actor.clip, rotations=rotations)
+    actor.clip = replace(actor.clip, figure_translations=places)
+    scene = Scene([actor], world_up="y")
+    (note,) = clean_up(scene, CleanUp(grounds=True))
+    assert str(note).endswith("lowered by 350 mm: its feet rest at height 0")
+    expected = -1.9 if upside_down else -0.1
+    found = scene.actors[0].clip.figure_translations
+    assert_allclose(found, np.tile([0.3, expected, 0.0], (60, 1)), atol=1e-12)
+
+
+def test_feet_that_slide_are_held():
+    actor = person(0, 0, 60)
+    places = np.zeros((60, 3))
+    places[:, 2] = 0.1 * np.arange(60) / 59
+    actor.clip = replace(actor.clip, figure_translations=places)
+    (note,) = clean_up(Scene([actor]), CleanUp(locks_feet=True))
+    assert note.key == "X006.locked" and note.values["n"] == 2
+    assert (note.values["before"], note.values["after"]) == ("200 mm", "0 mm")
+
+
+def test_actors_without_feet_stay_where_they_are():
+    figure, clip = keypoints()
+    scene = Scene([Actor(figure, clip=clip)])
+    wanted = CleanUp(locks_feet=True, grounds=True)
+    assert keys(clean_up(scene, wanted)) == ["X006.no-legs", "X006.no-feet"]
+    assert scene.actors[0].clip is clip
+
+
+def test_clips_of_keys_are_refused_alone_and_reported_beside_captures():
+    keyed = Actor(FIGURE, clip=Clip("keys", (), 0.0, 1.0))
+    wanted = CleanUp(smoothing=SavitzkyGolay())
+    with pytest.raises(RigError, match="captured motion"):
+        clean_up(Scene([keyed]), wanted)
+    notes = clean_up(Scene([keyed, person(0, 0, 60)]), wanted)
+    assert keys(notes) == ["X006.keys", "X006.smoothed"]
+
+
+@pytest.mark.parametrize("frames", [(0, 10), (150, 161), (120, 120)])
+def test_ranges_outside_the_frames_of_the_file_are_refused(frames):
+    with pytest.raises(RigError, match="100:160"):
+        clean_up(Scene([person(0, 0, 60)]), CleanUp(frames=frames))

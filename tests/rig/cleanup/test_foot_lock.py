@@ -1,0 +1,144 @@
+"""Contacts of feet, legs that reach a target, and feet that are held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import FRAMES, RATE, legs, standing
+from numpy.testing import assert_allclose
+
+from viewer.rig.cleanup.foot_contacts import contacts
+from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
+from viewer.rig.cleanup.leg_ik import Leg, bend, reach
+from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.motion.evaluation import frames_of, world_frames
+
+FIGURE = legs()  # hips at y = 0.9, knees at 0.5, ankles at 0.1
+HIP, KNEE, ANKLE = np.array([[0.0, 0.9, 0.0]]), np.array([[0.0, 0.5, 0.05]]), np.zeros((1, 3))
+SIDE = np.array([[1.0, 0.0, 0.0]])
+THERE = np.ones(FRAMES, dtype=np.bool_)
+
+
+def bent(target) -> tuple[np.ndarray, np.ndarray]:
+    """Return the positions of knee and ankle for a target of the ankle."""
+    thigh, shin = bend(HIP, KNEE, ANKLE, np.array([target]), SIDE)
+    knee = HIP + (KNEE - HIP) @ quaternion_to_matrix(thigh)[0].T
+    return knee[0], (knee + (ANKLE - KNEE) @ quaternion_to_matrix(shin)[0].T)[0]
+
+
+def places(clip) -> np.ndarray:
+    times = clip.timing.start + np.arange(FRAMES) / RATE
+    return world_frames(FIGURE, frames_of(FIGURE, clip, times))[..., :3, 3]
+
+
+@pytest.mark.parametrize("target", [(0, 0, 0), (0.1, 0.05, 0.2), (-0.2, 0.3, -0.1), (0, 0.01, 0)])
+def test_the_ankle_is_at_its_target_and_bones_keep_their_lengths(target) -> None:
+    knee, ankle = bent(target)
+    assert_allclose(ankle, target, atol=1e-12)
+    assert np.linalg.norm(knee - HIP) == pytest.approx(np.linalg.norm(KNEE - HIP), abs=1e-12)
+    if target == (0, 0, 0):
+        assert_allclose(knee, KNEE[0], atol=1e-12)
+    if target[0] == 0:
+        assert abs(knee[0]) < 1e-12  # the leg stays in its plane
+
+
+def test_a_target_out_of_reach_is_approached() -> None:
+    _, ankle = bent((0.0, -1.0, 0.0))
+    away = ankle - HIP[0]
+    assert_allclose(away / np.linalg.norm(away), [0.0, -1.0, 0.0], atol=1e-9)
+    assert np.linalg.norm(away) == pytest.approx(reach(HIP, KNEE, ANKLE)[0], abs=1e-9)
+
+
+def test_a_straight_leg_bends_its_knee_forwards() -> None:
+    hip, knee, ankle = (np.array([[0.0, y, 0.0]]) for y in (0.9, 0.5, 0.1))
+    # The axis from right to left is +x, forwards is +z.
+    thigh, _ = bend(hip, knee, ankle, np.array([[0.0, 0.3, 0.0]]), SIDE)
+    moved = hip + (knee - hip) @ quaternion_to_matrix(thigh)[0].T
+    # Two sides of 0.4 over a base of 0.6.
+    assert_allclose(moved, [[0.0, 0.6, np.sqrt(0.4**2 - 0.3**2)]], atol=1e-9)
+
+
+def test_contacts_are_low_and_slow_with_hysteresis() -> None:
+    step = np.zeros((FRAMES, 3))
+    step[20:30, 1] = 0.1
+    assert contacts(step, THERE, RATE, 1.0, 1).tolist() == [not 20 <= k < 30 for k in range(60)]
+    step[:, 1] = 0.0
+    step[20:30, 1] = 0.03  # not low enough to begin, low enough to last
+    assert contacts(step, THERE, RATE, 1.0, 1).all()
+    step[:, 0] = 1.0 * np.arange(FRAMES) / RATE
+    assert not contacts(step, THERE, RATE, 1.0, 1).any()
+
+
+def test_contacts_end_at_gaps_and_are_not_shorter_than_a_tenth_of_a_second() -> None:
+    there = THERE.copy()
+    there[[10, 13]] = False
+    found = contacts(np.zeros((FRAMES, 3)), there, RATE, 1.0, 1)
+    assert not found[10:14].any() and found[:10].all() and found[14:].all()
+
+
+def test_legs_are_found_by_name() -> None:
+    assert legs_of(FIGURE.skeleton) == [Leg(1, 2, 3, 3), Leg(4, 5, 6, 6)]
+
+
+@pytest.mark.parametrize("up_down", [1.0, -1.0])
+def test_a_sliding_body_keeps_its_feet_and_is_lowered_where_legs_are_too_short(up_down) -> None:
+    moved = np.zeros((FRAMES, 7, 3))
+    moved[:, 0, 2] = 0.2 * np.linspace(-0.5, 0.5, FRAMES)  # 0.1 m/s
+    clip = standing(FIGURE, translations=moved)
+    if up_down < 0.0:
+        rotations = clip.rotations.copy()
+        rotations[:, 0] = 1.0, 0.0, 0.0, 0.0
+        clip = replace(clip, rotations=rotations)
+    found, lock = lock_feet(FIGURE, clip, 1, up_down)
+    before, after = places(clip), places(found)
+    assert lock.n_contacts == 2 and lock.before == pytest.approx(0.4)
+    for ankle in (3, 6):
+        assert_allclose(after[:, ankle], np.tile(before[:, ankle].mean(axis=0), (60, 1)), atol=1e-9)
+    assert lock.after < 1e-9
+    # At the ends, the ankles are 0.1 behind legs of 0.8.
+    needed = 0.8 - np.sqrt((0.9999 * 0.8) ** 2 - 0.1**2)
+    assert needed <= lock.lowered < needed + 1e-6
+    lowest = before[:, 0, 1] - up_down * lock.lowered
+    assert (up_down * (after[:, 0, 1] - lowest) > -1e-9).all()
+
+
+def test_feet_keep_their_orientation_and_other_joints_their_rotations() -> None:
+    moved = np.zeros((FRAMES, 7, 3))
+    moved[:, 0, 2] = 0.002 * np.arange(FRAMES)
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 7, 1))
+    for hip, knee in ((1, 2), (4, 5)):
+        rotations[:, hip] = rotation_vector_to_quaternion(np.array([-0.3, 0.0, 0.0]))
+        rotations[:, knee] = rotation_vector_to_quaternion(np.array([0.6, 0.0, 0.0]))
+    clip = standing(FIGURE, translations=moved, rotations=rotations)
+    found, lock = lock_feet(FIGURE, clip, 1)
+    times = np.arange(FRAMES) / RATE
+    worlds = [world_frames(FIGURE, frames_of(FIGURE, each, times)) for each in (clip, found)]
+    assert_allclose(worlds[1][:, [3, 6], :3, :3], worlds[0][:, [3, 6], :3, :3], atol=1e-9)
+    assert_allclose(found.rotations[:, 0], clip.rotations[:, 0])
+    assert lock.lowered == 0.0 and lock.after < 1e-9 < lock.before
+
+
+def test_feet_in_the_air_are_left_alone() -> None:
+    moved = np.zeros((FRAMES, 7, 3))
+    moved[:, 0, 2] = 3.0 * np.arange(FRAMES) / RATE
+    clip = standing(FIGURE, translations=moved)
+    found, lock = lock_feet(FIGURE, clip, 1)
+    assert lock.n_contacts == 0
+    assert_allclose(places(found), places(clip), atol=1e-12)
+
+
+def test_corrections_fade_after_the_contact() -> None:
+    moved = np.zeros((FRAMES, 7, 3))
+    lift = np.clip(np.arange(FRAMES) - 30, 0, None) * 0.01
+    moved[:, 0, 1] = lift
+    moved[:30, 0, 2] = 0.003 * np.arange(30)
+    moved[30:, 0, 2] = 0.09
+    clip = standing(FIGURE, translations=moved)
+    found, _ = lock_feet(FIGURE, clip, 1)
+    shift = places(found)[:, 3, 2] - places(clip)[:, 3, 2]
+    assert abs(shift[30]) > 0.02  # held up to here
+    assert_allclose(shift[45:], 0.0, atol=1e-9)
+    assert np.abs(np.diff(shift[32:])).max() < 0.02  # no jump on the way

@@ -1,0 +1,33 @@
+"""View through a calibrated camera, which may move."""
+
+from __future__ import annotations
+
+from viewer.app.core.state import AppState
+from viewer.rendering.camera import Camera, camera_from_view, follow_view
+from viewer.rig.captures.camera_view import CameraView
+
+__all__ = ["follow_calibrated", "look_through_view"]
+
+
+def look_through_view(state: AppState, view: CameraView) -> None:
+    """Look through a calibrated camera of the scene.
+
+    Raises
+    ------
+    RigError
+        If the size of the camera's images is unknown.
+    """
+    seen = camera_from_view(view, _size(state), state.scene.up, state.box, state.clock.time)
+    seen.front = state.camera.front
+    for name in Camera.__slots__:
+        setattr(state.camera, name, getattr(seen, name))
+
+
+def follow_calibrated(state: AppState) -> None:
+    """Move the camera with the moving calibrated camera that it looks through, if any."""
+    follow_view(state.camera, _size(state), state.clock.time, state.box)
+
+
+def _size(state: AppState) -> tuple[int, int]:
+    _, _, width, height = state.view_rect
+    return max(round(width), 1), max(round(height), 1)

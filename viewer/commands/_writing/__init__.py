@@ -1,0 +1,1 @@
+"""Parts of ``convert`` that write motions and characters."""

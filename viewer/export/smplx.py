@@ -1,0 +1,100 @@
+"""Exporter of SMPL-X motions as programs that retarget people to robots read them.
+
+::
+
+    root_orient (N, 3)   pose_body (N, 63)   pose_hand (N, 90)   pose_jaw (N, 3)   pose_eye (N, 6)
+    poses (N, 165)   trans (N, 3)   betas (16,)   num_betas   gender "neutral"
+    mocap_frame_rate   mocap_framerate   mocap_time_length   surface_model_type "smplx"   up
+
+This is the layout of AMASS for SMPL-X: GMR reads ``pose_body``, ``root_orient``, ``trans``,
+``betas``, ``gender`` and ``mocap_frame_rate``; PHC and its relatives read ``poses``, of which they
+use the first 66 columns, ``trans``, ``betas``, ``gender`` and ``mocap_framerate``. They expect z up
+and one shape. ``up``, and ``present`` if frames are missing, are extensions.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.diagnostics import Diagnostic
+from viewer.export._family_frames import FamilyFrames
+from viewer.export._options import MotionOptions
+from viewer.export.amass import padded, write_layout
+from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.smpl_family import FAMILY
+
+__all__ = ["export_animation"]
+
+_MEMBER = FAMILY[55]
+_PARTS = {
+    "root_orient": slice(0, 1),
+    "pose_body": slice(1, 22),
+    "pose_jaw": slice(22, 23),
+    "pose_eye": slice(23, 25),
+    "pose_hand": slice(25, 55),
+}
+"""Joints of each array, in the order of SMPL-X."""
+
+
+def export_animation(
+    animation: SampledAnimation, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
+    """Write a motion of a body of the family, z up unless another up axis is requested.
+
+    Parameters
+    ----------
+    animation : SampledAnimation
+        Animation of a body with the joints of SMPL, SMPL+H or SMPL-X. Joints that it lacks have
+        rotations of 0.
+    path : Path
+        The file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
+    options : MotionOptions
+        Up axis and gaps.
+
+    Returns
+    -------
+    list of Diagnostic
+        Notes: the written files, then the data that the format cannot store.
+
+    Raises
+    ------
+    RigError, OutputError
+        As for ``viewer.export.amass.export_animation``.
+    """
+    wanted = replace(options, up=options.up or "z")
+    notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)
+    weights = animation.frames.shape_weights
+    if len(weights) > 1:
+        notes.append(Diagnostic("X005.shape-averaged", values={"n": len(weights)}))
+    if len(animation.figure.require_skeleton().names) != len(_MEMBER.names):
+        notes.append(Diagnostic("X005.as-smplx", values={"figure": animation.figure.name}))
+    return notes
+
+
+def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
+    vectors = np.zeros((len(body.vectors[part]), len(_MEMBER.names), 3))
+    for row, name in enumerate(body.member.names):
+        if name in _MEMBER.names:  # SMPL's hands have no joint of their own in SMPL-X
+            vectors[:, _MEMBER.names.index(name)] = body.vectors[part, row]
+    count = len(vectors)
+    arrays: dict[str, NDArray[Any]] = {
+        key: vectors[:, joints].reshape(count, -1) for key, joints in _PARTS.items()
+    }
+    shape = padded(body.shape.mean(axis=0, keepdims=True))[0]
+    return arrays | {
+        "poses": vectors.reshape(count, -1),
+        "trans": body.translations[part],
+        "betas": shape,
+        "num_betas": np.array(len(shape)),
+        "gender": np.array("neutral"),
+        "surface_model_type": np.array("smplx"),
+        "mocap_frame_rate": np.array(float(rate)),
+        "mocap_framerate": np.array(float(rate)),
+        "mocap_time_length": np.array(count / rate),
+        "up": np.array(up),
+    }

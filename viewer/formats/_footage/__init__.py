@@ -1,0 +1,1 @@
+"""Footage of cameras: the frames of a video."""

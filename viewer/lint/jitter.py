@@ -1,0 +1,152 @@
+"""Check of captured motions for jitter: noise from frame to frame."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from viewer.lint._finding import Finding, Subject
+from viewer.lint._tracks import track_of
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.points import PointClip
+from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.skeleton import joint_labels
+
+__all__ = ["check", "noise_of"]
+
+_LIMIT = 0.005  # relative to the size at rest: 10 mm for a person with spread arms
+_POINT_LIMIT = 0.02  # relative to the median size: triangulated points are noisier
+_WINDOW = 0.5  # seconds over which noise is averaged: a jump is not jitter
+_SLOWEST = 24.0  # frames per second; below, people move too far between frames
+_STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
+_FRACTION = 0.3  # of the window: with fewer, steps and other events would count as noise
+# The fourth difference of white noise has 70 times its variance. 30 % of the vectors of three
+# normal numbers are shorter than 1.193, their quadratic mean is sqrt(3), for a deviation of 1.
+_RMS = np.sqrt(3.0) / (np.sqrt(70.0) * 1.1932)
+_TOGETHER = 2000  # frames per batch
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Check the joints or points of a captured motion."""
+    clip = subject.actor.clip
+    if isinstance(clip, PointClip):
+        return _points(subject, clip)
+    if not isinstance(clip, SampledClip) or clip.timing.frame_rate < _SLOWEST:
+        return []
+    track = track_of(subject)
+    skeleton = subject.actor.figure.skeleton
+    if track is None or skeleton is None or not track.size > 0.0:
+        return []
+    noise = noise_of(track.positions, track.present, _width(clip.timing.frame_rate))
+    limit = _LIMIT * track.size
+    labels = [*joint_labels(skeleton)]
+    values = {
+        "noise": subject.length(float(noise.max()) / track.scale),
+        "limit": subject.length(limit / track.scale),
+    }
+    return _found(subject, noise, limit, labels, values, track.numbers, track.times)
+
+
+def _points(subject: Subject, clip: PointClip) -> list[Finding]:
+    timing, layout = clip.timing, subject.actor.figure.points
+    if timing.frame_rate < _SLOWEST or layout is None or not timing.present.any():
+        return []
+    rows = clip.points[np.maximum(timing.rows, 0)]
+    seen = (rows[..., 3] > 0.0) & timing.present[:, None]
+    limit = _POINT_LIMIT * _size(rows[..., :3], seen)
+    width = _width(timing.frame_rate)
+    noise = np.zeros(seen.shape)
+    for point in range(seen.shape[1]):
+        noise[:, point] = noise_of(rows[:, point, None, :3], seen[:, point], width)[:, 0]
+    names = [*layout.names, *(f"point {k}" for k in range(len(layout.names), seen.shape[1]))]
+    frames = np.arange(timing.n_frames)
+    values = {"noise": f"{noise.max():.3g} units", "limit": f"{limit:.3g} units"}
+    times = timing.start + frames / timing.frame_rate + subject.actor.offset
+    numbers = frames + timing.first_frame
+    return _found(subject, noise, limit, names, values, numbers, times)
+
+
+def _found(
+    subject: Subject,
+    noise: Floats,
+    limit: float,
+    labels: list[str],
+    values: dict[str, Any],
+    numbers: np.ndarray,
+    times: Floats,
+) -> list[Finding]:
+    """Report the joints whose noise (F, J) exceeds a limit."""
+    highest = noise.max(axis=1, initial=0.0)
+    frames = np.flatnonzero(highest > limit)
+    if limit <= 0.0 or len(frames) == 0:
+        return []
+    frames = frames[np.argsort(-highest[frames], kind="stable")]
+    order = np.argsort(-noise.max(axis=0), kind="stable")
+    joints = order[noise[:, order].max(axis=0) > limit]
+    return [
+        subject.found(
+            "C014.jitter",
+            n=len(frames),
+            all=int((~np.isnan(highest)).sum()),
+            joint=labels[joints[0]],
+            **values,
+            frame=int(numbers[frames[0]]),
+            part="clip",
+            joints=joints,
+            frames=numbers[frames],
+            times=times[frames],
+            at=("frames", int(frames[0])),
+        )
+    ]
+
+
+def noise_of(positions: Floats, present: Bools, width: int) -> Floats:
+    """Return the noise around each frame: the quadratic mean of its length.
+
+    It is estimated from the smaller fourth differences in a window, which slow motion and jumps
+    hardly change.
+
+    Parameters
+    ----------
+    positions : (F, J, 3)
+        Positions of joints.
+    present : (F,)
+        Frames that have positions; windows do not span gaps.
+    width : int
+        Length of the window, frames.
+
+    Returns
+    -------
+    (F, J)
+        In the unit of the positions; 0 where a run of frames is shorter than the window.
+    """
+    noise = np.zeros(positions.shape[:2])
+    for first, stop in runs_of(present):
+        for start in range(first, stop, _TOGETHER):
+            end = min(start + _TOGETHER + width + 4, stop)
+            if end - start < width + 4:
+                continue
+            part = positions[start:end]
+            count = end - start - 4
+            fourth = sum(c * part[k : k + count] for k, c in enumerate(_STENCIL.tolist()))
+            lengths = np.linalg.norm(np.asarray(fourth), axis=-1)
+            windows = np.lib.stride_tricks.sliding_window_view(lengths, width, axis=0)
+            middle = start + 2 + width // 2
+            place = round(_FRACTION * (width - 1))
+            smaller = np.partition(windows, place, axis=-1)[..., place]
+            noise[middle : middle + len(windows)] = _RMS * smaller
+    return noise
+
+
+def _width(rate: float) -> int:
+    return 2 * round(0.5 * _WINDOW * rate) + 1
+
+
+def _size(places: Floats, seen: Bools) -> float:
+    """Return the median size of the box around the visible points."""
+    low = np.where(seen[..., None], places, np.inf).min(axis=1)
+    high = np.where(seen[..., None], places, -np.inf).max(axis=1)
+    known = seen.any(axis=1)
+    return float(np.median(np.linalg.norm(high[known] - low[known], axis=1))) if known.any() else 0

@@ -1,0 +1,192 @@
+"""Checks of captured people: two who exchange their numbers, and tracks that break off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.lint._finding import Finding, Subject
+from viewer.lint._track import Indices
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.person import is_tracked, person_label
+from viewer.rig.captures.points import PointClip
+from viewer.rig.mesh import bounding_box, box_size
+from viewer.rig.motion.evaluation import frames_of, rest_translations_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.scene import Actor
+from viewer.rig.shape import rest_joints
+
+__all__ = ["check"]
+
+# Lengths are relative to the size of the body.
+_JUMPS = 0.15  # smallest jump of both people between two frames: 0.3 m for a person
+_BETTER = 0.5  # largest ratio of the steps with exchanged numbers to those without
+_NEAR = 0.25  # largest distance between the end of one track and the start of another
+_LATER = 1.0  # seconds: longest pause between them
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Path:
+    """Way of one person through the scene.
+
+    Attributes
+    ----------
+    timing : Timing
+        Frames.
+    present : (F,) bool
+        Frames with a position.
+    places : (F, 3)
+        Positions of the root, or the mean of the visible points, scene space.
+    size : float
+        Size of the body, scene units.
+    """
+
+    timing: Timing
+    present: Bools
+    places: Floats
+    size: float
+
+
+def check(subject: Subject) -> list[Finding]:
+    """Compare a captured person with the others in the recording."""
+    actor = subject.actor
+    if actor.person is None or not is_tracked(actor.person) or len(subject.people) < 2:
+        return []
+    own = _path(actor)
+    if own is None or not own.present.any():
+        return []
+    findings = []
+    is_later = False
+    for other in subject.people:
+        if other is actor:
+            is_later = True
+            continue
+        path = _path(other) if _are_alike(actor, other) else None
+        if path is None or not path.present.any():
+            continue
+        if is_later:
+            findings += _exchanged(subject, other, own, path)
+        findings += _continued(subject, other, own, path)
+    return findings
+
+
+def _are_alike(one: Actor, other: Actor) -> bool:
+    """Return whether two people are on one timeline, both as bodies or both as points."""
+    a, b = one.clip, other.clip
+    if not isinstance(a, SampledClip | PointClip) or type(a) is not type(b):
+        return False
+    if one.offset != other.offset or one.title != other.title or b is None:
+        return False
+    first, second = a.timing, b.timing
+    return (first.frame_rate, first.first_frame, first.n_frames) == (
+        second.frame_rate,
+        second.first_frame,
+        second.n_frames,
+    )
+
+
+def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[Finding]:
+    """Report frames in which two people jump to each other's places."""
+    both = np.flatnonzero(one.present & two.present)
+    if len(both) < 2:
+        return []
+    before, after = both[:-1], both[1:]
+    kept = np.maximum(
+        _distance(one.places[after], one.places[before]),
+        _distance(two.places[after], two.places[before]),
+    )
+    least = np.minimum(
+        _distance(one.places[after], one.places[before]),
+        _distance(two.places[after], two.places[before]),
+    )
+    swapped = np.maximum(
+        _distance(one.places[after], two.places[before]),
+        _distance(two.places[after], one.places[before]),
+    )
+    near = after - before <= max(1.0, _LATER * one.timing.frame_rate)
+    frames = after[near & (least > _JUMPS * one.size) & (swapped < _BETTER * kept)]
+    if len(frames) == 0:
+        return []
+    number = int(frames[0]) + one.timing.first_frame
+    return [
+        subject.found(
+            "C015.exchanged",
+            other=person_label(other.person or 0),
+            n=len(frames),
+            frames_text=[str(frame + one.timing.first_frame) for frame in frames.tolist()],
+            distance=_length(subject, float(kept[np.searchsorted(after, frames[0])])),
+            frame=number,
+            part="clip",
+            frames=frames + one.timing.first_frame,
+            times=_times(subject, one, frames),
+        )
+    ]
+
+
+def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[Finding]:
+    """Report a person who appears where another one has just disappeared for good."""
+    first, last = int(np.flatnonzero(own.present)[0]), int(np.flatnonzero(path.present)[-1])
+    pause = first - last
+    if not 0 < pause <= _LATER * own.timing.frame_rate:
+        return []
+    apart = float(_distance(own.places[first], path.places[last]))
+    if apart > _NEAR * own.size:
+        return []
+    numbers = own.timing.first_frame + np.array([first])
+    return [
+        subject.found(
+            "C015.continued",
+            other=person_label(other.person or 0),
+            first=first + own.timing.first_frame,
+            last=last + own.timing.first_frame,
+            distance=_length(subject, apart),
+            ids=f"{other.person},{subject.actor.person}",
+            part="clip",
+            severity="note",
+            frames=numbers,
+            times=_times(subject, own, np.array([first])),
+        )
+    ]
+
+
+def _path(actor: Actor) -> _Path | None:
+    """Return the way of a captured person; None without a captured motion."""
+    clip, figure = actor.clip, actor.figure
+    turn, place = actor.placement[:3, :3], actor.placement[:3, 3]
+    scale = float(np.cbrt(abs(np.linalg.det(turn))))
+    if isinstance(clip, PointClip):
+        points = clip.points[np.maximum(clip.timing.rows, 0)]
+        seen = points[..., 3:] > 0.0
+        present = clip.timing.present & seen.any(axis=(1, 2))
+        count = np.maximum(seen.sum(axis=1), 1)
+        means = np.where(seen, points[..., :3], 0.0).sum(axis=1) / count
+        low = np.where(seen, points[..., :3], np.inf).min(axis=1)
+        high = np.where(seen, points[..., :3], -np.inf).max(axis=1)
+        sizes = np.linalg.norm(high[present] - low[present], axis=1)
+        size = float(np.median(sizes)) if len(sizes) else 0.0
+        return _Path(clip.timing, present, means @ turn.T + place, scale * size)
+    if not isinstance(clip, SampledClip) or figure.skeleton is None:
+        return None
+    times = clip.timing.start + np.arange(clip.timing.n_frames) / clip.timing.frame_rate
+    frames = frames_of(figure, clip, times, actor.pose)
+    rest = rest_translations_of(figure, frames.shape_weights)[:, 0]
+    roots = frames.figure_scales[:, None] * (rest + frames.translations[:, 0])
+    roots = roots + frames.figure_translations
+    size = box_size(bounding_box(rest_joints(figure)))
+    return _Path(clip.timing, frames.present, roots @ turn.T + place, scale * size)
+
+
+def _distance(one: Floats, other: Floats) -> Floats:
+    return np.linalg.norm(one - other, axis=-1)
+
+
+def _length(subject: Subject, length: float) -> str:
+    scale = float(np.cbrt(abs(np.linalg.det(subject.actor.placement[:3, :3])))) or 1.0
+    return subject.length(length / scale)
+
+
+def _times(subject: Subject, path: _Path, frames: Indices) -> Floats:
+    timing = path.timing
+    return timing.start + frames / timing.frame_rate + subject.actor.offset

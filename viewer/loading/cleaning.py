@@ -1,0 +1,291 @@
+"""Clean-up of the captured motions of a scene, with a report of every change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import RigError
+from viewer.loading.merging import merge_people
+from viewer.rig.captures.points import PointClip
+from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
+from viewer.rig.cleanup.foot_lock import legs_of, lock_feet
+from viewer.rig.cleanup.frame_rows import Captured
+from viewer.rig.cleanup.gap_filling import interpolate_gaps
+from viewer.rig.cleanup.one_euro import OneEuro
+from viewer.rig.cleanup.resampling import resampled
+from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+from viewer.rig.cleanup.smoothing import smoothed
+from viewer.rig.cleanup.trimming import trimmed
+from viewer.rig.inspection.resting_height import resting_height
+from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.upright import own_up
+from viewer.rig.scalars import length_text
+from viewer.rig.scene import Actor, Scene
+from viewer.rig.skeleton import joint_labels
+from viewer.rig.units import METRES
+
+__all__ = ["CleanUp", "clean_up"]
+
+Smoothing = OneEuro | SavitzkyGolay
+
+_ROUNDING = 1e-9  # scene or figure units
+
+
+@dataclass(frozen=True, slots=True)
+class CleanUp:
+    """Requested changes of captured motions, in the order in which they are made.
+
+    Attributes
+    ----------
+    merged : tuple of tuple of int
+        Numbers of people whose tracks belong to one person, who keeps the first number.
+    interpolates : bool
+        Whether gaps are interpolated.
+    longest_gap : int or None
+        Longest gap to interpolate, frames; None for one second.
+    smoothing : OneEuro, SavitzkyGolay or None
+        The filter.
+    locks_feet : bool
+        Whether feet that stand are held in place.
+    grounds : bool
+        Whether people are moved up or down until their feet rest at height 0.
+    frames : (int or None, int or None) or None
+        First frame to keep and the frame after the last one, with the numbers of the file; None for
+        the motion's own ends.
+    rate : float or None
+        New frames per second.
+    """
+
+    merged: tuple[tuple[int, ...], ...] = ()
+    interpolates: bool = False
+    longest_gap: int | None = None
+    smoothing: Smoothing | None = None
+    locks_feet: bool = False
+    grounds: bool = False
+    frames: tuple[int | None, int | None] | None = None
+    rate: float | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is requested."""
+        return self == CleanUp()
+
+
+def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
+    """Clean up the captured motions of a scene, in place, and pose it again.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene whose captures have been read completely. Clips of keys are not changed.
+    wanted : CleanUp
+        Requested changes.
+
+    Returns
+    -------
+    list of Diagnostic
+        What was changed, and by how much joints move.
+
+    Raises
+    ------
+    RigError
+        If there is no captured motion, a person to be merged is missing or is somebody else, or no
+        frame is in the range.
+    """
+    if wanted.is_empty:
+        return []
+    if not any(isinstance(actor.clip, Captured) for actor in scene.actors):
+        raise RigError("clean-up: expected a captured motion, found none")
+    notes = [note for people in wanted.merged for note in merge_people(scene, people)]
+    for actor in scene.actors:
+        clip = actor.clip
+        if not isinstance(clip, Captured):
+            if clip is not None:
+                notes.append(Diagnostic("X006.keys", values={"figure": actor.name}))
+            continue
+        actor.clip, said = _cleaned(scene, actor, clip, wanted)
+        notes += said
+    time = _start(scene.actors) if scene.time is None else scene.time
+    for actor in scene.actors:
+        pose_actor(actor, time)
+    if scene.in_space is not None:
+        scene.in_space = partial(_cleaned_in, scene.in_space, wanted)
+    return notes
+
+
+def _cleaned_in(in_space: Callable[[str], Scene], wanted: CleanUp, space: str) -> Scene:
+    """Return a scene in another space, cleaned up in the same way."""
+    scene = in_space(space)
+    clean_up(scene, wanted)
+    return scene
+
+
+def _start(actors: Iterable[Actor]) -> float:
+    return min((a.clip.start + a.offset for a in actors if a.clip is not None), default=0.0)
+
+
+def _cleaned(
+    scene: Scene, actor: Actor, clip: Captured, wanted: CleanUp
+) -> tuple[Captured, list[Diagnostic]]:
+    """Return the cleaned motion of one actor, and notes about it."""
+    notes: list[Diagnostic] = []
+    if wanted.interpolates:
+        clip, notes = _interpolated(actor, clip, wanted.longest_gap)
+    if wanted.smoothing is not None:
+        clip, said = _smoothed(actor, clip, wanted.smoothing)
+        notes.append(said)
+    if wanted.locks_feet:
+        clip, said = _locked(scene, actor, clip)
+        notes.append(said)
+    if wanted.grounds:
+        clip, said = _grounded(scene, actor, clip)
+        notes.append(said)
+    if wanted.frames is not None:
+        clip, said = _trimmed(actor, clip, wanted.frames)
+        notes.append(said)
+    if wanted.rate is not None and wanted.rate != clip.timing.frame_rate:
+        clip, said = _resampled(actor, clip, wanted.rate)
+        notes.append(said)
+    return clip, notes
+
+
+def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured, Diagnostic]:
+    found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
+    values = {"filter": _filter_phrase(chosen, clip.timing.frame_rate)}
+    return found, _note("X006.smoothed", actor, values, clip, found)
+
+
+def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
+    """Return a motion whose feet do not slide while they stand."""
+    figure = actor.figure
+    if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
+        return clip, Diagnostic("X006.no-legs", values={"figure": actor.name})
+    axis, hangs = own_up(scene, actor)
+    found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
+    if not lock.n_contacts:
+        return clip, Diagnostic("X006.no-contacts", values={"figure": actor.name})
+    values = {
+        "n": lock.n_contacts,
+        "before": length_text(figure, lock.before),
+        "after": length_text(figure, lock.after if lock.after > _ROUNDING else 0.0),
+        "lowered": length_text(figure, lock.lowered) if lock.lowered > _ROUNDING else "",
+    }
+    return found, _note("X006.locked", actor, values, clip, found)
+
+
+def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
+    """Return a motion whose feet rest at height 0 of the scene."""
+    found = resting_height(replace(actor, clip=clip), scene.up)
+    if found is None or isinstance(clip, PointClip):
+        return clip, Diagnostic("X006.no-feet", values={"figure": actor.name})
+    height = 0.0 if abs(found.height) < _ROUNDING else found.height
+    lift = np.zeros(3)
+    lift[2 if scene.up == "z" else 1] = -height
+    moved = np.linalg.solve(actor.placement[:3, :3], lift)
+    place = np.zeros((clip.n_rows, 3)) if actor.pose is None else actor.pose.figure_translation
+    own = clip.figure_translations
+    places = moved + (np.broadcast_to(place, (clip.n_rows, 3)) if own is None else own)
+    values = {
+        "figure": actor.name,
+        "height": length_text(actor.figure, abs(height)),
+        "way": Phrase("lowered" if height > 0.0 else "raised"),
+    }
+    key = "X006.grounded" if found.is_clear else "X006.grounded-lowest"
+    return replace(clip, figure_translations=places), Diagnostic(key, values=values)
+
+
+def _resampled(actor: Actor, clip: Captured, rate: float) -> tuple[Captured, Diagnostic]:
+    found = resampled(clip, rate)
+    values = {
+        "old": clip.timing.frame_rate,
+        "new": rate,
+        "before": clip.timing.n_frames,
+        "after": found.timing.n_frames,
+    }
+    return found, _note("X006.resampled", actor, values, clip, found)
+
+
+def _trimmed(
+    actor: Actor, clip: Captured, frames: tuple[int | None, int | None]
+) -> tuple[Captured, Diagnostic]:
+    timing = clip.timing
+    first = 0 if frames[0] is None else frames[0] - timing.first_frame
+    stop = timing.n_frames if frames[1] is None else frames[1] - timing.first_frame
+    if not 0 <= first < stop <= timing.n_frames:
+        low, high = timing.first_frame, timing.first_frame + timing.n_frames
+        asked = ":".join("" if end is None else str(end) for end in frames)
+        raise RigError(
+            f"frames to keep: expected a range within {low}:{high} (frames {low} to {high - 1}), "
+            f"found {asked}"
+        )
+    found = trimmed(clip, first, stop)
+    number = found.timing.first_frame
+    values = {"first": number, "last": number + stop - first - 1, "n": stop - first}
+    values["all"] = timing.n_frames
+    return found, Diagnostic("X006.trimmed", values={"figure": actor.name, **values})
+
+
+def _interpolated(
+    actor: Actor, clip: Captured, longest: int | None
+) -> tuple[Captured, list[Diagnostic]]:
+    timing = clip.timing
+    limit = max(1, round(timing.frame_rate)) if longest is None else longest
+    clip, gaps = interpolate_gaps(clip, limit)
+    notes = []
+    if gaps.closed:
+        first, stop = max(gaps.closed, key=lambda gap: gap[1] - gap[0])
+        values = {
+            "n": sum(b - a for a, b in gaps.closed),
+            "gaps": len(gaps.closed),
+            "longest": _frames(first + timing.first_frame, stop + timing.first_frame),
+            "seconds": (stop - first) / timing.frame_rate,
+        }
+        notes.append(Diagnostic("X006.gaps", values={"figure": actor.name, **values}))
+    if gaps.left:
+        spans = [_frames(a + timing.first_frame, b + timing.first_frame) for a, b in gaps.left]
+        values = {"n": len(gaps.left), "limit": limit, "gaps": spans}
+        notes.append(Diagnostic("X006.gaps-left", values={"figure": actor.name, **values}))
+    return clip, notes
+
+
+def _frames(first: int, stop: int) -> Phrase:
+    if stop == first + 1:
+        return Phrase("one-frame", frame=first)
+    return Phrase("frame-range", first=first, last=stop - 1)
+
+
+def _filter_phrase(chosen: Smoothing, rate: float) -> Phrase:
+    if isinstance(chosen, OneEuro):
+        return Phrase("one-euro", cutoff=chosen.cutoff, beta=chosen.beta)
+    return Phrase("savgol", n=chosen.frames(rate), order=chosen.order)
+
+
+def _note(
+    key: str, actor: Actor, values: Mapping[str, object], before: Captured, after: Captured
+) -> Diagnostic:
+    """Return a note with the displacement of joints or points."""
+    figure = actor.figure
+    labels: Sequence[str] = ()
+    if isinstance(before, SampledClip) and isinstance(after, SampledClip):
+        found = joint_displacement(figure, before, after)
+        labels, part = joint_labels(figure.require_skeleton()), Phrase("moved-joints")
+    elif isinstance(before, PointClip) and isinstance(after, PointClip):
+        found = point_displacement(before, after)
+        labels = () if figure.points is None else figure.points.names
+        part = Phrase("moved-points")
+    where: object = ""
+    if found.largest and found.joint < len(labels):
+        where = Phrase("joint-in-frame", joint=labels[found.joint], frame=found.frame)
+    moved = {
+        "part": part,
+        "mean": length_text(figure, found.mean),
+        "largest": length_text(figure, found.largest),
+        "where": where,
+    }
+    return Diagnostic(key, values={"figure": actor.name, **values, **moved})

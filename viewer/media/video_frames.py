@@ -1,0 +1,188 @@
+"""Frames of a video by time, decoded with PyAV, which is imported only when needed."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, ViewerError
+from viewer.rig.arrays import Bytes
+
+__all__ = ["VideoFrames"]
+
+_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is quick
+_FEWEST = 2  # frames that are kept however large they are
+_AHEAD = 2.0  # seconds to decode forwards rather than to seek
+_ON_TIME = 1e-6  # seconds
+
+
+@dataclass(frozen=True, slots=True)
+class _Decoded:
+    """A decoded frame, which is shown from halfway after the previous one.
+
+    Attributes
+    ----------
+    begins, ends : float
+        Seconds between which it is the nearest frame.
+    frame : av.VideoFrame
+        The frame.
+    """
+
+    begins: float
+    ends: float
+    frame: Any
+
+
+class VideoFrames:
+    """Reads the frame of a video that is nearest to a time.
+
+    Frames are decoded in the order of time. The last ones are kept; an earlier time, or one far
+    ahead, is sought from the key frame before it.
+
+    Parameters
+    ----------
+    path : Path
+        The video.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Width and height of the upright picture, pixels.
+    rate : float
+        Frames per second, on average.
+    n_frames : int
+        Number of frames according to the file; 0 if it does not state it.
+
+    Raises
+    ------
+    ViewerError
+        If PyAV is not installed.
+    FormatError
+        If the file is not a readable video.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._errors: Any = _library()
+        try:
+            path.open("rb").close()  # FFmpeg's own messages do not name the reason
+        except OSError as problem:
+            values = {"reason": str(problem.strerror or problem)}
+            raise FormatError(Diagnostic("F001.video", path, values=values)) from None
+        try:
+            self._container = self._errors.open(str(path))
+        except (self._errors.FFmpegError, ValueError):
+            raise FormatError(Diagnostic("F002.video", path)) from None
+        streams = self._container.streams.video
+        if not streams:
+            raise FormatError(Diagnostic("F002.video-stream", path))
+        self._stream = streams[0]
+        self._stream.thread_type = "AUTO"
+        self.rate = float(self._stream.average_rate or self._stream.guessed_rate or 0.0)
+        self.n_frames = int(self._stream.frames)
+        self._kept: deque[_Decoded] = deque()
+        self._source: Iterator[Any] = iter(())
+        self._start, self._is_over = 0.0, False
+        self._restart(0.0)
+        first = self._next()
+        if first is None or not self.rate > 0.0:
+            raise FormatError(Diagnostic("F002.video", path))
+        turned = _quarter_turns(first.frame) % 2
+        wide, high = first.frame.width, first.frame.height
+        self.size = (high, wide) if turned else (wide, high)
+
+    def at(self, seconds: float) -> Bytes | None:
+        """Return the pixels of the frame nearest to a time; None outside the video.
+
+        Parameters
+        ----------
+        seconds : float
+            Seconds from the video's first frame.
+
+        Returns
+        -------
+        (H, W, 4) uint8 or None
+            First row at the top, upright.
+
+        Raises
+        ------
+        FormatError
+            If the file is damaged there.
+        """
+        found = self._find(seconds)
+        if found is None:
+            return None
+        pixels: Bytes = found.frame.to_ndarray(format="rgba")
+        return np.ascontiguousarray(np.rot90(pixels, _quarter_turns(found.frame)))
+
+    def _find(self, seconds: float) -> _Decoded | None:
+        half = 0.5 / self.rate
+        if seconds < -half - _ON_TIME:
+            return None
+        last = self._kept[-1].ends if self._kept else np.inf
+        first = self._kept[0].begins if self._kept else np.inf
+        if seconds < first or (seconds > last + _AHEAD and not self._is_over):
+            self._restart(seconds)
+        for known in self._kept:
+            if known.begins - _ON_TIME <= seconds < known.ends - _ON_TIME:
+                return known
+        while (found := self._next()) is not None:
+            if seconds < found.ends - _ON_TIME:
+                return found
+        return None
+
+    def _restart(self, seconds: float) -> None:
+        """Continue decoding at the key frame before a time."""
+        stream = self._stream
+        begin = stream.start_time or 0
+        self._start = float(begin * stream.time_base)
+        # One frame earlier, since the frame before the wanted one determines when that begins.
+        target = max(seconds - 1.5 / (self.rate or 1.0), 0.0)
+        try:
+            self._container.seek(begin + int(target / stream.time_base), stream=stream)
+        except self._errors.FFmpegError:
+            values = {"seconds": seconds}
+            raise FormatError(Diagnostic("F002.video-frame", self.path, values=values)) from None
+        self._source, self._is_over = self._container.decode(stream), False
+        self._kept.clear()
+
+    def _next(self) -> _Decoded | None:
+        """Return the next frame and keep it; None after the last one."""
+        half = 0.5 / (self.rate or 1.0)
+        try:
+            frame = next(self._source, None)
+        except self._errors.FFmpegError:
+            self._source = iter(())
+            seconds = self._kept[-1].ends if self._kept else 0.0
+            values = {"seconds": seconds}
+            raise FormatError(Diagnostic("F002.video-frame", self.path, values=values)) from None
+        if frame is None:
+            self._is_over = True
+            return None
+        time = float(frame.time or 0.0) - self._start
+        begins = self._kept[-1].ends if self._kept else time - half
+        found = _Decoded(begins, time + half, frame)
+        self._kept.append(found)
+        size = 2 * frame.width * frame.height  # at most, for usual pixel formats
+        while len(self._kept) > max(_FEWEST, _BYTES // max(size, 1)):
+            self._kept.popleft()
+        return found
+
+
+def _library() -> Any:
+    try:
+        import av
+    except ImportError:
+        raise ViewerError("videos need PyAV, which is not installed: pip install av") from None
+    return av
+
+
+def _quarter_turns(frame: Any) -> int:
+    """Return the quarter turns, anticlockwise, that make a frame upright, as cameras record it."""
+    return round(getattr(frame, "rotation", 0) / 90) % 4

@@ -1,0 +1,1 @@
+"""Clean-up of captured motions: smoothing, gaps, frame rate, range, and tracks of people."""

@@ -1,0 +1,88 @@
+"""Displacement of joints between two versions of a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.captures.points import PointClip
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
+
+__all__ = ["Displacement", "joint_displacement", "point_displacement"]
+
+_TOGETHER = 1000  # frames per batch, whose matrices are in memory together
+
+
+@dataclass(frozen=True, slots=True)
+class Displacement:
+    """Distances between the joints of two motions in the frames that both have.
+
+    Attributes
+    ----------
+    mean, largest : float
+        Over joints and frames, figure units.
+    joint, frame : int
+        Where the largest distance is; the frame has the first motion's number.
+    n_frames : int
+        Number of compared frames.
+    """
+
+    mean: float = 0.0
+    largest: float = 0.0
+    joint: int = 0
+    frame: int = 0
+    n_frames: int = 0
+
+
+def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) -> Displacement:
+    """Return how far joints move, at the times of the first motion's frames.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton.
+    before, after : SampledClip
+        Two motions of it on the same clock.
+    """
+    timing = before.timing
+    times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)
+    frames = np.flatnonzero(timing.present & inside)
+    total, count, worst = 0.0, 0, Displacement()
+    for first in range(0, len(frames), _TOGETHER):
+        chosen = frames[first : first + _TOGETHER]
+        both = [frames_of(figure, clip, times[chosen]) for clip in (before, after)]
+        places = [world_frames(figure, found)[..., :3, 3] for found in both]
+        distances = np.linalg.norm(places[1] - places[0], axis=-1)[both[1].present]
+        chosen = chosen[both[1].present]
+        if not distances.size:
+            continue
+        total, count = total + float(distances.sum()), count + len(distances)
+        row, joint = np.unravel_index(distances.argmax(), distances.shape)
+        if distances[row, joint] >= worst.largest:
+            number = int(chosen[row]) + timing.first_frame
+            worst = Displacement(0.0, float(distances[row, joint]), int(joint), number)
+    n_joints = before.n_joints
+    mean = total / (count * n_joints) if count else 0.0
+    return Displacement(mean, worst.largest, worst.joint, worst.frame, count)
+
+
+def point_displacement(before: PointClip, after: PointClip) -> Displacement:
+    """Return how far points move, at the times of the first motion's frames where both are seen."""
+    timing = before.timing
+    times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
+    inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)
+    rows, _, fraction = after.timing.locate(times)
+    frames = np.flatnonzero(timing.present & inside & (rows >= 0) & (fraction == 0.0))
+    old, new = before.points[timing.rows[frames]], after.points[rows[frames]]
+    seen = (old[..., 3] > 0.0) & (new[..., 3] > 0.0)
+    if not seen.any():
+        return Displacement()
+    distances = np.where(seen, np.linalg.norm(new[..., :3] - old[..., :3], axis=-1), 0.0)
+    row, point = np.unravel_index(distances.argmax(), distances.shape)
+    number = int(frames[row]) + timing.first_frame
+    mean = float(distances.sum() / seen.sum())
+    return Displacement(mean, float(distances.max()), int(point), number, len(frames))

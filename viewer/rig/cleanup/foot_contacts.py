@@ -1,0 +1,64 @@
+"""Frames in which a joint of a foot stands on the ground, by its height and speed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.frame_rows import runs_of
+
+__all__ = ["contacts"]
+
+# Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
+_LOW, _HIGH = 0.02, 0.035  # above the lowest positions: a contact begins, and ends
+_SLOW, _FAST = 0.3, 0.5  # per second
+_LOWEST = 0.05  # fraction of the frames below the level of the ground
+_WINDOW = 0.1  # seconds over which the speed is averaged
+_SHORTEST = 0.1  # seconds
+
+
+def contacts(positions: Floats, present: Bools, rate: float, size: float, up: int) -> Bools:
+    """Return the frames in which a joint stands: it is low and slow, with hysteresis.
+
+    Parameters
+    ----------
+    positions : (F, 3)
+        Positions of the joint.
+    present : (F,)
+        Frames that have positions.
+    rate : float
+        Frames per second.
+    size : float
+        Height of the figure.
+    up : int
+        The axis that points up.
+
+    Returns
+    -------
+    (F,)
+        Contacts of at least 0.1 seconds.
+    """
+    result = np.zeros(len(positions), dtype=np.bool_)
+    if not present.any():
+        return result
+    heights = positions[:, up] - np.quantile(positions[present, up], _LOWEST)
+    flat = [axis for axis in range(3) if axis != up]
+    for start, stop in runs_of(present):
+        speeds = _speeds(positions[start:stop][:, flat], rate)
+        above = heights[start:stop]
+        begins = (above < _LOW * size) & (speeds < _SLOW * size)
+        lasts = (above < _HIGH * size) & (speeds < _FAST * size)
+        for first, last in runs_of(lasts):
+            is_long = last - first >= max(2, round(_SHORTEST * rate))
+            if is_long and begins[first:last].any():
+                result[start + first : start + last] = True
+    return result
+
+
+def _speeds(places: Floats, rate: float) -> Floats:
+    """Return speeds (N,) averaged over a window around each frame."""
+    half = max(1, round(0.5 * _WINDOW * rate))
+    frames = np.arange(len(places))
+    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, len(places) - 1)
+    moved = np.linalg.norm(places[after] - places[before], axis=1)
+    return moved * rate / np.maximum(after - before, 1)

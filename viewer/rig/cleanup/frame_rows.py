@@ -1,0 +1,68 @@
+"""Rows of clips in the order of their frames."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Bools
+from viewer.rig.captures.points import PointClip
+from viewer.rig.motion.sampled_clip import SampledClip
+
+__all__ = ["Captured", "in_frame_order", "runs_of", "with_rows"]
+
+Captured = SampledClip | PointClip
+"""Clips of frames: of joints, or of points."""
+Indices = NDArray[np.intp]
+
+
+def runs_of(flags: Bools) -> list[tuple[int, int]]:
+    """Return the runs of True as half-open ranges of indices.
+
+    >>> runs_of(np.array([True, True, False, True]))
+    [(0, 2), (3, 4)]
+    """
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def with_rows(clip: Captured, frames: Indices) -> Captured:
+    """Return a clip of some of the frames, each with a row of its own, in time order.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip.
+    frames : (F,)
+        Consecutive indices of frames, from 0; rate, first frame and start are adjusted.
+    """
+    timing = clip.timing
+    chosen = timing.rows[frames]
+    kept = chosen[chosen >= 0]
+    rows = np.where(chosen >= 0, np.cumsum(chosen >= 0) - 1, -1).astype(np.int32)
+    first = int(frames[0]) if len(frames) else 0
+    moved = replace(
+        timing, rows=rows, first_frame=timing.first_frame + first, start=timing.time(first)
+    )
+    count = len(clip.points) if isinstance(clip, PointClip) else clip.n_rows
+    arrays: dict[str, Any] = {}
+    for field in fields(clip):
+        value = getattr(clip, field.name)
+        # A single row that applies to all frames stays as it is.
+        if isinstance(value, np.ndarray) and len(value) == count and _is_per_row(clip, field.name):
+            arrays[field.name] = value[kept]
+    return replace(clip, timing=moved, **arrays)
+
+
+def _is_per_row(clip: SampledClip | PointClip, name: str) -> bool:
+    """Return whether an array has a row for each row of the clip, not one for all of them."""
+    is_shared = name in ("shape_weights", "scales") and len(getattr(clip, name)) == 1
+    return not is_shared
+
+
+def in_frame_order(clip: Captured) -> Captured:
+    """Return the same motion with one row for each present frame, in time order."""
+    return with_rows(clip, np.arange(clip.timing.n_frames))

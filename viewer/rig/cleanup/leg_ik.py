@@ -1,0 +1,102 @@
+"""Analytic inverse kinematics of legs: hip and knee rotate until the ankle is at its target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
+
+__all__ = ["Leg", "bend", "reach"]
+
+_STRAIGHT = 0.05  # sine of the knee's angle below which the leg does not show its plane
+_REACH = 0.9999  # relative to the length of the leg: a straight knee has no direction
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """Joints of one leg.
+
+    Attributes
+    ----------
+    hip, knee, ankle : int
+        Indices in the skeleton.
+    toe : int
+        The ball of the foot; the ankle if there is none.
+    """
+
+    hip: int
+    knee: int
+    ankle: int
+    toe: int
+
+
+def reach(hips: Floats, knees: Floats, ankles: Floats) -> Floats:
+    """Return the longest distance from hip to ankle in each frame: (F,) for (F, 3) each."""
+    thigh = np.linalg.norm(knees - hips, axis=1)
+    return _REACH * (thigh + np.linalg.norm(ankles - knees, axis=1))
+
+
+def bend(
+    hips: Floats, knees: Floats, ankles: Floats, targets: Floats, axis: Floats
+) -> tuple[Floats, Floats]:
+    """Return the rotations of thigh and shin that bring the ankle to a target.
+
+    The shin rotates about the normal of the leg's plane until the distance from hip to ankle is
+    that of the target (law of cosines). Then the whole leg rotates about the hip by the smallest
+    angle that points it at the target, so the knee keeps its direction.
+
+    Parameters
+    ----------
+    hips, knees, ankles : (F, 3)
+        Positions.
+    targets : (F, 3)
+        Targets of the ankle; those out of reach are approached as far as possible.
+    axis : (F, 3)
+        Normals of the leg's plane for frames in which the leg is straight, thigh x shin.
+
+    Returns
+    -------
+    thigh, shin : (F, 4)
+        Unit quaternions in the space of the positions: R' = Q R.
+    """
+    upper, lower = hips - knees, ankles - knees
+    a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
+    normal = np.cross(upper, lower)
+    sine = np.linalg.norm(normal, axis=1) / np.maximum(a * b, 1e-30)
+    given = -axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)
+    found = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    normal = np.where(sine[:, None] < _STRAIGHT, given, found)
+    wanted = targets - hips
+    distance = np.linalg.norm(wanted, axis=1)
+    distance = np.clip(distance, np.abs(a - b) * (2.0 - _REACH), _REACH * (a + b))
+    new = _angle((a * a + b * b - distance * distance) / np.maximum(2.0 * a * b, 1e-30))
+    old = np.arctan2(
+        np.einsum("fa,fa->f", np.cross(upper, lower), normal), np.einsum("fa,fa->f", upper, lower)
+    )
+    knee = rotation_vector_to_quaternion((new - old)[:, None] * normal)
+    bent = _rotated(knee, lower) - upper  # from the hip to the ankle
+    turn = _between(bent, wanted)
+    return turn, multiply(turn, knee)
+
+
+def _angle(cosine: Floats) -> Floats:
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def _rotated(quaternions: Floats, vectors: Floats) -> Floats:
+    """Return v + 2 w (u x v) + 2 u x (u x v) for quaternions (u, w)."""
+    axis, real = quaternions[:, :3], quaternions[:, 3:]
+    across = np.cross(axis, vectors)
+    return vectors + 2.0 * (real * across + np.cross(axis, across))
+
+
+def _between(start: Floats, end: Floats) -> Floats:
+    """Return the smallest rotations from one direction to another: (F, 4)."""
+    a = start / np.maximum(np.linalg.norm(start, axis=1, keepdims=True), 1e-30)
+    b = end / np.maximum(np.linalg.norm(end, axis=1, keepdims=True), 1e-30)
+    real = 1.0 + np.einsum("fa,fa->f", a, b)
+    found = np.concatenate([np.cross(a, b), real[:, None]], axis=1)
+    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30)

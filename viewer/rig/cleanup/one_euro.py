@@ -1,0 +1,77 @@
+"""One Euro filter: an exponential filter whose cutoff rises with speed (Casiez et al. 2012)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
+
+__all__ = ["OneEuro"]
+
+
+@dataclass(frozen=True, slots=True)
+class OneEuro:
+    """One Euro filter, applied forwards and then backwards, so that nothing is delayed.
+
+    Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
+    is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
+    rotations, x - x' is the rotation vector from x' to x. At constant cutoff, both passes together
+    scale a frequency of w radians per frame by a^2 / (1 - 2 (1 - a) cos w + (1 - a)^2).
+
+    Attributes
+    ----------
+    cutoff : float
+        Cutoff frequency at rest, Hz.
+    beta : float
+        Hz per radian per second for rotations, per metre per second for positions.
+    speed_cutoff : float
+        Cutoff frequency of the speed, Hz.
+    """
+
+    cutoff: float = 3.0
+    beta: float = 2.0
+    speed_cutoff: float = 1.0
+
+    def rotations(self, quaternions: Floats, rate: float) -> Floats:
+        """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
+        once = self._turned(continuous(quaternions), rate)
+        return self._turned(once[::-1], rate)[::-1]
+
+    def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
+        """Return filtered positions (N, ..., 3), of which one unit has some metres."""
+        once = self._shifted(positions, rate, metres)
+        return self._shifted(once[::-1], rate, metres)[::-1]
+
+    def _turned(self, quaternions: Floats, rate: float) -> Floats:
+        found = quaternions.copy()
+        steps = relative_vectors(quaternions[:-1], quaternions[1:])
+        speed = np.zeros((*quaternions.shape[1:-1], 3))
+        for frame in range(1, len(found)):
+            speed, factor = self._adapted(speed, steps[frame - 1] * rate, rate)
+            toward = relative_vectors(found[frame - 1], quaternions[frame])
+            found[frame] = moved(found[frame - 1], factor * toward)
+        return found
+
+    def _shifted(self, positions: Floats, rate: float, metres: float) -> Floats:
+        found = positions.copy()
+        speed = np.zeros(positions.shape[1:])
+        steps = np.diff(positions, axis=0) * (rate * metres)
+        for frame in range(1, len(found)):
+            speed, factor = self._adapted(speed, steps[frame - 1], rate)
+            found[frame] = found[frame - 1] + factor * (positions[frame] - found[frame - 1])
+        return found
+
+    def _adapted(self, speed: Floats, measured: Floats, rate: float) -> tuple[Floats, Floats]:
+        """Return the filtered speed (..., 3), and the factor a of this frame (..., 1)."""
+        speed = speed + _factor(self.speed_cutoff, rate) * (measured - speed)
+        size = np.linalg.norm(speed, axis=-1, keepdims=True)
+        return speed, _factor(self.cutoff + self.beta * size, rate)
+
+
+def _factor(cutoff: Floats | float, rate: float) -> Floats:
+    """Return a = 1 / (1 + r / (2 pi f)) for a cutoff frequency f at r frames per second."""
+    turns = 2.0 * np.pi * np.asarray(cutoff, dtype=np.float64)
+    return turns / (turns + rate)

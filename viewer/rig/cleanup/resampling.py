@@ -1,0 +1,79 @@
+"""Resampling of clips at another frame rate."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.captures.points import PointClip
+from viewer.rig.cleanup.frame_rows import Captured
+from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
+from viewer.rig.motion.timing import Timing
+
+__all__ = ["resampled"]
+
+_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
+
+
+def resampled(clip: Captured, rate: float) -> Captured:
+    """Return a clip with another frame rate, which begins at the same time.
+
+    Rotations are interpolated along the shorter arc, everything else linearly. At the times of the
+    original frames, the values are the original ones. A new frame between two original frames is
+    missing if one of those is missing. Frames are counted from 0.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip.
+    rate : float
+        Frames per second.
+    """
+    timing = clip.timing
+    count = int(np.floor((timing.n_frames - 1) / timing.frame_rate * rate + _ON_FRAME)) + 1
+    times = timing.start + np.arange(count if timing.n_frames else 0) / rate
+    present = _present(timing, times)
+    rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
+    again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
+    if isinstance(clip, PointClip):
+        return replace(clip, timing=again, points=_points(clip, times[present]))
+    found = sample_rows(clip, times[present])
+    return SampledClip(
+        clip.name,
+        again,
+        found.rotations,
+        found.translations,
+        found.figure_translations,
+        found.figure_scales,
+        clip.shape_weights if _is_shared(clip.shape_weights) else found.shape_weights,
+        clip.scales if _is_shared(clip.scales) else found.scales,
+    )
+
+
+def _present(timing: Timing, times: Floats) -> Bools:
+    """Return at which times the frames on both sides, or the frame itself, exist: (T,)."""
+    if not timing.n_frames:
+        return np.zeros(0, dtype=np.bool_)
+    place = (times - timing.start) * timing.frame_rate
+    nearest = np.round(place)
+    place = np.where(np.abs(place - nearest) < _ON_FRAME, nearest, place)
+    last = timing.n_frames - 1
+    before = np.clip(np.floor(place).astype(int), 0, last)
+    after = np.clip(np.ceil(place).astype(int), 0, last)
+    both: Bools = timing.present[before] & timing.present[after]
+    return both
+
+
+def _is_shared(rows: Floats | None) -> bool:
+    return rows is not None and len(rows) == 1
+
+
+def _points(clip: PointClip, times: Floats) -> Floats:
+    """Return points (T, K, 4), interpolated where they are visible on both sides."""
+    before, after, fraction = clip.timing.locate(times)
+    start, end = clip.points[before], clip.points[after]
+    mixed = start + fraction[:, None, None] * (end - start)
+    both = (start[..., 3:] > 0.0) & (end[..., 3:] > 0.0)
+    return np.where(both, mixed, start)

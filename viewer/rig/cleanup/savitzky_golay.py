@@ -1,0 +1,85 @@
+"""Savitzky-Golay filter: a polynomial fitted to a window around each frame (1964)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
+
+__all__ = ["SavitzkyGolay"]
+
+_SECONDS = 0.2  # default length of the window
+_PASSES = 2  # the second is about the rotation found by the first, which is less noisy
+
+
+@dataclass(frozen=True, slots=True)
+class SavitzkyGolay:
+    """Least-squares fit of a polynomial to a window of frames, evaluated at its middle.
+
+    Near the ends of a motion the window stays within it, and the polynomial is evaluated off its
+    middle. Rotations are fitted as rotation vectors relative to the frame's own, so constant and
+    uniform rotation are unchanged.
+
+    Attributes
+    ----------
+    window : int
+        Odd number of frames; 0 for 0.2 seconds.
+    order : int
+        Degree of the polynomial, below the window.
+    """
+
+    window: int = 0
+    order: int = 2
+
+    def frames(self, rate: float) -> int:
+        """Return the length of the window at a frame rate, frames."""
+        if self.window:
+            return self.window
+        half = max(round(0.5 * _SECONDS * rate), (self.order + 1) // 2)
+        return 2 * half + 1
+
+    def rotations(self, quaternions: Floats, rate: float) -> Floats:
+        """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
+        known = continuous(quaternions)
+        found = known
+        for _ in range(_PASSES):
+            vectors = self._fitted(len(known), rate, _relative_to(found, known))
+            found = moved(found, vectors) if vectors is not None else found
+        return found
+
+    def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
+        """Return filtered positions (N, ..., 3); the unit of lengths has no effect."""
+        found = self._fitted(len(positions), rate, lambda rows: positions[rows] - positions)
+        return positions if found is None else positions + found
+
+    def _fitted(self, count: int, rate: float, at: Callable[[Ints], Floats]) -> Floats | None:
+        """Return the fitted values of all frames; None if there are too few to fit.
+
+        ``at`` returns the values at one frame of each window, relative to the window's own frame.
+        """
+        window = min(self.frames(rate), count - 1 + count % 2)
+        if window <= self.order:
+            return None
+        start = np.clip(np.arange(count) - window // 2, 0, count - window)
+        weights = _smoothing_matrix(window, self.order)[np.arange(count) - start]
+        total: Floats | None = None
+        for place in range(window):
+            values = at((start + place).astype(np.int32))
+            part = weights[:, place].reshape(-1, *[1] * (values.ndim - 1)) * values
+            total = part if total is None else total + part
+        return total
+
+
+def _relative_to(found: Floats, known: Floats) -> Callable[[Ints], Floats]:
+    return lambda rows: relative_vectors(found, known[rows])
+
+
+def _smoothing_matrix(window: int, order: int) -> Floats:
+    """Return H = A (A^T A)^-1 A^T of polynomials: row i gives the fitted value at frame i."""
+    place = np.linspace(-1.0, 1.0, window)
+    basis, _ = np.linalg.qr(np.vander(place, order + 1))
+    return basis @ basis.T
