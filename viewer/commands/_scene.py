@@ -107,18 +107,6 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         help="layout of captured keypoints, if their number is ambiguous",
     )
     group.add_argument(
-        "--images",
-        metavar="FOLDER",
-        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
-        "the capture); for a single camera also a folder of its numbered images",
-    )
-    group.add_argument(
-        "--video",
-        metavar="FILE",
-        help="video of a capture's camera, drawn behind the scene with --view; also gives the "
-        "frame rate of captures that have none (needs PyAV)",
-    )
-    group.add_argument(
         "--legacy-expression",
         action="store_true",
         help="apply expressions to SMPL-X columns 10 to 19, as EasyMocap does",
@@ -134,7 +122,19 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
-    """Add the options of video motion capture."""
+    """Add the options of video motion capture, and of cameras' images."""
+    group.add_argument(
+        "--images",
+        metavar="FOLDER",
+        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
+        "the capture); for a single camera also a folder of its numbered images",
+    )
+    group.add_argument(
+        "--video",
+        metavar="FILE",
+        help="video of a capture's camera, drawn behind the scene with --view; also gives the "
+        "frame rate of captures that have none (needs PyAV)",
+    )
     group.add_argument(
         "--space",
         choices=("world", "camera"),

@@ -77,6 +77,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     _add_method_arguments(parser)
     _add_alignment_arguments(parser)
     add_vrm_arguments(parser)
+    _add_template_pose_arguments(parser)
+
+
+def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
     add_frame_arguments(parser)
     add_pose_arguments(parser)
     parser.add_argument(

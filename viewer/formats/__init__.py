@@ -85,6 +85,7 @@ _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
 _ANY_TEXT = (".txt",)  # does not identify the content
 _HEAD = 1 << 16  # bytes that must identify a file
+_NAMED_KEYS = 3  # per format, in a message about unknown archives
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,7 +325,9 @@ def _detect_archive(source: Source) -> str:
     if _is_video_mocap(archive):
         return "video_mocap"
     wanted = "; ".join(
-        f"{form.title}: {', '.join(form.keys)}" for form in FORMATS.values() if form.keys
+        f"{form.title}: {', '.join(form.keys[:_NAMED_KEYS])}"
+        for form in FORMATS.values()
+        if form.keys
     )
     if not keys:
         raise source.fault("F002.empty-archive", wanted=wanted)

@@ -148,7 +148,7 @@ class VideoFrames:
             self._container.seek(begin + int(target / stream.time_base), stream=stream)
         except self._errors.FFmpegError:
             values = {"seconds": seconds}
-            raise FormatError(Diagnostic("F002.video-frame", self.path, values=values)) from None
+            raise FormatError(Diagnostic("F002.video-damaged", self.path, values=values)) from None
         self._source, self._is_over = self._container.decode(stream), False
         self._kept.clear()
 
@@ -161,7 +161,7 @@ class VideoFrames:
             self._source = iter(())
             seconds = self._kept[-1].ends if self._kept else 0.0
             values = {"seconds": seconds}
-            raise FormatError(Diagnostic("F002.video-frame", self.path, values=values)) from None
+            raise FormatError(Diagnostic("F002.video-damaged", self.path, values=values)) from None
         if frame is None:
             self._is_over = True
             return None
