@@ -21,14 +21,16 @@ _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "o
 
 def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that clean up captured motions."""
-    group = parser.add_argument_group("clean-up of captures: in this order, changes are printed")
+    group = parser.add_argument_group(
+        "clean-up of captures, applied in this order; changes are printed"
+    )
     group.add_argument(
         "--merge-ids",
         type=_people,
         action="append",
         default=[],
         metavar="A,B,…",
-        help="people whose tracks belong to one person, who keeps the number A; may be repeated",
+        help="IDs of tracks that belong to one person, who keeps ID A; may be repeated",
     )
     group.add_argument(
         "--fill-gaps",
@@ -77,7 +79,7 @@ def _add_feet(group: argparse._ArgumentGroup) -> None:
 
 
 def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
-    """Return the requested clean-up; nothing for a command without these options.
+    """Return the requested clean-up, which is empty for a command without these options.
 
     Raises ViewerError if the frames are not a range.
     """
@@ -114,7 +116,7 @@ def _longest(text: str) -> int:
     """Return the length of the longest gap in frames."""
     if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
         raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or nothing with the files before the option, found "
+            f"expected a number of frames, or no value and the files before the option, found "
             f"{printable(text, 60)}"
         )
     return int(text)
@@ -125,7 +127,7 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
     name, _, rest = text.partition(":")
     if name not in _KEYS:
         raise argparse.ArgumentTypeError(
-            f"expected one-euro or savgol, or nothing with the files before the option, found "
+            f"expected one-euro or savgol, or no value and the files before the option, found "
             f"{printable(text, 60)}"
         )
     values = {}
@@ -156,6 +158,6 @@ def _savgol(values: dict[str, float]) -> SavitzkyGolay:
         )
     if order != int(order) or order > 9 or ("window" in values and order >= window):
         raise argparse.ArgumentTypeError(
-            f"savgol: expected a whole order of 0 to 9, below the window, found {order:g}"
+            f"savgol: expected an integer order from 0 to 9, less than the window, found {order:g}"
         )
     return SavitzkyGolay(int(window), int(order))

@@ -143,7 +143,7 @@ def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--average-shape",
         action="store_true",
-        help="average each person's shape over time, where video motion capture varies it",
+        help="average each person's shape over time if the files have one per frame",
     )
 
 

@@ -111,7 +111,7 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 def is_body(figure: Figure) -> bool:
     """Return whether a figure can show captured bodies: it has the family's root and a mesh.
 
-    A VRM character is none, whatever its joints are called: its rest pose and origin differ.
+    A VRM character cannot, whatever its joints are called: its rest pose and origin differ.
     """
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
@@ -175,7 +175,7 @@ def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figu
             continue
         try:
             model = read(Source.open(found))
-        except FormatError as problem:  # nobody asked for this file
+        except FormatError as problem:  # the user did not ask for this file
             cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
             continue
         if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):

@@ -31,7 +31,7 @@ def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
     source : Source
         The file.
     content : Content
-        What was read from it.
+        Its contents.
     wanted : str
         The animation, see ``chosen_animation``.
 

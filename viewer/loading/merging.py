@@ -103,7 +103,7 @@ def _apart(
 ) -> float:
     """Return the median distance of two tracks in their common frames.
 
-    Raises RigError if that is farther than one person can be from himself.
+    Raises RigError if it is too large for two tracks of one person.
     """
     if not len(both):
         return 0.0

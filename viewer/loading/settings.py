@@ -50,7 +50,7 @@ class MotionSettings:
         Further files whose motion drives a figure: their first animation, or the one of the name
         ``animation``.
     springs : bool
-        Whether joints that swing, such as hair, are simulated while a motion plays.
+        Whether spring joints, such as those of hair, are simulated while a motion plays.
     find_model : callable or None
         Returns the user's own model of a member of the SMPL family, such as ``"SMPL"``, for
         captures that are opened without one; None for the bundled body.

@@ -16,8 +16,8 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["VideoFrames"]
 
-_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is quick
-_FEWEST = 2  # frames that are kept however large they are
+_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is fast
+_FEWEST = 2  # frames that are kept regardless of their size
 _AHEAD = 2.0  # seconds to decode forwards rather than to seek
 _ON_TIME = 1e-6  # seconds
 
@@ -43,7 +43,7 @@ class VideoFrames:
     """Reads the frame of a video that is nearest to a time.
 
     Frames are decoded in the order of time. The last ones are kept; an earlier time, or one far
-    ahead, is sought from the key frame before it.
+    ahead, is reached by seeking to the key frame before it.
 
     Parameters
     ----------

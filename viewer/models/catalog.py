@@ -9,7 +9,7 @@ __all__ = ["CATALOG", "Publication"]
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """Where a kind of body model is published.
+    """Publication of a kind of body model.
 
     Attributes
     ----------

@@ -71,7 +71,7 @@ class BlendShapes:
     rest_weights : (S,) or None
         Weights of the file's own pose; None if all are 0.
     rules : ExpressionRules or None
-        How weights of expressions change each other; None if they do not.
+        Rules by which expressions modify each other's weights; None if they do not.
     space : ShapeSpace or None
         Computes the displacement if it is not the sum of the offsets; these are then those of
         each weight of 1 alone.

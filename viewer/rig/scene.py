@@ -200,7 +200,7 @@ class Scene:
     views : tuple of CameraView
         Calibrated cameras of a capture.
     facts : tuple of (str, str)
-        What captures among the files contain, for ``viewer info``.
+        Contents of captures among the files, for ``viewer info``.
     images : CameraImages or None
         Images of the cameras, if available.
     time : float or None

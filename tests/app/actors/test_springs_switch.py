@@ -36,7 +36,7 @@ def test_check_box_switches_springs_and_undo_restores_them(drive, tmp_path):
 
 
 def test_figures_without_springs_have_no_switch(hand):
-    assert "has no joints that swing" in no_springs(hand.state)
+    assert "has no spring joints" in no_springs(hand.state)
 
 
 def test_exported_motions_do_not_contain_the_pose_of_springs(drive, tmp_path):

@@ -28,7 +28,7 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     options = ["--bake-springs"] if bakes else []
     assert run(["convert", str(path), "-o", str(out), "--fps", "60", *options]) == 0
     said = capsys.readouterr().out
-    assert ("simulated rotations of 3 joints that swing are written" in said) == bakes
+    assert ("simulated rotations of 3 spring joints are written" in said) == bakes
     assert ("viewer convert --bake-springs writes the simulated ones" in said) == (not bakes)
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors
@@ -45,5 +45,5 @@ def test_figures_without_springs_are_refused(tmp_path, capsys):
     out = str(tmp_path / "a.glb")
     assert run(["convert", str(path), "-o", out, "--bake-springs"]) == 2
     said = capsys.readouterr().err
-    assert "--bake-springs: no figure with a motion has joints that swing" in said
+    assert "--bake-springs: no figure with a motion has spring joints" in said
     assert np.array_equal([*tmp_path.iterdir()], [path])

@@ -46,15 +46,15 @@ MESSAGES = {
     "{longest} ({seconds:.2g} s)",
     "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
     "{gaps:list}",
-    "X006.locked": "{figure:text}: feet held in {n:#contact}, in which they slide by {after} "
+    "X006.locked": "{figure:text}: feet held in place in {n:#contact}; they slide by {after} "
     f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
     "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
-    "X006.no-legs": "{figure:text}: feet not held, since it has no legs with joints of known names",
+    "X006.no-legs": "{figure:text}: feet not held, since no legs were found by joint name",
     "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
     "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
     "lowest positions are at height 0",
-    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh or "
-    "joints of known names",
+    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh and "
+    "no joints of known names",
     "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",

@@ -35,7 +35,7 @@ def human_bones(figure: Figure) -> dict[str, int]:
 
     Optional bones whose hierarchy VRM does not allow are left out.
 
-    ``figure``: figure with a skeleton, whose humanoid or joint names tell the bones.
+    ``figure``: figure with a skeleton, whose humanoid or joint names identify the bones.
     Raises RigError if a required bone is missing.
     """
     skeleton = figure.require_skeleton()

@@ -1,6 +1,6 @@
 """Extensions of a VRM 1.0 file, with the indices of the file that is written.
 
-Members without indices are kept as they are, whatever they are.
+Members without indices are kept unchanged.
 """
 
 from __future__ import annotations

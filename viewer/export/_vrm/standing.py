@@ -31,7 +31,7 @@ _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "L
 
 
 def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
-    """Return a figure with a joint-wise equal skeleton without DOFs, in VRM's axes and unit.
+    """Return a figure in VRM's axes and unit, whose skeleton has the same joints without DOFs.
 
     Its shape is baked in unless it has only morph targets; pose correctives are dropped. VRM
     characters keep their height above the ground.
@@ -114,7 +114,7 @@ def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
 
 
 def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
-    """Return a figure with its mesh and bindings transformed; joints are already."""
+    """Return a figure with its mesh and bindings transformed as its joints already are."""
     mesh, skin = figure.mesh, figure.skin
     if mesh is None:
         return figure

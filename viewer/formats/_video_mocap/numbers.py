@@ -1,4 +1,4 @@
-"""Checked arrays of results: finite, of the expected shape, within reach."""
+"""Checked arrays of results: finite, of the expected shape, within limits."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RowBudget:
         Raises
         ------
         FormatError
-            If there are more than any recording has.
+            If there are more than any plausible recording has.
         """
         self._left -= max(count, 1)
         if self._left < 0:
@@ -99,7 +99,7 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
 
 
 def frames_of(archive: Archive, key: str, count: int) -> Frames:
-    """Return numbers of frames, whole and in any order: (N,)."""
+    """Return frame numbers, integers in any order: (N,)."""
     found = rows(archive, key, (count,))
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
         raise archive.fault("F002.video-frame-numbers", item=key)

@@ -1,4 +1,4 @@
-"""4D-Humans and PHALP: ``results/NAME.pkl``, joblib's file of a dict from frame to detections.
+"""4D-Humans and PHALP: ``results/NAME.pkl``, a joblib file with the detections of each frame.
 
 ::
 
@@ -49,7 +49,7 @@ def recognises(archive: Archive) -> bool:
 
 
 def read(source: Source, archive: Archive) -> Results:
-    """Read all people who are seen, frame by frame."""
+    """Read all visible people, frame by frame."""
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     size, n_ghosts, n_cuts = None, 0, 0
     budget = RowBudget(archive)

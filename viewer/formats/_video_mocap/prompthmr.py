@@ -1,4 +1,4 @@
-"""PromptHMR (yufu-wang/PromptHMR): ``results.pkl``, joblib's file of people and a camera.
+"""PromptHMR (yufu-wang/PromptHMR): ``results.pkl``, a joblib file of people and a camera.
 
 ::
 

@@ -1,4 +1,4 @@
-"""What the results of every tool consist of, and their conversion to a capture."""
+"""Results of a tool in a common form, and their conversion to a capture."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ class Results:
     frame_rate : float or None
         Frames per second, if the tool always uses the same.
     facts : tuple of (str, str)
-        What was recognised and what was ignored, for ``viewer info``.
+        Recognised and ignored contents, for ``viewer info``.
     notes : tuple of Diagnostic
         Messages about the file.
     """

@@ -14,7 +14,7 @@ __all__ = ["TOOLS", "Tool", "folder_tool", "module_of", "tool_of"]
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool, and what its results contain.
+    """A tool, and the form of its results.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""TRAM (yufu-wang/tram): a folder of a file per person, and of the camera's path.
+"""TRAM (yufu-wang/tram): a folder with one file per person, and the camera's path.
 
 ::
 

@@ -227,7 +227,7 @@ def _arc_end(bending: Floats, extension: Floats, length: float) -> Floats:
 
 
 def _arc(angle: Floats, length: float) -> tuple[Floats, Floats]:
-    """Return shift aside and change of height of the end of an arc of an angle and a length."""
+    """Return the lateral and vertical shift of the end of an arc of given angle and length."""
     half = np.sinc(0.5 * angle / np.pi)  # sin(a / 2) / (a / 2)
     aside = 0.5 * length * angle * half * half
     return aside, length * (np.sinc(angle / np.pi) - 1.0)

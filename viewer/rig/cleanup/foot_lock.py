@@ -30,7 +30,7 @@ _EASE = 0.2  # seconds over which a correction begins and ends outside contacts
 
 @dataclass(frozen=True, slots=True)
 class FootLock:
-    """What locking changed.
+    """Changes made by foot locking.
 
     Attributes
     ----------

@@ -1,7 +1,8 @@
 """Rotations of spring joints over the time of a motion, computed once and in order.
 
-The simulation starts at rest at the start of the motion and proceeds in equal steps, so that every
-time has one result, whether it is played or chosen. Between two steps, rotations are interpolated.
+The simulation starts at rest at the start of the motion and proceeds in equal steps, so the result
+at a given time does not depend on what was played before. Between two steps, rotations are
+interpolated.
 """
 
 from __future__ import annotations
