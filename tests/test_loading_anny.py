@@ -1,4 +1,4 @@
-"""Anny with motions and options: driven by bodies of the SMPL family, shaped by its own numbers."""
+"""Anny with motions and options: driven by SMPL-family bodies, shaped by its own sliders."""
 
 import numpy as np
 import pytest

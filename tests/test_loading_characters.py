@@ -1,4 +1,4 @@
-"""Motions of bodies and of other figures on characters with joints of their own."""
+"""Motions of bodies and other figures retargeted to characters with different joints."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ def test_captured_people_are_shown_as_the_character(capture, hero, is_named):
     for before, after in zip(plain.actors, scene.actors, strict=True):
         for frame in (0, 3):
             time = frame / 30
-            # The rest pose of the body is a T-pose within some degrees, which limbs make up for.
+            # The rest pose of the body is a T-pose to within a few degrees, for which the limbs
+            # compensate.
             found = directions(after, time)
             assert_allclose(found, directions(before, time, NAMES), rtol=0, atol=1e-6)
 

@@ -223,7 +223,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
 
 
 def _add_motion(source: Source, contents: Contents, settings: MotionSettings) -> None:
-    """Read a file that is given as a motion: a skeleton's, a body's, or a figure's animation."""
+    """Read a file that was passed as a motion: a skeleton's, a body's, or a figure's animation."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind in ("BodyMotion", "Capture", "Clip"):

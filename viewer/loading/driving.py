@@ -326,7 +326,7 @@ def _begin_capture(
 
 
 def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) -> None:
-    """Let captured bodies move a figure with other joints: the requested one, or one that is open.
+    """Let captured bodies drive a figure with other joints: the requested one, or an open one.
 
     Raises RigError if too few joints of the requested figure match.
     """

@@ -24,7 +24,7 @@ __all__ = ["drive_by_figures", "motion_in"]
 
 
 def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
-    """Return the motion of a file that is given as a motion.
+    """Return the motion of a file that was passed as a motion.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Catalogue of the body models that the viewer reads: publisher, licence, and where to get them."""
+"""Catalogue of the body models that the viewer reads: publisher, licence and source."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors
     for time in (0.5, 1.0):
-        # Single precision of the file.
+        # The file is in single precision.
         assert_allclose(places(found, time), places(wanted, time), rtol=0, atol=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Files of joblib as bytes, written without it."""
+"""Joblib files as bytes, written without joblib."""
 
 from __future__ import annotations
 

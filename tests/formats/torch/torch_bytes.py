@@ -1,4 +1,4 @@
-"""Files of torch and joblib as bytes, written without them, with any fault one wants."""
+"""Torch and joblib files as bytes, written without these packages, with any fault on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""WHAM: people with numbers and gaps, both spaces, a shape per frame, a guessed frame rate."""
+"""WHAM: people with IDs and gaps, both spaces, a shape per frame, an assumed frame rate."""
 
 from __future__ import annotations
 

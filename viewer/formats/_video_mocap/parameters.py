@@ -1,4 +1,4 @@
-"""SMPL parameters in dicts of any layout, by the usual spellings of their keys.
+"""SMPL parameters in dicts of any layout, found by the usual spellings of their keys.
 
 ::
 

@@ -135,7 +135,7 @@ class AnatomicalPosing:
     data_frames : (24, 3, 3)
         A: frames of the bones in the pose of the data.
     data_steps : (24, 3)
-        Places of the joints relative to their parents in that pose.
+        Positions of the joints relative to their parents in that pose.
     learned : (24, 3, 3)
         Learned rotations from the pose of the data to the T-pose.
     joints : (24, 3)
@@ -187,7 +187,7 @@ class AnatomicalPosing:
         return frames @ own @ np.swapaxes(frames, 1, 2)
 
     def translations(self, dofs: Floats) -> Floats:
-        """Return how far joints leave their rest places in the parent: (..., 24, 3)."""
+        """Return the displacement of joints from rest, in their parents: (..., 24, 3)."""
         found = np.zeros((*dofs.shape[:-1], len(JOINTS), 3))
         joint = {name: self.joints[row] for row, name in enumerate(JOINTS)}
         number = {name: dofs[..., row] for row, name in enumerate(DOF_NAMES)}
@@ -212,7 +212,7 @@ class AnatomicalPosing:
 def _on_ellipsoid(
     sign: float, abduction: Floats, elevation: Floats, width: float, height: float
 ) -> Floats:
-    """Return a place of a shoulder blade; ``sign`` is 1 on the right side."""
+    """Return the position of a shoulder blade; ``sign`` is 1 on the right side."""
     angle = elevation - _TILT
     along = -sign * 0.25 * width * np.cos(angle) * np.cos(abduction)
     up = -0.5 * height * np.sin(angle)

@@ -16,7 +16,7 @@ from viewer.rig.motion.parameter_clip import ParameterMotion
 __all__ = ["Capture", "CapturePart", "RestRoots"]
 
 RestRoots = Callable[[Floats | None], Floats]
-"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or without any."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -146,7 +146,7 @@ def _corrections(
         for joint, a, b in _parts(leg, toe, start, stop):
             part = places[a:b, joint]
             slid += _path(part, up)
-            # A contact that follows another one continues where that one has put the foot.
+            # A contact that follows another one continues from the foot's position there.
             kept = part.mean(axis=0) if held is None else part[0] + held
             shift[a:b] = kept - part
             held = shift[b - 1].copy()
@@ -156,7 +156,7 @@ def _corrections(
 
 
 def _parts(leg: Leg, toe: Bools, start: int, stop: int) -> list[tuple[int, int, int]]:
-    """Return the joint that is held in each part of a contact, and the part's frames."""
+    """Return the joint that is held in each part of a contact, and the frames of the part."""
     own = np.where(toe[start:stop], leg.toe, leg.ankle)
     edges = [0, *(np.flatnonzero(np.diff(own)) + 1).tolist(), stop - start]
     return [(int(own[a]), start + a, start + b) for a, b in pairwise(edges)]

@@ -111,7 +111,7 @@ class SpringTrack:
         rotations = []
         for number, pose in enumerate(rows):
             if block == 0 and number == 0:
-                # Without speed, the first step only applies stiffness and gravity.
+                # Starting at rest, the first step applies only stiffness and gravity.
                 tails = self._simulation.start(*pose)
                 rotations.append(self._simulation.rests)
                 continue
