@@ -130,7 +130,7 @@ def read_files(
 
 
 def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iterator[Diagnostic]:
-    """Yield a message for each choice among the contents of files that no file has."""
+    """Yield a message for each option for file contents that had no effect."""
     if settings.model is not None:
         return  # read later
     used = {name for source in sources for name in source.used_options}

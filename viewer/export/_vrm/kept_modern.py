@@ -70,7 +70,7 @@ def _list(told: Any, name: str) -> list[Any]:
 
 
 def _rows(told: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
-    """Return the objects of a list with a translated index, without those that have none."""
+    """Return the objects of a list with translated indices, except those whose index is lost."""
     rows = told if isinstance(told, list) else []
     return [
         {**each, name: index}

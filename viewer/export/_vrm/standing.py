@@ -176,6 +176,6 @@ def _arc(start: Floats, end: Floats) -> Floats:
     if not middle.any():
         middle = unit(np.cross(start, np.eye(3)[np.abs(start).argmin()]))
         return 2.0 * np.outer(middle, middle) - np.eye(3)
-    # Two half turns, about the start and about the middle.
+    # Two rotations by 180 degrees: about the start, and about the middle.
     first = 2.0 * np.outer(start, start) - np.eye(3)
     return (2.0 * np.outer(middle, middle) - np.eye(3)) @ first

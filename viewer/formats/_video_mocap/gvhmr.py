@@ -32,7 +32,7 @@ _PERSON = 0
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     parts = [archive.inside(key) for key in _KEYS.values()]
     return any(has(part, "body_pose", "global_orient", "transl") for part in parts)
 

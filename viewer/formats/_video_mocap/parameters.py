@@ -75,7 +75,7 @@ class _Layout:
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive has such parameters, in a layout that is not AMASS's."""
+    """Return whether an archive has SMPL parameters in a layout other than AMASS's."""
     layout = _layout(archive)
     if layout is None:
         budget = RowBudget(archive, _COST * _LOOKED_AT)
@@ -208,7 +208,7 @@ def _coefficients(archive: Archive, key: str) -> Floats | None:
 
 
 def _joined(tracks: list[Track]) -> Track:
-    """Return the frames of one person, each of which is a dict of its own."""
+    """Return the frames of one person, each of which is a separate dict."""
     vectors = [track.vectors for track in tracks if track.vectors is not None]
     placed = [track.translations for track in tracks if track.translations is not None]
     shapes = [track.shape for track in tracks if track.shape is not None]

@@ -43,7 +43,7 @@ _LARGEST = 1 << 20  # pixels along a side
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     first = archive.inside(archive.keys[0]) if archive.keys else None
     return first is not None and all(map(first.has, ("tid", "smpl", "camera", "time")))
 

@@ -41,7 +41,7 @@ _WAYS = (("Rcw", "Tcw", False), ("Rwc", "Twc", True), ("pred_cam_R", "pred_cam_T
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     people = archive.inside("people")
     persons = [] if people is None else [people.inside(key) for key in people.keys[:1]]
     return any(has(person, "frames", key) for person in persons for key in _SPACES.values())

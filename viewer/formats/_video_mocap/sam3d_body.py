@@ -137,7 +137,7 @@ def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     if _is_person(archive):
         return True
     firsts = [inner for key in archive.keys[:_LOOKED_AT] if (inner := archive.inside(key))]
@@ -174,7 +174,7 @@ def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
 
 
 def claims_folder(source: Source, names: set[str]) -> bool:
-    """Return whether the first file of a folder is such a file."""
+    """Return whether the first file of a folder contains results of this tool."""
     first = next((name for name in sorted(names) if name.lower().endswith(_SUFFIXES)), None)
     if first is None or any(name.lower().endswith(".json") for name in names):
         return False

@@ -26,7 +26,7 @@ _KEYS = {"world": ("pose_world", "trans_world"), "camera": ("pose", "trans")}
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     if not archive.keys or not archive.keys[0].lstrip("-").isdigit():
         return False
     person = archive.inside(archive.keys[0])

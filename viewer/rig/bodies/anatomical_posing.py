@@ -112,14 +112,14 @@ DOF_NAMES = tuple(
 _AXES = np.array([axis for _, axes, _ in _TABLE for axis in axes])
 _OWNERS = np.repeat(np.arange(len(_TABLE)), [len(axes) for _, axes, _ in _TABLE])
 _RANKS = np.concatenate([np.arange(len(axes)) for _, axes, _ in _TABLE])
-# Joints whose frames do not follow the shape: the root and the ends of chains.
+# Joints whose frames are independent of the shape: the root and the ends of chains.
 _FIXED = [JOINTS.index(name) for name in ("pelvis", "toes_r", "toes_l", "head", "hand_r", "hand_l")]
 _ARCS = (("lumbar_body", "pelvis"), ("thorax", "lumbar_body"), ("head", "thorax"))
 _TILT = 0.25 * np.pi  # of the shoulder blades on their ellipsoid, at rest
 
 
 def dof_table() -> tuple[Ints, Ints]:
-    """Return joint and kind of each DOF, (46,) int32; the kind is the nearest axis of the bone."""
+    """Return the joint and kind of each DOF, (46,) int32; the kind is the nearest bone axis."""
     kinds = 3 + np.abs(_AXES).argmax(axis=1)
     return _OWNERS.astype(np.int32), kinds.astype(np.int32)
 

@@ -127,7 +127,7 @@ def _rotations(
     drop: Floats,
     shifts: list[Floats],
 ) -> Floats:
-    """Return local rotations (N, J, 4) with which the ankles of all legs are at their targets."""
+    """Return local rotations (N, J, 4) that bring the ankles of all legs to their targets."""
     result = rotations.copy()
     # Knees bend about the axis from the right to the left.
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
