@@ -71,7 +71,7 @@ class VideoFrames:
         self.path = path
         self._errors: Any = _library()
         try:
-            path.open("rb").close()  # FFmpeg's own messages do not name the reason
+            path.open("rb").close()  # FFmpeg's own messages do not state the reason
         except OSError as problem:
             values = {"reason": str(problem.strerror or problem)}
             raise FormatError(Diagnostic("F001.video", path, values=values)) from None
@@ -184,5 +184,5 @@ def _library() -> Any:
 
 
 def _quarter_turns(frame: Any) -> int:
-    """Return the quarter turns, anticlockwise, that make a frame upright, as cameras record it."""
+    """Return the number of anticlockwise 90-degree rotations that make a frame upright."""
     return round(getattr(frame, "rotation", 0) / 90) % 4

@@ -1,4 +1,4 @@
-"""Rigs of MakeHuman: joints at means of vertices, and weights, as JSON."""
+"""Rigs of MakeHuman: joints at the means of vertex positions, and weights, as JSON."""
 
 from __future__ import annotations
 

@@ -245,7 +245,7 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
 
 
 class _Row(NamedTuple):
-    """One person in one frame: points, place, and the parameters of the rig."""
+    """One person in one frame: points, position, and the parameters of the rig."""
 
     frame: int
     points: Floats
@@ -269,7 +269,7 @@ def _track(rows: list[_Row], layout: PointLayout) -> Track:
 
 
 def _rig(rows: list[_Row]) -> tuple[Floats, Floats, Floats, Floats] | None:
-    """Return parameters and places of the rig; None unless every frame has all of them."""
+    """Return parameters and positions of the rig; None unless every frame has all of them."""
     sizes = {tuple(map(len, row.parameters)) for row in rows}
     if len(sizes) != 1 or len(next(iter(sizes))) != len(_MODEL):
         return None

@@ -51,7 +51,7 @@ def module_of(tool: str) -> ModuleType:
 
 
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool, None if it is none of them."""
+    """Return the key in ``TOOLS`` of an archive's tool; None if there is none."""
     return next((tool for tool in TOOLS if module_of(tool).recognises(archive)), None)
 
 
