@@ -47,7 +47,7 @@ def test_other_options_are_parsed():
     [
         ("--smooth=median", "expected one-euro or savgol"),
         ("--smooth=savgol:window=8", "odd window"),
-        ("--smooth=savgol:order=1.5", "whole order"),
+        ("--smooth=savgol:order=1.5", "integer order"),
         ("--smooth=savgol:cutoff=3", "window=NUMBER, order=NUMBER"),
         ("--smooth=one-euro:cutoff=0", "above 0 Hz"),
         ("--merge-ids=3", "at least two"),
