@@ -22,6 +22,7 @@ from viewer.app.weights.hover_text import draw_hover_text
 from viewer.app.weights.legend import draw_legend
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
+from viewer.rig.scene import scene_unit
 
 __all__ = ["draw_hints", "draw_overlays", "n_newest"]
 
@@ -50,7 +51,8 @@ def draw_hints(state: AppState) -> None:
     """
     x, y, width, height = state.view_rect
     step = grid_step(state.box)
-    grid = f"grid {step:g} unit{'s' * (step != 1.0)}   " if state.options.grid else ""
+    unit = scene_unit(state.scene) or f"unit{'s' * (step != 1.0)}"
+    grid = f"grid {step:g} {unit}   " if state.options.grid else ""
     text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
     place = (x + width - size.x - 10, y + height - size.y - 8)
