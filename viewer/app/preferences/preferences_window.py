@@ -50,6 +50,7 @@ _LISTED = 20.0  # rows of the list of keys
 def open_preferences(state: AppState) -> None:
     """Open the window."""
     state.of(Appearance).is_open = True
+    state.of(Files).model_folder = load_model_folder()
 
 
 def draw_preferences(state: AppState) -> None:
@@ -121,7 +122,7 @@ def _draw_view(state: AppState, preferences: Preferences) -> None:
 def _draw_files(state: AppState, preferences: Preferences) -> None:
     preferences.up = choice(state, "Up axis", preferences.up, UPS)
     explain("up axis of captures and BVH files that are opened from now on")
-    folder = load_model_folder()
+    folder = state.of(Files).model_folder
     begin_field("Model folder")
     if button(state, "Choose…##model folder"):
         state.of(Files).dialog = FileDialog(
