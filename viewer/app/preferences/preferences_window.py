@@ -92,19 +92,25 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
         appearance.system_theme = system_theme()
     if preferences.theme == "system" and not appearance.system_theme:
         imgui.text_disabled("the theme of this system is unknown: dark is used")
-    why = "--scale was given on the command line" if appearance.given_scale else ""
-    scales = {"0": f"automatic ({100.0 * appearance.screen_scale:.0f} %)"}
-    scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
-    with disabled(state, why):
-        chosen = choice(state, "Interface scale", f"{preferences.scale:g}", scales)
-        explain("automatic follows the scale of the monitor", why)
-    preferences.scale = float(chosen)
+    _draw_scale(state, preferences)
     changed, size = slider_float(
         state, begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
     )
     note_item(state, "Font size")
     if changed:
         preferences.font_size = float(round(size))
+
+
+def _draw_scale(state: AppState, preferences: Preferences) -> None:
+    given = state.of(Appearance).given_scale
+    if given:
+        with disabled(state, "--scale was given on the command line"):
+            choice(state, "Interface scale", "", {"": f"{100.0 * given:.0f} %"})
+        return
+    scales = {"0": f"automatic ({100.0 * state.of(Appearance).screen_scale:.0f} %)"}
+    scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
+    preferences.scale = float(choice(state, "Interface scale", f"{preferences.scale:g}", scales))
+    explain("automatic follows the scale of the monitor")
 
 
 def _draw_view(state: AppState, preferences: Preferences) -> None:
