@@ -27,7 +27,7 @@ from viewer.rig.scene import scene_unit
 __all__ = ["draw_hints", "draw_overlays", "n_newest"]
 
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
-_BAR_WIDTH = 260.0  # points
+_BAR_WIDTH = 52.0 / 3.0  # in font sizes
 _GAP = 10.0  # points from the edges of the view
 _BETWEEN = 6.0  # points between one overlay and another
 _MOST_NOTES = 8
@@ -102,7 +102,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
     if shown is None:
         return None
     x, y, width, _ = state.view_rect
-    bar = max(min(_BAR_WIDTH, width - 4 * _GAP), 60.0)
+    bar = max(min(_BAR_WIDTH * imgui.get_font_size(), width - 4 * _GAP), 60.0)
     whole = bar + 2.0 * imgui.get_style().window_padding.x
     left = x + (width - whole - _GAP if shown.is_aside else 0.5 * (width - whole))
     top = y + _GAP
