@@ -82,6 +82,15 @@ def test_people_frames_and_shapes() -> None:
 
 
 @pytest.mark.parametrize(
+    ("keys", "numbers"),
+    [(["1", "b"], [1, 2]), ([2, "b", "1"], [1, 2, 3]), (["\u00b2", "-4"], [0, 1])],
+)
+def test_keys_without_numbers_hide_nobody(keys: list[Any], numbers: list[int]) -> None:
+    one = {"rotmat": TURNED, "trans": PLACES}
+    assert sorted(bodies(dict.fromkeys(keys, one))) == numbers
+
+
+@pytest.mark.parametrize(
     ("count", "names"), [(22, "SMPL"), (24, "SMPL"), (52, "SMPL+H"), (55, "SMPL-X")]
 )
 def test_members_of_the_family(count: int, names: str) -> None:

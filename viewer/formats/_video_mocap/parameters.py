@@ -13,7 +13,8 @@ and single poses in their own spellings are read by ``amass.py`` and ``pose.py``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,14 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import RowBudget, frames_of, places, rows, shape_of
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    frames_of,
+    person_number,
+    places,
+    rows,
+    shape_of,
+)
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
 from viewer.phrases import printable
@@ -176,9 +184,15 @@ def _people(found: list[tuple[tuple[str, ...], Archive, _Layout]]) -> dict[int, 
         return {0: _joined(tracks)}
     people: dict[int, Track] = {}
     for index, ((path, _, _), track) in enumerate(zip(found, tracks, strict=True)):
-        number = next((int(part) for part in path if part.isdigit() and len(part) < 10), index)
-        people[index if number in people else number] = track
+        known = (person_number(part) for part in path)
+        number = next((each for each in known if each is not None and each >= 0), index)
+        people[number if number not in people else _unused(people, index)] = track
     return people
+
+
+def _unused(people: Mapping[int, Track], first: int) -> int:
+    """Return the lowest number from ``first`` that nobody has."""
+    return next(number for number in itertools.count(first) if number not in people)
 
 
 def _track(archive: Archive, layout: _Layout) -> Track:
