@@ -103,11 +103,13 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
 
 def _people(text: str) -> tuple[int, ...]:
     """Return the numbers of people to merge."""
-    if not re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII):
+    is_list = re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII)
+    people = tuple(dict.fromkeys(map(int, text.split(",")))) if is_list else ()
+    if len(people) < 2:
         raise argparse.ArgumentTypeError(
             f"expected at least two numbers of people, as in 3,7, found {printable(text, 40)}"
         )
-    return tuple(dict.fromkeys(int(part) for part in text.split(",")))
+    return people
 
 
 def _longest(text: str) -> int:

@@ -51,6 +51,7 @@ def test_other_options_are_parsed():
         ("--smooth=savgol:cutoff=3", "window=NUMBER, order=NUMBER"),
         ("--smooth=one-euro:cutoff=0", "above 0 Hz"),
         ("--merge-ids=3", "at least two"),
+        ("--merge-ids=3,3", "at least two"),
         ("--fill-gaps=0", "number of frames"),
         ("--trim=1:2:3", "expected A:B"),
         ("--resample=0", "frames per second"),
