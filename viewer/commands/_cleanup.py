@@ -6,7 +6,6 @@ import argparse
 import re
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.errors import ViewerError
 from viewer.loading.cleaning import CleanUp
 from viewer.phrases import printable
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -85,9 +84,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         return CleanUp()
     frames = None
     if arguments.trim is not None:
-        span = parse_range(arguments.trim, "--trim")
-        if span.step != 1:
-            raise ViewerError(f"--trim: expected A:B, found {printable(arguments.trim, 40)}")
+        span = parse_range(arguments.trim, "--trim", steps=False)
         frames = span.first, span.stop
     return CleanUp(
         merged=tuple(arguments.merge_ids),

@@ -53,7 +53,8 @@ def test_other_options_are_parsed():
         ("--merge-ids=3", "at least two"),
         ("--merge-ids=3,3", "at least two"),
         ("--fill-gaps=0", "number of frames"),
-        ("--trim=1:2:3", "expected A:B"),
+        ("--trim=1:2:3", "expected A:B with A below B"),
+        ("--trim=5:2", "expected A:B with A below B"),
         ("--resample=0", "frames per second"),
     ],
 )
