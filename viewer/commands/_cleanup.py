@@ -6,7 +6,6 @@ import argparse
 import re
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.errors import ViewerError
 from viewer.loading.cleaning import CleanUp
 from viewer.phrases import printable
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -87,9 +86,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         return CleanUp()
     frames = None
     if arguments.trim is not None:
-        span = parse_range(arguments.trim, "--trim")
-        if span.step != 1:
-            raise ViewerError(f"--trim: expected A:B, found {printable(arguments.trim, 40)}")
+        span = parse_range(arguments.trim, "--trim", steps=False)
         frames = span.first, span.stop
     return CleanUp(
         merged=tuple(arguments.merge_ids),
@@ -105,11 +102,13 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
 
 def _people(text: str) -> tuple[int, ...]:
     """Return the numbers of people to merge."""
-    if not re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII):
+    is_list = re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII)
+    people = tuple(dict.fromkeys(map(int, text.split(",")))) if is_list else ()
+    if len(people) < 2:
         raise argparse.ArgumentTypeError(
             f"expected at least two numbers of people, as in 3,7, found {printable(text, 40)}"
         )
-    return tuple(dict.fromkeys(int(part) for part in text.split(",")))
+    return people
 
 
 def _longest(text: str) -> int:

@@ -225,6 +225,7 @@ def _give_body_motion(
     except RigError as problem:
         values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
+    cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
     up = settings.up or motion.up
     if not up:
@@ -238,7 +239,6 @@ def _give_body_motion(
         return
     if is_bundled:
         _note_bundled(cast, path, *lost)
-    cast.diagnostics += [replace(note, path=path) for note in notes]
     cast.add(actor, up[-1], placed=False)
 
 

@@ -93,6 +93,12 @@ def test_arrays_that_do_not_fit(changes: dict[str, Any], key: str) -> None:
     assert refusal(changes) == key
 
 
+def test_keys_are_numbers_of_people() -> None:
+    people: dict[Any, Any] = {**wham(), "x": wham()[0]}
+    with pytest.raises(FormatError, match="x: expected a person with a number"):
+        open_results(Source("a.pkl", joblib_file(people)))
+
+
 def test_nobody_is_refused() -> None:
     empty = {0: {key: value[:0] for key, value in wham()[0].items()}}
     with pytest.raises(FormatError) as caught:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = [
     "intrinsics_of",
     "matrices",
     "numbers",
+    "person_number",
     "places",
     "rotations_of",
     "rows",
@@ -33,6 +35,7 @@ __all__ = [
 Frames = np.ndarray[Any, np.dtype[np.int64]]
 
 _MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
+_PERSON = re.compile(r"-?[0-9]{1,9}")
 _SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
 
 
@@ -58,6 +61,15 @@ class RowBudget:
 def has(archive: Archive | None, *keys: str) -> bool:
     """Return whether an archive has all of some keys."""
     return archive is not None and all(archive.has(key) for key in keys)
+
+
+def person_number(key: str) -> int | None:
+    """Return the number of a person from a key, or None if the key is no number.
+
+    >>> person_number("-1"), person_number("camera")
+    (-1, None)
+    """
+    return int(key) if _PERSON.fullmatch(key) else None
 
 
 def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
