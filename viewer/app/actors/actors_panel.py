@@ -119,6 +119,7 @@ def _draw_springs(state: AppState, actor: Actor) -> None:
 
 def _draw_following(state: AppState) -> None:
     """Draw the choice of the camera's target: the chosen actor, its selected joint or none."""
+    imgui.align_text_to_frame_padding()
     imgui.text_unformatted("Camera follows")
     same_line_if_room("Actor")
     target = state.of(Following).target
