@@ -200,6 +200,16 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     )
 
 
+def test_a_character_without_a_mesh_is_written(tmp_path: Path) -> None:
+    file = swinging()
+    for node in file.root["nodes"]:
+        node.pop("mesh", None), node.pop("skin", None)
+    for name in ("meshes", "skins", "materials"):
+        del file.root[name]
+    written, _ = convert(file, tmp_path)
+    assert "materials" not in written.root and written.root["extensions"]["VRMC_vrm"]["humanoid"]
+
+
 @pytest.mark.parametrize(
     ("version", "place", "value"),
     [
