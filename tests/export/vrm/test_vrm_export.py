@@ -200,6 +200,22 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     )
 
 
+def test_a_collider_group_without_a_joint_moves_to_a_written_joint(tmp_path: Path) -> None:
+    file = swinging(0, turn=False)
+    vrm = file.root["extensions"]["VRM"]
+    vrm["secondaryAnimation"]["colliderGroups"][0]["node"] = 99
+    # The hips, the first joint of the written file, come last in the original.
+    file.root["nodes"].append(file.root["nodes"][0])
+    file.root["nodes"][0] = {"name": "unused"}
+    last = len(file.root["nodes"]) - 1
+    for listed in (file.root["scenes"][0]["nodes"], file.root["skins"][0]["joints"]):
+        listed[0] = last
+    vrm["humanoid"]["humanBones"][0]["node"] = last
+    written, _ = convert(file, tmp_path)
+    (kept,) = written.root["extensions"]["VRM"]["secondaryAnimation"]["colliderGroups"]
+    assert (written.name(kept["node"]), kept["colliders"]) == ("hips", [])
+
+
 def test_a_character_without_a_mesh_is_written(tmp_path: Path) -> None:
     file = swinging()
     for node in file.root["nodes"]:
