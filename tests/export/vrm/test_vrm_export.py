@@ -186,6 +186,11 @@ def test_requested_meta_replaces_that_of_the_file(tmp_path: Path) -> None:
     assert (meta["name"], meta["authors"], meta["version"]) == ("Bea", ["C"], "2")
 
 
+def test_empty_authors_keep_those_of_the_file(tmp_path: Path) -> None:
+    written, _ = convert(swinging(), tmp_path, authors=("",))
+    assert written.root["extensions"]["VRMC_vrm"]["meta"]["authors"] == META["authors"]
+
+
 def test_lost_references_are_counted(tmp_path: Path) -> None:
     file = swinging()
     vrm = file.root["extensions"]["VRMC_vrm"]
