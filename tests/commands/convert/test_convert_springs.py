@@ -48,3 +48,13 @@ def test_figures_without_springs_are_refused(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "--bake-springs: no figure with a motion has joints that swing" in said
     assert np.array_equal([*tmp_path.iterdir()], [path])
+
+
+@pytest.mark.parametrize("suffix", [".vrm", ".vrma"])
+def test_formats_without_such_motions_are_refused(tmp_path, capsys, suffix):
+    path = tmp_path / "ada.vrm"
+    path.write_bytes(swinging().glb())
+    assert run(["convert", str(path), "-o", f"{tmp_path}/a{suffix}", "--bake-springs"]) == 2
+    said = capsys.readouterr().err
+    assert f"--bake-springs: {suffix} cannot store motions of joints that swing" in said
+    assert [*tmp_path.iterdir()] == [path]
