@@ -177,3 +177,16 @@ def test_an_upside_down_file_is_understood(body):
     expected, _ = posed(body, twin(t_pose(), starts_in_t_pose=False), "zero")
     flip = np.diag([1.0, -1.0, -1.0])
     assert degrees(found, flip @ expected[..., :3, :3]).max() < 5.0
+
+
+@pytest.mark.parametrize("starts_in_t_pose", [True, False])
+def test_files_with_z_up_are_understood(body, starts_in_t_pose):
+    motion = twin(along_x(), starts_in_t_pose)
+    raised = matrix_to_quaternion(matrices(np.array([[np.pi / 2.0, 0.0, 0.0]])))
+    rotations = motion.clip.rotations.copy()
+    rotations[:, 0] = multiply(np.tile(raised, (N_FRAMES, 1)), rotations[:, 0])
+    clip = replace(motion.clip, rotations=rotations, translations=None)
+    turned = replace(motion, clip=clip, figure=replace(motion.figure, up="z"))
+    found, _ = posed(body, turned)
+    expected, _ = posed(body, twin(t_pose(), starts_in_t_pose), "zero")
+    assert degrees(found, expected).max() < 5.0

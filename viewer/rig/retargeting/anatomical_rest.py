@@ -2,7 +2,8 @@
 
 The trunk stands upright in its mean posture, the legs hang straight down with the knees' axes
 sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
-level. All other joints keep their mean rotation.
+level. All other joints keep their mean rotation. A bend of the spine or a twist of the
+forearms that never changes cannot be seen: it counts as part of the rest pose.
 """
 
 from __future__ import annotations
