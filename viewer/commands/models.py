@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def _add(arguments: argparse.Namespace) -> int:
         wanted = name_hint(name, ADDABLE) if name else f"expected one of {', '.join(ADDABLE)}"
         raise ViewerError(f'models add: cannot add "{printable(name, 60)}": {wanted}')
     if arguments.dry_run:
-        print(" ".join(pip_command(name, data_folder())))
+        print(subprocess.list2cmdline(pip_command(name, data_folder())))
         return 0
     model = CATALOG[name]
     print(f"downloading {model.title} ({model.licence}) with pip …", file=sys.stderr)

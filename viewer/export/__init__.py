@@ -391,10 +391,7 @@ class _CallableModule(ModuleType):
     name in ``viewer``.
     """
 
-    def __call__(
-        self, actor: Actor, path: str | Path, skinning: Skinning | None = None
-    ) -> list[Diagnostic]:
-        return export(actor, path, skinning)
+    __call__ = staticmethod(export)
 
 
 sys.modules[__name__].__class__ = _CallableModule

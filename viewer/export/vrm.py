@@ -146,7 +146,8 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
             _declare(document, _TOON)
         if not item:
             del document.root["materials"][written]["extensions"]
-    is_used = any(_UNLIT in item.get("extensions", {}) for item in document.root["materials"])
+    items = document.root.get("materials", ())
+    is_used = any(_UNLIT in item.get("extensions", {}) for item in items)
     used = document.root.get("extensionsUsed", [])
     if _UNLIT in used and not is_used:
         used.remove(_UNLIT)

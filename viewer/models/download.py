@@ -62,7 +62,7 @@ def _downloaded(name: str, folder: Path) -> Path:
     wheels = sorted(folder.glob("*.whl"))
     if result.returncode or not wheels:
         lines = (result.stderr or result.stdout).strip().splitlines() or ["no message"]
-        shown = " ".join(pip_command(name, data_folder())[1:])
+        shown = subprocess.list2cmdline(pip_command(name, data_folder())[1:])
         raise ViewerError(
             f"models: pip could not download {ADDABLE[name]}: {printable(lines[-1], 200)}; run "
             f"python {printable(shown, 400)} where there is a network, or put the .whl file into "

@@ -216,6 +216,18 @@ def test_animations_are_written_with_their_keys(tmp_path, capsys, options, anima
     assert [animation.name for animation in figure.animations] == animations
 
 
+def test_a_figure_without_the_chosen_animation_is_written_in_its_pose(tmp_path, capsys):
+    figure = two_parts()
+    export_clips(Actor(figure), tmp_path / "both.glb")
+    export_clips(Actor(figure), tmp_path / "wave.glb", clips=[figure.animations[0].clip()])
+    files = [str(tmp_path / name) for name in ("both.glb", "wave.glb")]
+    out = tmp_path / "out.glb"
+    assert run(["convert", *files, "--animation", "jump", "--optimize", "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert "both: largest difference of vertices over 1 animation" in said
+    assert "wave: vertices differ from the pose by up to" in said and "0 animations" not in said
+
+
 def test_only_gltf_is_optimised(tmp_path, capsys):
     export_clips(Actor(two_parts()), tmp_path / "in.glb")
     command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]

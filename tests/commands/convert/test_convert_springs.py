@@ -29,6 +29,7 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     assert run(["convert", str(path), "-o", str(out), "--fps", "60", *options]) == 0
     said = capsys.readouterr().out
     assert ("simulated rotations of 3 spring joints are written" in said) == bakes
+    assert "the humanoid bone map, 1 spring chain" in said
     assert ("viewer convert --bake-springs writes the simulated ones" in said) == (not bakes)
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors
@@ -47,3 +48,13 @@ def test_figures_without_springs_are_refused(tmp_path, capsys):
     said = capsys.readouterr().err
     assert "--bake-springs: no figure with a motion has spring joints" in said
     assert np.array_equal([*tmp_path.iterdir()], [path])
+
+
+@pytest.mark.parametrize("suffix", [".vrm", ".vrma"])
+def test_formats_without_such_motions_are_refused(tmp_path, capsys, suffix):
+    path = tmp_path / "ada.vrm"
+    path.write_bytes(swinging().glb())
+    assert run(["convert", str(path), "-o", f"{tmp_path}/a{suffix}", "--bake-springs"]) == 2
+    said = capsys.readouterr().err
+    assert f"--bake-springs: {suffix} cannot store motions of spring joints" in said
+    assert [*tmp_path.iterdir()] == [path]

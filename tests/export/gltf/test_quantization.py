@@ -64,7 +64,7 @@ def test_one_pose_is_quantised_too(tmp_path, unbound):
     figure = replace(two_parts(), animations=(), record=None)
     if unbound:
         figure = replace(figure, skin=None, skeleton=None)
-    notes = export(Actor(figure), tmp_path / "small.glb", optimizes=True)
+    notes = viewer.export(Actor(figure), tmp_path / "small.glb", optimizes=True)
     assert "X002.quantized" in [note.key for note in notes]
     back = viewer.load(tmp_path / "small.glb").actors[0]
     found = deform(back.figure, back.pose, Skinning())[0]

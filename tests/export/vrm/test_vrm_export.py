@@ -186,6 +186,11 @@ def test_requested_meta_replaces_that_of_the_file(tmp_path: Path) -> None:
     assert (meta["name"], meta["authors"], meta["version"]) == ("Bea", ["C"], "2")
 
 
+def test_empty_authors_keep_those_of_the_file(tmp_path: Path) -> None:
+    written, _ = convert(swinging(), tmp_path, authors=("",))
+    assert written.root["extensions"]["VRMC_vrm"]["meta"]["authors"] == META["authors"]
+
+
 def test_lost_references_are_counted(tmp_path: Path) -> None:
     file = swinging()
     vrm = file.root["extensions"]["VRMC_vrm"]
@@ -198,6 +203,32 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     assert lost.endswith("1 first-person setting, 1 texture") or lost.endswith(
         "1 first-person setting and 1 texture"
     )
+
+
+def test_a_collider_group_without_a_joint_moves_to_a_written_joint(tmp_path: Path) -> None:
+    file = swinging(0, turn=False)
+    vrm = file.root["extensions"]["VRM"]
+    vrm["secondaryAnimation"]["colliderGroups"][0]["node"] = 99
+    # The hips, the first joint of the written file, come last in the original.
+    file.root["nodes"].append(file.root["nodes"][0])
+    file.root["nodes"][0] = {"name": "unused"}
+    last = len(file.root["nodes"]) - 1
+    for listed in (file.root["scenes"][0]["nodes"], file.root["skins"][0]["joints"]):
+        listed[0] = last
+    vrm["humanoid"]["humanBones"][0]["node"] = last
+    written, _ = convert(file, tmp_path)
+    (kept,) = written.root["extensions"]["VRM"]["secondaryAnimation"]["colliderGroups"]
+    assert (written.name(kept["node"]), kept["colliders"]) == ("hips", [])
+
+
+def test_a_character_without_a_mesh_is_written(tmp_path: Path) -> None:
+    file = swinging()
+    for node in file.root["nodes"]:
+        node.pop("mesh", None), node.pop("skin", None)
+    for name in ("meshes", "skins", "materials"):
+        del file.root[name]
+    written, _ = convert(file, tmp_path)
+    assert "materials" not in written.root and written.root["extensions"]["VRMC_vrm"]["humanoid"]
 
 
 @pytest.mark.parametrize(

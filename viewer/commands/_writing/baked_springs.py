@@ -7,6 +7,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
+from viewer.phrases import printable
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.spring_motion import has_springs, with_baked_springs
 from viewer.rig.scene import Scene
@@ -30,6 +31,10 @@ def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> l
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
     actors = actors if holds_motion else []
     bakes = arguments.springs == "on"
+    if bakes and not holds_motion:
+        raise ViewerError(
+            f"--bake-springs: {printable(output.suffix)} cannot store motions of spring joints"
+        )
     if bakes and not actors:
         raise ViewerError("--bake-springs: no figure with a motion has spring joints")
     notes = []

@@ -203,6 +203,8 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
         lost.append(Phrase("part-expressions", n=mixed))
     if skeleton is not None and skeleton.humanoid is not None and not is_vrm:
         lost.append(Phrase("part-humanoid"))
+    if skeleton is not None and skeleton.springs is not None and not is_vrm:
+        lost.append(Phrase("part-springs", n=skeleton.springs.n_chains))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)

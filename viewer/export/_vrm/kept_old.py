@@ -109,7 +109,7 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     for each in _list(told, "colliderGroups"):
         node = maps.joint(part(each, "node"), "colliders")
         # A group without a joint would be invalid: it moves to the first joint, without colliders.
-        empty = {"node": next(iter(maps.record.joints), 0), "colliders": []}
+        empty = {"node": maps.first_joint, "colliders": []}
         is_kept = node is not None and isinstance(each, dict)
         colliders.append({**each, "node": node} if is_kept else empty)
     return {**told, "boneGroups": groups, "colliderGroups": colliders}

@@ -43,6 +43,11 @@ class Maps:
         """Return the written node of a joint; None, counted as lost, if there is none."""
         return self._found(self._joints, node, kind)
 
+    @property
+    def first_joint(self) -> int:
+        """The written node of the file's first joint."""
+        return next(iter(self._joints.values()), 0)
+
     def drawn(self, node: Any, kind: str) -> int | None:
         """Return the written node of a mesh; None, counted as lost, if there is none."""
         return self._found(self._drawn, node, kind)

@@ -45,8 +45,8 @@ def changed_meta(told: dict[str, Any], meta: VrmMeta, version: int) -> dict[str,
     changed = dict(told)
     if meta.name:
         changed[names[0]] = text_of(meta.name)
-    if meta.authors:
-        listed = [text_of(author) for author in meta.authors]
+    listed = [text_of(author) for author in meta.authors if author]
+    if listed:
         changed[names[1]] = ", ".join(listed) if version == 0 else listed
     if meta.licence:
         changed["otherLicenseUrl" if version == 0 else "licenseUrl"] = text_of(meta.licence)
