@@ -1,4 +1,4 @@
-"""Programs forked from a process that has imported the viewer: importing takes most of a short run.
+"""Programs forked from a process that has imported the viewer, to save the time of imports.
 
 A forked program starts at its own first line, with default signal handlers, and ends as any program
 does: exit functions run, and the interpreter is torn down.
@@ -18,8 +18,8 @@ from pathlib import Path
 from children import listening
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 100.0  # seconds until a program counts as stuck
-# All that a run imports on its way, except the module that begins it.
+PATIENCE = 100.0  # seconds after which a program counts as hung
+# All modules that a run imports, except its first one.
 IMPORTED = (
     "numpy",
     "moderngl",
@@ -69,7 +69,7 @@ class Forker:
         for _, writing in pipes:
             os.close(writing)
         streams = []
-        for reading, _ in pipes:  # so little that no pipe is ever full
+        for reading, _ in pipes:  # too little to fill a pipe
             with os.fdopen(reading, "rb") as stream:
                 streams.append(stream.read())
         code = int(self._connection.recv(16) or self._failed())

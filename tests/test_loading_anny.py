@@ -1,4 +1,4 @@
-"""Anny with motions and options: driven by bodies of the SMPL family, shaped by its own numbers."""
+"""Anny with motions and options: driven by SMPL-family bodies, shaped by its own sliders."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from viewer.loading import MotionSettings
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a tiny Anny whose joints have names of a body, and a motion."""
+    """A folder with a motion and a tiny Anny whose joints are named like those of a body."""
     monkeypatch.chdir(tmp_path)
     content, _ = files(ACTIONS)
     named = {b'"hips"': b'"spine"', b'"shin"': b'"neck"', b'"toe"': b'"head"'}

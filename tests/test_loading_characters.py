@@ -1,4 +1,4 @@
-"""Motions of bodies and of other figures on characters with joints of their own."""
+"""Motions of bodies and other figures retargeted to characters with different joints."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ def test_captured_people_are_shown_as_the_character(capture, hero, is_named):
     for before, after in zip(plain.actors, scene.actors, strict=True):
         for frame in (0, 3):
             time = frame / 30
-            # The rest pose of the body is a T-pose within some degrees, which limbs make up for.
+            # The rest pose of the body is a T-pose to within a few degrees, for which the limbs
+            # compensate.
             found = directions(after, time)
             assert_allclose(found, directions(before, time, NAMES), rtol=0, atol=1e-6)
 
@@ -107,6 +108,18 @@ def test_amass_moves_the_figure_of_the_model_option(amass, hero):
     (found,) = load(amass, motion=MotionSettings(model=hero)).actors
     assert found.figure.name == "hero" and found.title == "walk"
     assert_allclose(directions(found, 0.1), directions(plain, 0.1, NAMES), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("is_named", [True, False])
+def test_fingers_that_the_body_lacks_are_a_note(is_named, hero, tmp_path):
+    poses = np.zeros((2, 156))
+    poses[:, 66:69] = 0.3  # left_index1: the hands follow 22 joints
+    np.savez(tmp_path / "hand.npz", poses=poses, trans=np.zeros((2, 3)), mocap_framerate=30.0)
+    paths = (tmp_path / "hand.npz", *(() if is_named else (hero,)))
+    scene = load(*paths, motion=MotionSettings(model=hero if is_named else None))
+    assert [actor.figure.name for actor in scene.actors] == ["hero"]
+    notes = [note for note in scene.diagnostics if note.key == "F007.joints-left-out"]
+    assert [note.values["names"] for note in notes] == [["left_index1"]]
 
 
 def test_gravity_points_down_in_the_world_of_the_motion(amass, hero):

@@ -58,6 +58,18 @@ def test_text_output_matches_json(tmp_path, capsys):
         assert words in text
 
 
+def test_size_has_its_unit_if_the_file_has_one(tmp_path, capsys):
+    rig = write_rig(tmp_path)
+    assert run(["convert", *map(str, rig), "-o", str(tmp_path / "a.glb")]) == 0
+    for path, unit in ((tmp_path / "a.glb", "m"), (rig[0], None)):
+        capsys.readouterr()
+        assert run(["info", str(path)]) == 0
+        box = capsys.readouterr().out.splitlines()[1].split(", ")
+        assert box[-2].endswith(" m") == (unit == "m") and box[-2].startswith("size ")
+        assert run(["info", str(path), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["actors"][0]["unit"] == unit
+
+
 def test_parts_alone_are_described(describe, tmp_path):
     skel, skin = write_rig(tmp_path)
     assert set(describe(skel)["actors"][0]) >= {"skeleton"}

@@ -1,4 +1,4 @@
-"""``viewer models``: the list of body models, and models that anyone may use."""
+"""``viewer models``: the list of body models, and the addition of freely licensed ones."""
 
 import shlex
 import zipfile

@@ -1,6 +1,6 @@
-"""Writes the tiny files of torch and joblib in this folder, with torch 2.13 and joblib 1.6.
+"""Writes the tiny torch and joblib files in this folder, with torch 2.13 and joblib 1.6.
 
-The tests read them; neither package is needed for that. Run in an environment that has both.
+The tests read them without either package. Run in an environment that has both.
 """
 
 import collections

@@ -88,6 +88,6 @@ def test_gltf_holds_the_figure_at_rest(rigged, tmp_path):
     plain = without_correctives(found)
     assert actor.figure.require_skeleton().n_joints == plain.skeleton.n_joints
     wanted = deform(plain, rest_pose(plain.skeleton))[0]
-    # Single precision of the file.
+    # The file is in single precision.
     assert_allclose(deform(actor.figure, actor.pose)[0], wanted, rtol=0, atol=1e-6)
     assert files_of(tmp_path / "arm.gltf") == [tmp_path / "arm.gltf", tmp_path / "arm.bin"]

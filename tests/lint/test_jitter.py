@@ -1,4 +1,4 @@
-"""Noise of motions against its known size; smooth motion, jumps and gaps are no noise."""
+"""Estimated noise of motions against its known size; jumps and gaps are not noise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""People who exchange their numbers, and tracks that continue under another number."""
+"""Swapped IDs of people, and tracks that continue under another ID."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def found(scene: Scene):
 def test_an_exchange_names_the_other_person_and_the_distance() -> None:
     (finding,) = found(exchanged())
     assert finding.message == (
-        "jumps by 2000 mm to the place of person 1, who jumps to the place of this person, in "
+        "jumps by 2000 mm to the position of person 1, who jumps to that of this person, in "
         "1 frame: 120"
     )
 

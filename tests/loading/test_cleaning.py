@@ -94,6 +94,13 @@ def test_missing_people_are_refused_with_the_known_numbers():
         clean_up(scene, CleanUp(merged=((0, 5),)))
 
 
+def test_motions_without_people_are_not_merged():
+    actor = person(0, 0, 30)
+    actor.person = None
+    with pytest.raises(RigError, match="expected people with numbers, found none"):
+        clean_up(Scene([actor]), CleanUp(merged=((0, 5),)))
+
+
 def test_keypoints_are_cleaned_too():
     figure, clip = keypoints()
     rows = clip.timing.rows.copy()

@@ -5,7 +5,7 @@ from rig.hand_made import mesh, skeleton
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
-from viewer.rig.scene import Actor, Scene, actor_points, scene_box
+from viewer.rig.scene import Actor, Scene, actor_points, scene_box, scene_unit
 
 
 def cloud(points) -> Actor:
@@ -74,3 +74,22 @@ def test_actor_without_pose_or_motion_is_reported():
         actor.require_pose()
     with pytest.raises(RigError, match=r"^cloud has no motion$"):
         actor.require_clip()
+
+
+@pytest.mark.parametrize(
+    ("unit", "placed", "posed", "expected"),
+    [
+        ("m", 1.0, 1.0, "m"),
+        ("cm", 1.0, 1.0, "cm"),
+        ("cm", 0.01, 1.0, "m"),  # placed in metres
+        ("cm", 1.0, 0.01, "m"),  # posed in metres
+        ("m", 1.0, 1.3, "m"),  # enlarged by the user
+        ("m", 1.3, 1.0, ""),
+        ("", 1.0, 1.0, ""),
+    ],
+)
+def test_unit_of_the_scene_is_that_of_the_placed_figure(unit, placed, posed, expected):
+    figure = Figure("a", skeleton=skeleton([-1], []), unit=unit)
+    actor = Actor(figure, placement=np.diag([placed, placed, placed, 1.0]))
+    actor.pose.figure_scale = posed
+    assert scene_unit(Scene([cloud([[0, 0, 0]]), actor])) == expected

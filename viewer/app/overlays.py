@@ -22,11 +22,12 @@ from viewer.app.weights.hover_text import draw_hover_text
 from viewer.app.weights.legend import draw_legend
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
+from viewer.rig.scene import scene_unit
 
 __all__ = ["draw_hints", "draw_overlays", "n_newest"]
 
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
-_BAR_WIDTH = 260.0  # points
+_BAR_WIDTH = 52.0 / 3.0  # in font sizes
 _GAP = 10.0  # points from the edges of the view
 _BETWEEN = 6.0  # points between one overlay and another
 _MOST_NOTES = 8
@@ -50,7 +51,8 @@ def draw_hints(state: AppState) -> None:
     """
     x, y, width, height = state.view_rect
     step = grid_step(state.box)
-    grid = f"grid {step:g} unit{'s' * (step != 1.0)}   " if state.options.grid else ""
+    unit = scene_unit(state.scene) or f"unit{'s' * (step != 1.0)}"
+    grid = f"grid {step:g} {unit}   " if state.options.grid else ""
     text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
     place = (x + width - size.x - 10, y + height - size.y - 8)
@@ -100,7 +102,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
     if shown is None:
         return None
     x, y, width, _ = state.view_rect
-    bar = max(min(_BAR_WIDTH, width - 4 * _GAP), 60.0)
+    bar = max(min(_BAR_WIDTH * imgui.get_font_size(), width - 4 * _GAP), 60.0)
     whole = bar + 2.0 * imgui.get_style().window_padding.x
     left = x + (width - whole - _GAP if shown.is_aside else 0.5 * (width - whole))
     top = y + _GAP

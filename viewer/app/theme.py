@@ -49,7 +49,7 @@ _USES = {
     "track active": ("slider_grab_active", "resize_grip_hovered", "resize_grip_active"),
     "dim": ("modal_window_dim_bg",),
     "grip": ("resize_grip",),
-    "chosen text": ("text_selected_bg",),
+    "chosen text": ("text_selected_bg", "plot_histogram"),
     "mark": ("check_mark", "tab_selected_overline"),
 }
 

@@ -6,7 +6,6 @@ import argparse
 import re
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.errors import ViewerError
 from viewer.loading.cleaning import CleanUp
 from viewer.phrases import printable
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -21,14 +20,16 @@ _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "o
 
 def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that clean up captured motions."""
-    group = parser.add_argument_group("clean-up of captures: in this order, changes are printed")
+    group = parser.add_argument_group(
+        "clean-up of captures, applied in this order; changes are printed"
+    )
     group.add_argument(
         "--merge-ids",
         type=_people,
         action="append",
         default=[],
         metavar="A,B,…",
-        help="people whose tracks belong to one person, who keeps the number A; may be repeated",
+        help="IDs of tracks that belong to one person, who keeps ID A; may be repeated",
     )
     group.add_argument(
         "--fill-gaps",
@@ -77,7 +78,7 @@ def _add_feet(group: argparse._ArgumentGroup) -> None:
 
 
 def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
-    """Return the requested clean-up; nothing for a command without these options.
+    """Return the requested clean-up, which is empty for a command without these options.
 
     Raises ViewerError if the frames are not a range.
     """
@@ -85,9 +86,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
         return CleanUp()
     frames = None
     if arguments.trim is not None:
-        span = parse_range(arguments.trim, "--trim")
-        if span.step != 1:
-            raise ViewerError(f"--trim: expected A:B, found {printable(arguments.trim, 40)}")
+        span = parse_range(arguments.trim, "--trim", steps=False)
         frames = span.first, span.stop
     return CleanUp(
         merged=tuple(arguments.merge_ids),
@@ -103,18 +102,20 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
 
 def _people(text: str) -> tuple[int, ...]:
     """Return the numbers of people to merge."""
-    if not re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII):
+    is_list = re.fullmatch(r"\s*\d{1,9}(\s*,\s*\d{1,9})+\s*", text, re.ASCII)
+    people = tuple(dict.fromkeys(map(int, text.split(",")))) if is_list else ()
+    if len(people) < 2:
         raise argparse.ArgumentTypeError(
             f"expected at least two numbers of people, as in 3,7, found {printable(text, 40)}"
         )
-    return tuple(dict.fromkeys(int(part) for part in text.split(",")))
+    return people
 
 
 def _longest(text: str) -> int:
     """Return the length of the longest gap in frames."""
     if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
         raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or nothing with the files before the option, found "
+            f"expected a number of frames, or no value and the files before the option, found "
             f"{printable(text, 60)}"
         )
     return int(text)
@@ -125,7 +126,7 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
     name, _, rest = text.partition(":")
     if name not in _KEYS:
         raise argparse.ArgumentTypeError(
-            f"expected one-euro or savgol, or nothing with the files before the option, found "
+            f"expected one-euro or savgol, or no value and the files before the option, found "
             f"{printable(text, 60)}"
         )
     values = {}
@@ -156,6 +157,6 @@ def _savgol(values: dict[str, float]) -> SavitzkyGolay:
         )
     if order != int(order) or order > 9 or ("window" in values and order >= window):
         raise argparse.ArgumentTypeError(
-            f"savgol: expected a whole order of 0 to 9, below the window, found {order:g}"
+            f"savgol: expected an integer order from 0 to 9, less than the window, found {order:g}"
         )
     return SavitzkyGolay(int(window), int(order))

@@ -82,20 +82,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
 def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that control how captures and BVH are read."""
     group = parser.add_argument_group("captures and BVH")
-    group.add_argument(
-        "--model",
-        metavar="FIGURE",
-        help="body model for captured bodies, or driven by BVH (default: one among FILES; for "
-        "captured bodies, otherwise the bundled body)",
-    )
-    group.add_argument(
-        "--motion",
-        action="append",
-        default=[],
-        metavar="FILE",
-        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
-        "figure of its own; may be repeated",
-    )
+    _add_driving_arguments(group)
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
@@ -121,6 +108,33 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
+    """Add the options for motions that drive figures."""
+    group.add_argument(
+        "--model",
+        metavar="FIGURE",
+        help="body model for captured bodies, or driven by BVH (default: one among FILES; for "
+        "captured bodies, otherwise the bundled body)",
+    )
+    group.add_argument(
+        "--motion",
+        action="append",
+        default=[],
+        metavar="FILE",
+        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
+        "figure of its own; may be repeated",
+    )
+    group.add_argument(
+        "--source-rest",
+        type=_source_rest,
+        default="auto",
+        metavar="N|zero|auto",
+        help="rest pose of a skeleton that drives a figure: frame N, the file's zero pose, or "
+        "auto: the zero pose if it is a standing pose, otherwise a frame in a T- or A-pose, "
+        "otherwise estimated from the motion (default: auto)",
+    )
+
+
 def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
     """Add the options of video motion capture, and of cameras' images."""
     group.add_argument(
@@ -143,8 +157,16 @@ def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--average-shape",
         action="store_true",
-        help="average each person's shape over time, where video motion capture varies it",
+        help="average each person's shape over time if the files have one per frame",
     )
+
+
+def _source_rest(text: str) -> int | str:
+    if text in ("zero", "auto"):
+        return text
+    if re.fullmatch(r"-?\d{1,9}", text):
+        return int(text)
+    raise argparse.ArgumentTypeError(f"expected a frame number, zero or auto, found {text}")
 
 
 def add_animation_argument(group: argparse._ArgumentGroup) -> None:
@@ -167,6 +189,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         frame_rate=arguments.fps,
         space=arguments.space or "",
         average_shape=arguments.average_shape,
+        source_rest=arguments.source_rest,
         find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",

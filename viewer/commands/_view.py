@@ -134,7 +134,7 @@ def _add_switches(group: argparse._ArgumentGroup) -> None:
         "--springs",
         choices=("on", "off"),
         default="on",
-        help="simulate joints that swing, such as hair in VRM files, while a motion plays "
+        help="simulate spring joints, such as hair in VRM files, while a motion plays "
         "(default: on)",
     )
 

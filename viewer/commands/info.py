@@ -26,7 +26,7 @@ from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.number_text import number_text
-from viewer.rig.scene import Actor, Scene, actor_points
+from viewer.rig.scene import Actor, Scene, actor_points, scene_unit
 from viewer.rig.skeleton import (
     DOF_KINDS,
     Skeleton,
@@ -97,6 +97,7 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
     parts["figure"] = figure.name
     parts |= {"box": None if box is None else box.tolist()}
     parts |= {"size": None if box is None else box_size(box), "attached": figure.is_attached}
+    parts["unit"] = scene_unit(Scene([actor])) or None
     if figure.skeleton is not None and actor.pose is not None:
         parts["skeleton"] = _describe_skeleton(figure.skeleton, actor.pose.dofs.tolist())
     if figure.mesh is not None:
@@ -253,7 +254,8 @@ def _box_text(actor: dict[str, Any]) -> str:
     if actor["box"] is None:
         return "none: nothing is visible" if actor["present"] else "none: absent at this time"
     low, high = actor["box"]
-    return f"{_point(low)} to {_point(high)}, size {actor['size']:.6g}"
+    unit = f" {actor['unit']}" if actor["unit"] else ""
+    return f"{_point(low)} to {_point(high)}, size {actor['size']:.6g}{unit}"
 
 
 def _vertices(count: int) -> str:

@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=("list", "add"),
         default="list",
-        help="list the models (default), or add one that anyone may use",
+        help="list the models (default), or add a freely licensed one",
     )
     parser.add_argument(
         "name", nargs="?", metavar="NAME", help=f"the model to add: {', '.join(ADDABLE)}"
@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
     )
     parser.add_argument(
-        "--dry-run", action="store_true", help="with add: only print the command that downloads it"
+        "--dry-run", action="store_true", help="with add: only print the download command"
     )
 
 

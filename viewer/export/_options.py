@@ -10,7 +10,7 @@ ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
 """Orders of rotation channels as BVH lists them: the product R = Rz Ry Rx is ``zyx``."""
 
 QUATERNIONS = ("xyzw", "wxyz")
-"""Orders of the components of quaternions in arrays."""
+"""Orders of quaternion components in arrays."""
 
 GAPS = {
     "hold": "hold the last pose",

@@ -1,4 +1,4 @@
-"""Exporter of SMPL-X motions as programs that retarget people to robots read them.
+"""Exporter of SMPL-X motions in the layout of programs that retarget human motion to robots.
 
 ::
 

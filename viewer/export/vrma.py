@@ -1,4 +1,4 @@
-"""Exporter of motions of humanoids, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
+"""Exporter of humanoid motions, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
 
 The file has a node for each human bone in a T-pose, without rest rotations, in metres, y up, facing
 +z. With the rotation W(f) of a joint in the world of the motion, its rotation T in the T-pose, and
@@ -118,7 +118,7 @@ def _fill(
 
 
 def _parent(bone: str, bones: dict[str, int]) -> str:
-    """Return the nearest bone above one; empty for the hips."""
+    """Return the nearest exported ancestor of a bone; empty for the hips."""
     above = bone_above(bone)
     if bone in ("neck", "head") or bone.endswith(("Shoulder", "UpperArm")):
         spine = ("upperChest", "chest", "spine")

@@ -59,7 +59,8 @@ class Source:
     also_read : list of Path
         Other files that its reader opened: images, material libraries.
     options : dict of str to str
-        Choices among the contents of a file: ``"rig"`` of Anny, ``"lod"`` (level of detail) of MHR.
+        Options that select among the contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of
+        detail) for MHR.
     used_options : set of str
         Those that its reader has used.
     """
@@ -104,7 +105,7 @@ class Source:
         return self._data
 
     def option(self, name: str) -> str:
-        """Return a choice among the contents of the file, empty for the usual one."""
+        """Return an option that selects among the contents of the file; empty for the default."""
         self.used_options.add(name)
         return self.options.get(name, "")
 

@@ -189,7 +189,7 @@ def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], I
 
 
 def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints]:
-    """Return the different names of runs of faces, and the index of each face's, -1 for none."""
+    """Return the distinct names of runs of faces, and the index of each face's, or -1."""
     names = list(dict.fromkeys(name for _, name in runs))
     numbers = {name: index for index, name in enumerate(names)}
     of_run = np.array([-1, *(numbers[name] for _, name in runs)], dtype=np.int32)
@@ -198,9 +198,9 @@ def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints
 
 
 def _parts_of(parts: ObjParts) -> tuple[tuple[str, ...], Ints]:
-    """Return the names of objects, or else of groups, and the index of each face's.
+    """Return the names of objects, or else of groups, and the index of each face's name.
 
-    Without at least two of them there are no parts.
+    A file with fewer than two of them has no parts.
     """
     for word in (b"o", b"g"):
         names, of_face = _named(parts.runs[word], len(parts.counts))

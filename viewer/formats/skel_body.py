@@ -7,9 +7,9 @@ A pickle or ``.npz`` of named arrays; nothing in it is executed::
     osim_kintree_table (2, 24)    apose_rel_transfo (24, 4, 4)    per_joint_rot (24, 3, 3)
 
 Keller et al. 2023, From Skin to Skeleton. The 46 pose parameters are the DOFs, in their order. The
-published program gives all correctives the rotation of the left hand, because it assigns to one
-shared matrix; here, each joint drives the correctives of its counterpart in SMPL, as intended. The
-mesh of the bones (``skel_template_v``) is not read.
+published program drives all correctives with the rotation of the left hand, because it assigns to
+one shared matrix; here, each joint drives the correctives of its counterpart in SMPL, as intended.
+The skeleton mesh (``skel_template_v``) is not read.
 """
 
 from __future__ import annotations

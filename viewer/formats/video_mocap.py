@@ -1,7 +1,7 @@
 """Reader of results of video motion capture: people reconstructed from a video.
 
 Each tool writes files of its own: see the modules in ``_video_mocap/``. They are recognised by
-their contents, and people keep their numbers and the frames in which they are seen.
+their contents. People keep their IDs and the frames in which they are visible.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["frame_numbers", "key_times", "track_of"]
 
-_TOGETHER = 1000  # frames per batch, whose matrices are in memory together
+_TOGETHER = 1000  # frames per batch, to limit the memory for their matrices
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
 _PROP = 0.1  # size of a skeleton relative to its mesh, below which the mesh determines the size
 _ON_STEP = 1e-6  # fraction of a step

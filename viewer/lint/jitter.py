@@ -23,7 +23,7 @@ _SLOWEST = 24.0  # frames per second; below, people move too far between frames
 _STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
 _FRACTION = 0.3  # of the window: with fewer, steps and other events would count as noise
 # The fourth difference of white noise has 70 times its variance. 30 % of the vectors of three
-# normal numbers are shorter than 1.193, their quadratic mean is sqrt(3), for a deviation of 1.
+# normal numbers are shorter than 1.193; their quadratic mean is sqrt(3), for a deviation of 1.
 _RMS = np.sqrt(3.0) / (np.sqrt(70.0) * 1.1932)
 _TOGETHER = 2000  # frames per batch
 

@@ -1,4 +1,4 @@
-"""Checks of captured people: two who exchange their numbers, and tracks that break off."""
+"""Checks of captured people: swapped IDs, and tracks that break off."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _LATER = 1.0  # seconds: longest pause between them
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Path:
-    """Way of one person through the scene.
+    """Path of one person through the scene.
 
     Attributes
     ----------
@@ -152,7 +152,7 @@ def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[
 
 
 def _path(actor: Actor) -> _Path | None:
-    """Return the way of a captured person; None without a captured motion."""
+    """Return the path of a captured person; None without a captured motion."""
     clip, figure = actor.clip, actor.figure
     turn, place = actor.placement[:3, :3], actor.placement[:3, 3]
     scale = float(np.cbrt(abs(np.linalg.det(turn))))

@@ -70,7 +70,7 @@ class Builder:
     target : Figure or None
         Figure with other joints that the bodies move instead of the model.
     swings : bool
-        Whether joints of later people swing, such as hair.
+        Whether the spring joints of later people are simulated.
     """
 
     capture: Capture
@@ -216,7 +216,7 @@ class Builder:
 
     @property
     def has_bodies(self) -> bool:
-        """Whether anybody found so far is more than keypoints."""
+        """Whether any person found so far has a body, not only keypoints."""
         return bool(self._bodies)
 
     def place(self, up: str) -> None:

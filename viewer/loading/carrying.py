@@ -23,7 +23,7 @@ _Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 
 def has_joints(figure: Figure, names: Sequence[str]) -> bool:
-    """Return whether a figure is a body model for a motion: it has the root and most joints.
+    """Return whether a figure is a body model for a motion: it has its root and most of its joints.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Choices among the contents of files, as readers expect them."""
+"""Options that select among the contents of a file, in the form that readers expect."""
 
 from __future__ import annotations
 
@@ -8,5 +8,5 @@ __all__ = ["reader_options"]
 
 
 def reader_options(settings: MotionSettings) -> dict[str, str]:
-    """Return the choices among the contents of files, see ``Source.options``."""
+    """Return the options that select among the contents of a file; see ``Source.options``."""
     return {"rig": settings.rig, "lod": settings.lod}

@@ -90,13 +90,13 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
     Returns
     -------
     list of Diagnostic
-        What was changed, and by how much joints move.
+        Messages about the changes and the displacement of joints.
 
     Raises
     ------
     RigError
-        If there is no captured motion, a person to be merged is missing or is somebody else, or no
-        frame is in the range.
+        If there is no captured motion, a person to be merged is missing or is a different person,
+        or no frame is in the range.
     """
     if wanted.is_empty:
         return []

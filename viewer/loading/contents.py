@@ -130,7 +130,7 @@ def read_files(
 
 
 def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iterator[Diagnostic]:
-    """Yield a message for each choice among the contents of files that no file has."""
+    """Yield a message for each option for file contents that had no effect."""
     if settings.model is not None:
         return  # read later
     used = {name for source in sources for name in source.used_options}
@@ -223,7 +223,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
 
 
 def _add_motion(source: Source, contents: Contents, settings: MotionSettings) -> None:
-    """Read a file that is given as a motion: a skeleton's, a body's, or a figure's animation."""
+    """Read a file that was passed as a motion: a skeleton's, a body's, or a figure's animation."""
     content = _read(source, settings)
     kind = type(content).__name__
     if kind in ("BodyMotion", "Capture", "Clip"):

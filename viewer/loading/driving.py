@@ -111,7 +111,7 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 def is_body(figure: Figure) -> bool:
     """Return whether a figure can show captured bodies: it has the family's root and a mesh.
 
-    A VRM character is none, whatever its joints are called: its rest pose and origin differ.
+    A VRM character cannot, whatever its joints are called: its rest pose and origin differ.
     """
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
@@ -175,7 +175,7 @@ def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figu
             continue
         try:
             model = read(Source.open(found))
-        except FormatError as problem:  # nobody asked for this file
+        except FormatError as problem:  # the user did not ask for this file
             cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
             continue
         if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
@@ -225,6 +225,7 @@ def _give_body_motion(
     except RigError as problem:
         values = {"problem": problem.cause}
         raise RigError(Diagnostic("F004.model", path, values=values)) from None
+    cast.diagnostics += [replace(note, path=path) for note in notes]
     actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
     up = settings.up or motion.up
     if not up:
@@ -238,7 +239,6 @@ def _give_body_motion(
         return
     if is_bundled:
         _note_bundled(cast, path, *lost)
-    cast.diagnostics += [replace(note, path=path) for note in notes]
     cast.add(actor, up[-1], placed=False)
 
 
@@ -326,7 +326,7 @@ def _begin_capture(
 
 
 def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) -> None:
-    """Let captured bodies move a figure with other joints: the requested one, or one that is open.
+    """Let captured bodies drive a figure with other joints: the requested one, or an open one.
 
     Raises RigError if too few joints of the requested figure match.
     """

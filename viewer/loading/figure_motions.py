@@ -24,14 +24,14 @@ __all__ = ["drive_by_figures", "motion_in"]
 
 
 def motion_in(source: Source, content: Content, wanted: str) -> SkeletonMotion:
-    """Return the motion of a file that is given as a motion.
+    """Return the motion of a file that was passed as a motion.
 
     Parameters
     ----------
     source : Source
         The file.
     content : Content
-        What was read from it.
+        Its contents.
     wanted : str
         The animation, see ``chosen_animation``.
 

@@ -46,7 +46,7 @@ def filmed(
     images : CameraImages or None
         Images of one of them.
     notes : list of Diagnostic
-        What was assumed.
+        Messages about assumptions.
 
     Raises
     ------

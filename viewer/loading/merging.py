@@ -48,9 +48,11 @@ def merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
     """
     notes: list[Diagnostic] = []
     known = sorted({actor.person for actor in scene.actors if actor.person is not None})
+    if not known:
+        raise RigError("people to merge: expected people with numbers, found none")
     for person in people:
         if person not in known:
-            named = ", ".join(map(str, known)) or "none"
+            named = ", ".join(map(str, known))
             raise RigError(f"people to merge: expected numbers among {named}, found {person}")
     for kind in (SampledClip, PointClip):
         tracks = {actor.person: actor for actor in scene.actors if isinstance(actor.clip, kind)}
@@ -103,7 +105,7 @@ def _apart(
 ) -> float:
     """Return the median distance of two tracks in their common frames.
 
-    Raises RigError if that is farther than one person can be from himself.
+    Raises RigError if it is too large for two tracks of one person.
     """
     if not len(both):
         return 0.0

@@ -50,7 +50,7 @@ class MotionSettings:
         Further files whose motion drives a figure: their first animation, or the one of the name
         ``animation``.
     springs : bool
-        Whether joints that swing, such as hair, are simulated while a motion plays.
+        Whether spring joints, such as those of hair, are simulated while a motion plays.
     find_model : callable or None
         Returns the user's own model of a member of the SMPL family, such as ``"SMPL"``, for
         captures that are opened without one; None for the bundled body.
@@ -58,6 +58,10 @@ class MotionSettings:
         The space of results of video motion capture; empty for the world, if they have it.
     average_shape : bool
         Whether people of video motion capture keep one shape, the average over time.
+    source_rest : int, "zero" or "auto"
+        Rest pose of skeletons whose motion drives a figure: the number of a frame, ``"zero"`` for
+        the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
+        a frame in a T- or A-pose, otherwise an estimate from the anatomy.
     """
 
     model: Path | None = None
@@ -78,3 +82,4 @@ class MotionSettings:
     find_model: Callable[[str], Path | None] | None = None
     space: str = ""
     average_shape: bool = False
+    source_rest: int | str = "auto"

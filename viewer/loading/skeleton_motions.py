@@ -17,6 +17,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.retarget import retarget, scaled_motion
+from viewer.rig.retargeting.source_rest import SourceRest, rest_fault
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.units import METRES, is_metres
 
@@ -77,10 +78,13 @@ def give_skeleton_motion(
     motion = _as_asked(motion, settings)
     for note in motion.up_notes:
         cast.note("F007.up-taken", path, note=note)
+    fault = rest_fault(motion, settings.source_rest)
+    if fault is not None:
+        raise RigError(replace(fault, path=path))
     placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     if settings.drives and model is not None:
         try:
-            clip, notes = retarget(motion, model)
+            clip, notes = retarget(motion, model, source_rest=settings.source_rest)
         except RigError as problem:
             values = {"problem": problem.cause}
             raise RigError(Diagnostic("F004.model", path, values=values)) from None
@@ -91,7 +95,7 @@ def give_skeleton_motion(
         )
         return None
     if settings.drives:
-        is_driving, refusal = drive_somebody(path, motion, cast, placement)
+        is_driving, refusal = drive_somebody(path, motion, cast, placement, settings.source_rest)
         if is_driving:
             return None
         if refusal:
@@ -125,7 +129,11 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 
 def drive_somebody(
-    path: Path, motion: SkeletonMotion, cast: Cast, placement: Floats
+    path: Path,
+    motion: SkeletonMotion,
+    cast: Cast,
+    placement: Floats,
+    source_rest: SourceRest = "zero",
 ) -> tuple[bool, str | Diagnostic]:
     """Assign a motion to the first matching figure with a mesh and no clip, if any.
 
@@ -139,6 +147,8 @@ def drive_somebody(
         Its actor gets the clip.
     placement : (4, 4)
         Applied to that actor.
+    source_rest : int, "zero" or "auto"
+        The motion's rest pose, see ``MotionSettings``.
 
     Returns
     -------
@@ -152,7 +162,7 @@ def drive_somebody(
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
-            actor.clip, notes = retarget(motion, actor.figure)
+            actor.clip, notes = retarget(motion, actor.figure, source_rest=source_rest)
         except RigError as problem:
             refusal = refusal or problem.cause
             continue

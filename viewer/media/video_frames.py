@@ -16,8 +16,8 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["VideoFrames"]
 
-_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is quick
-_FEWEST = 2  # frames that are kept however large they are
+_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is fast
+_FEWEST = 2  # frames that are kept regardless of their size
 _AHEAD = 2.0  # seconds to decode forwards rather than to seek
 _ON_TIME = 1e-6  # seconds
 
@@ -43,7 +43,7 @@ class VideoFrames:
     """Reads the frame of a video that is nearest to a time.
 
     Frames are decoded in the order of time. The last ones are kept; an earlier time, or one far
-    ahead, is sought from the key frame before it.
+    ahead, is reached by seeking to the key frame before it.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ class VideoFrames:
         self.path = path
         self._errors: Any = _library()
         try:
-            path.open("rb").close()  # FFmpeg's own messages do not name the reason
+            path.open("rb").close()  # FFmpeg's own messages do not state the reason
         except OSError as problem:
             values = {"reason": str(problem.strerror or problem)}
             raise FormatError(Diagnostic("F001.video", path, values=values)) from None
@@ -184,5 +184,5 @@ def _library() -> Any:
 
 
 def _quarter_turns(frame: Any) -> int:
-    """Return the quarter turns, anticlockwise, that make a frame upright, as cameras record it."""
+    """Return the number of anticlockwise 90-degree rotations that make a frame upright."""
     return round(getattr(frame, "rotation", 0) / 90) % 4

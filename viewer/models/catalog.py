@@ -1,4 +1,4 @@
-"""Catalogue of the body models that the viewer reads: publisher, licence, and where to get them."""
+"""Catalogue of the body models that the viewer reads: publisher, licence and source."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ __all__ = ["CATALOG", "Publication"]
 
 @dataclass(frozen=True, slots=True)
 class Publication:
-    """Where a kind of body model is published.
+    """Publication of a kind of body model.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Download of body models that anyone may use, through pip, into the user's data folder."""
+"""Download of freely licensed body models with pip into the user's data folder."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ __all__ = [
     "with_cameras",
 ]
 
-_FRAMED = 24  # number of places on the way of a moving camera that are framed
+_FRAMED = 24  # number of positions along the path of a moving camera that are framed
 _TOLERANCE = 0.01  # relative difference of aspect ratios: one pixel of a small image
 
 
@@ -77,7 +77,7 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
     """Return the points to frame: those of the figures, and of the cameras' frusta if drawn.
 
-    Moving cameras are framed along their whole way.
+    Moving cameras are framed along their whole path.
     """
     if not options.cameras or not scene.views:
         return points

@@ -71,14 +71,14 @@ class BlendShapes:
     rest_weights : (S,) or None
         Weights of the file's own pose; None if all are 0.
     rules : ExpressionRules or None
-        How weights of expressions change each other; None if they do not.
+        Rules by which expressions modify each other's weights; None if they do not.
     space : ShapeSpace or None
         Computes the displacement if it is not the sum of the offsets; these are then those of
         each weight of 1 alone.
     origins : (S,) or None
-        Number that a slider shows at weight 0; None if all are 0.
+        Value that a slider shows at weight 0; None if all are 0.
     ranges : (S, 2) or None
-        Smallest and largest number of each slider; None for the usual range of its group.
+        Smallest and largest value of each slider; None for the default range of its group.
     """
 
     names: tuple[str, ...]
@@ -130,7 +130,7 @@ class BlendShapes:
         return self.space is None
 
     def origin(self, row: int) -> float:
-        """Return the number that the slider of a blend shape shows at weight 0."""
+        """Return the value that the slider of a blend shape shows at weight 0."""
         return 0.0 if self.origins is None else float(self.origins[row])
 
     def is_expression(self, row: int) -> bool:

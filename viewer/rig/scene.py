@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
@@ -18,6 +19,7 @@ from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import deform
+from viewer.rig.units import METRES
 
 __all__ = [
     "Actor",
@@ -29,6 +31,7 @@ __all__ = [
     "free_title",
     "scene_box",
     "scene_points",
+    "scene_unit",
 ]
 
 if TYPE_CHECKING:
@@ -200,7 +203,7 @@ class Scene:
     views : tuple of CameraView
         Calibrated cameras of a capture.
     facts : tuple of (str, str)
-        What captures among the files contain, for ``viewer info``.
+        Contents of captures among the files, for ``viewer info``.
     images : CameraImages or None
         Images of the cameras, if available.
     time : float or None
@@ -310,3 +313,33 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
             points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
         parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))
+
+
+def scene_unit(scene: Scene) -> str:
+    """Return the unit of length of the scene: that of its first figure with a known unit.
+
+    A scale that converts the figure's unit into another, as of a placement, is considered; any
+    other scale of a pose is taken as the user's own.
+
+    Parameters
+    ----------
+    scene : Scene
+        Scene with any number of actors.
+
+    Returns
+    -------
+    str
+        Key of ``viewer.rig.units.METRES``; empty if no unit is known.
+    """
+    actor = next((actor for actor in scene.actors if actor.figure.unit in METRES), None)
+    if actor is None:
+        return ""
+    metres = METRES[actor.figure.unit] / (float(np.linalg.norm(actor.placement[:3, 0])) or 1.0)
+    scales = (1.0,) if actor.pose is None else (actor.pose.figure_scale or 1.0, 1.0)
+    return next((unit for scale in scales if (unit := _unit_of(metres / scale))), "")
+
+
+def _unit_of(metres: float) -> str:
+    """Return the unit of this length; empty if there is none."""
+    known = (unit for unit, size in METRES.items() if math.isclose(size, metres, rel_tol=1e-6))
+    return next(known, "")

@@ -69,7 +69,7 @@ class Skeleton:
     constraints : tuple of Constraint
         Joints that follow others, in the order of evaluation; at most one per joint.
     springs : Springs or None
-        Joints that swing while a motion plays.
+        Joints that are simulated as springs while a motion plays.
     posing : JointPosing or None
         Rules by which joints follow the DOFs instead of rotating about x, y and z.
     """

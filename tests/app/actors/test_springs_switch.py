@@ -1,4 +1,4 @@
-"""The switch of spring joints in the Actors panel."""
+"""The switch for spring joints in the Actors panel."""
 
 import numpy as np
 from formats.vrm.swinging import swinging
@@ -36,7 +36,7 @@ def test_check_box_switches_springs_and_undo_restores_them(drive, tmp_path):
 
 
 def test_figures_without_springs_have_no_switch(hand):
-    assert "has no joints that swing" in no_springs(hand.state)
+    assert "has no spring joints" in no_springs(hand.state)
 
 
 def test_exported_motions_do_not_contain_the_pose_of_springs(drive, tmp_path):
@@ -53,5 +53,5 @@ def test_exported_motions_do_not_contain_the_pose_of_springs(drive, tmp_path):
         pose_actor(actor, 0.5)
     hair = plain.figure.require_skeleton().springs.joints
     matrices = [viewer.joint_matrices(actor.figure, actor.pose)[hair] for actor in (plain, found)]
-    # Single precision of the file.
+    # The file is in single precision.
     assert_allclose(matrices[1], matrices[0], rtol=0, atol=1e-6)

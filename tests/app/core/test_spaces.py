@@ -1,4 +1,4 @@
-"""Switch of the space of captured people: their places, cameras, time and selection."""
+"""Switching the space of captured people: their positions, cameras, time and selection."""
 
 from __future__ import annotations
 

@@ -10,9 +10,12 @@ from imgui_bundle import imgui
 
 from viewer.app.core.key_names import key_name
 from viewer.app.features import KEYS
+from viewer.app.files.model_folder import set_model_folder
+from viewer.app.preferences import preferences_window
 from viewer.app.preferences.key_map import chord_name, conflicts, parse_chord
 from viewer.app.preferences.state import Appearance, Preferences
 from viewer.app.preferences.storage import load_preferences, preferences_file, save_preferences
+from viewer.phrases import printable
 
 WIREFRAME = next(key.name for key in KEYS if key.label == "W")
 CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "Shift+P"})
@@ -159,3 +162,26 @@ def test_table_of_keys_has_no_conflicts_and_every_name_is_read_back():
             name = chord_name(chord)
             assert not name or parse_chord(name) == chord, key.label
     assert parse_chord("Ctrl+Nothing") == parse_chord("Hyper+A") == parse_chord("") == 0
+
+
+def test_shown_model_folder_is_the_chosen_one(shown, tmp_path, monkeypatch):
+    said = []
+    monkeypatch.setattr(imgui, "text_disabled", said.append)
+    shown.step()
+    assert "none" in said
+    said.clear()
+    set_model_folder(shown.state, [tmp_path])
+    shown.step()
+    assert printable(tmp_path.resolve(), 60) in said and "none" not in said
+
+
+def test_given_scale_is_shown_and_kept(shown, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        preferences_window, "choice", lambda *given: asked.append(given) or given[2]
+    )
+    for scale, expected in ((1.25, "125 %"), (2.0, "200 %")):
+        shown.state.of(Appearance).given_scale = scale
+        shown.step()
+        assert (shown.state, "Interface scale", "", {"": expected}) in asked
+    assert shown.state.of(Preferences).scale == 0.0

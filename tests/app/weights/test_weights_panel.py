@@ -9,6 +9,7 @@ import pytest
 from imgui_bundle import imgui
 from numpy.testing import assert_array_equal
 
+from viewer.app.preferences.state import Appearance
 from viewer.app.weights.actions import no_view
 from viewer.rendering.colormap import colormap
 from viewer.rig.annotations import VertexField
@@ -340,3 +341,12 @@ def test_multiple_fields_are_listed(bent):
     bent.step(2)
     assert bent.state.options.scalar == "field:near"
     assert bent.state.stats.scalar_range == (1.0, 5.0)
+
+
+def test_legend_grows_with_the_scale_of_the_interface(wide):
+    wide.click("Heat map")
+    dark, _, bright = _legend_colours(wide)
+    wide.state.of(Appearance).screen_scale = 1.5
+    wide.step(3)
+    left, _, right = _legend_colours(wide)
+    assert right - left == pytest.approx(1.5 * (bright - dark), rel=0.05)

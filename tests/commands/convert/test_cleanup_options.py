@@ -47,12 +47,14 @@ def test_other_options_are_parsed():
     [
         ("--smooth=median", "expected one-euro or savgol"),
         ("--smooth=savgol:window=8", "odd window"),
-        ("--smooth=savgol:order=1.5", "whole order"),
+        ("--smooth=savgol:order=1.5", "integer order"),
         ("--smooth=savgol:cutoff=3", "window=NUMBER, order=NUMBER"),
         ("--smooth=one-euro:cutoff=0", "above 0 Hz"),
         ("--merge-ids=3", "at least two"),
+        ("--merge-ids=3,3", "at least two"),
         ("--fill-gaps=0", "number of frames"),
-        ("--trim=1:2:3", "expected A:B"),
+        ("--trim=1:2:3", "expected A:B with A below B"),
+        ("--trim=5:2", "expected A:B with A below B"),
         ("--resample=0", "frames per second"),
     ],
 )

@@ -28,13 +28,13 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     options = ["--bake-springs"] if bakes else []
     assert run(["convert", str(path), "-o", str(out), "--fps", "60", *options]) == 0
     said = capsys.readouterr().out
-    assert ("simulated rotations of 3 joints that swing are written" in said) == bakes
+    assert ("simulated rotations of 3 spring joints are written" in said) == bakes
     assert "the humanoid bone map, 1 spring chain" in said
     assert ("viewer convert --bake-springs writes the simulated ones" in said) == (not bakes)
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors
     for time in (0.5, 1.0):
-        # Single precision of the file.
+        # The file is in single precision.
         assert_allclose(places(found, time), places(wanted, time), rtol=0, atol=1e-6)
 
 
@@ -46,7 +46,7 @@ def test_figures_without_springs_are_refused(tmp_path, capsys):
     out = str(tmp_path / "a.glb")
     assert run(["convert", str(path), "-o", out, "--bake-springs"]) == 2
     said = capsys.readouterr().err
-    assert "--bake-springs: no figure with a motion has joints that swing" in said
+    assert "--bake-springs: no figure with a motion has spring joints" in said
     assert np.array_equal([*tmp_path.iterdir()], [path])
 
 
@@ -56,5 +56,5 @@ def test_formats_without_such_motions_are_refused(tmp_path, capsys, suffix):
     path.write_bytes(swinging().glb())
     assert run(["convert", str(path), "-o", f"{tmp_path}/a{suffix}", "--bake-springs"]) == 2
     said = capsys.readouterr().err
-    assert f"--bake-springs: {suffix} cannot store motions of joints that swing" in said
+    assert f"--bake-springs: {suffix} cannot store motions of spring joints" in said
     assert [*tmp_path.iterdir()] == [path]

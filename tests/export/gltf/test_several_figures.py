@@ -21,7 +21,7 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
 
 SINGLE = 2e-6  # of lengths up to 5
-# Turned by 90 degrees about y and moved; the second figure is in centimetres and z is up.
+# Rotated by 90 degrees about y and moved; the second figure is in centimetres and z is up.
 PLACED = np.array([[0.0, 0, 1, 3], [0, 1, 0, 0.5], [-1, 0, 0, 2], [0, 0, 0, 1]])
 UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 

@@ -280,7 +280,7 @@ def test_other_humanoids_become_version_1_in_a_t_pose(body: Figure, tmp_path: Pa
     for side, sign in (("left", 1.0), ("right", -1.0)):
         arm = places[f"{side}Hand"] - places[f"{side}UpperArm"]
         leg = places[f"{side}Foot"] - places[f"{side}UpperLeg"]
-        # Single precision of the file.
+        # The file is in single precision.
         assert_allclose(arm / np.linalg.norm(arm), [sign, 0, 0], rtol=0, atol=1e-6)
         assert_allclose(leg / np.linalg.norm(leg), [0, -1, 0], rtol=0, atol=1e-6)
     assert_allclose(figure.require_mesh().positions[:, 1].min(), 0.0, rtol=0, atol=1e-6)

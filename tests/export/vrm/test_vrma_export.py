@@ -39,12 +39,12 @@ def test_a_character_moves_as_before(tmp_path: Path, version: int) -> None:
     still.write_bytes(swinging(turn=False).glb())
     assert run(["convert", str(path), "-o", str(out)]) == 0
     (plain,), (found,) = load(path).actors, load(out, still).actors
-    # Version 0.x faces -z, version 1.0 +z: the character turns around.
+    # Version 0.x faces -z, version 1.0 +z: the character is rotated by 180 degrees.
     facing = np.diag([1.0, 1.0, 1.0] if version else [-1.0, 1.0, -1.0])
     for time in (0.5, 1.0):
         before, after = joints(plain, time), joints(found, time)
         for bone in ("leftHand", "rightFoot", "head", "hips"):
-            # Single precision of the file.
+            # The file is in single precision.
             assert_allclose(after[bone], facing @ before[bone], rtol=0, atol=1e-6)
 
 

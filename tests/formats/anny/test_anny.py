@@ -100,7 +100,7 @@ def in_metres(points):
 
 
 def slid(figure, **numbers):
-    """Return the figure with sliders at these numbers."""
+    """Return the figure with sliders at these values."""
     weights = np.zeros(figure.n_shapes)
     for name, number in numbers.items():
         row = figure.blend_shapes.names.index(name.replace("_", "-"))

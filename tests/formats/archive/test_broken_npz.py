@@ -18,7 +18,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._source import Source
 
-BOUND = 64 << 20  # bytes of memory that a refusal may need
+BOUND = 64 << 20  # bytes of memory that may be allocated before the error
 
 
 @pytest.mark.parametrize(

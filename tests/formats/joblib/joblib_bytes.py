@@ -1,4 +1,4 @@
-"""Files of joblib as bytes, written without it."""
+"""Joblib files as bytes, written without joblib."""
 
 from __future__ import annotations
 
@@ -49,6 +49,6 @@ def old_array(values: NDArray[Any]) -> bytes:
 
 
 def joblib_file(given: Any, aligned: bool = True) -> bytes:
-    """A file of a value whose arrays follow their descriptions."""
+    """A file with a value whose arrays follow their descriptions."""
     write = aligned_array if aligned else old_array
     return finished(value(given, lambda values: write(np.asarray(values))))

@@ -1,4 +1,4 @@
-"""Files of joblib: arrays behind their descriptions, plain and compressed."""
+"""Joblib files: arrays that follow their descriptions, uncompressed and compressed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Files of joblib with false sizes, bombs or damage: refused in one line, in little memory."""
+"""Hostile joblib files: false sizes, bombs and damage give a one-line error without much memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from viewer.formats._source import Source
 
 ROWS = np.arange(12.0).reshape(4, 3)
 F8 = element_type()
-BOUND = 8 << 20  # bytes of memory that a refusal may need
+BOUND = 8 << 20  # bytes of memory that may be allocated before the error
 
 
 def problem_of(data: bytes) -> str:

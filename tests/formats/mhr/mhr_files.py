@@ -1,4 +1,4 @@
-"""A tiny MHR in the keys of its portable files, and its forward model with states.
+"""A tiny MHR with the keys of its portable files, and its forward model with states.
 
 A state is a translation, a quaternion (x, y, z, w) and a scale, as in Momentum: states are
 multiplied, and map points to t + q (s p). Nothing here uses matrices.

@@ -38,7 +38,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.values import Opaque
 
 pytestmark = pytest.mark.slow
-BOUND = 64 << 20  # bytes of memory that a refusal may need
+BOUND = 64 << 20  # bytes of memory that may be allocated before the error
 PATIENCE = 5.0  # seconds; far more than needed, even on a busy machine
 
 

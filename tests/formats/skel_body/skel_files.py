@@ -1,4 +1,4 @@
-"""A tiny SKEL model in its published keys, and its forward pass for one pose, written out."""
+"""A tiny SKEL model with its published keys, and its forward pass for one pose, written out."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Tiny STAR and SUPR models in their published keys, and their forward passes, joint by joint."""
+"""Tiny STAR and SUPR models with their published keys, and their forward passes, joint by joint."""
 
 import numpy as np
 

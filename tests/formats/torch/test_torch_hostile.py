@@ -1,4 +1,4 @@
-"""Files of torch with false sizes, foreign names or damage: refused in one line."""
+"""Hostile torch files: false sizes, foreign names and damage give a one-line error."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from formats.torch.torch_bytes import (
 
 ROWS = np.arange(12, dtype=np.float32).reshape(4, 3)
 KEPT = storage("FloatStorage", "0", 12)
-BOUND = 8 << 20  # bytes of memory that a refusal may need
+BOUND = 8 << 20  # bytes of memory that may be allocated before the error
 
 
 def view(offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
@@ -34,7 +34,7 @@ def view(offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
 
 
 def problem_of(data: bytes) -> str:
-    """The key of the phrase that says what is wrong."""
+    """The key of the phrase that describes the fault."""
     _, _, values = refusal(data)
     return str(values["problem"].key)
 

@@ -1,4 +1,4 @@
-"""Files of torch and joblib as bytes, written without them, with any fault one wants."""
+"""Torch and joblib files as bytes, written without these packages, with any fault on request."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAGIC = b"\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19"
 
 
 def value(given: Any, array: Callable[[NDArray[Any]], bytes]) -> bytes:
-    """The opcodes of nested dicts, lists, tuples, texts and numbers, with arrays as wanted."""
+    """The opcodes of nested dicts, lists, tuples, strings, numbers and arrays."""
     match given:
         case dict():
             pairs = b"".join(value(key, array) + value(of, array) for key, of in given.items())
@@ -87,7 +87,7 @@ class Tensors:
 def zip_file(
     body: bytes, stored: dict[str, bytes], order: str = "little", method: int = 0, **more: bytes
 ) -> bytes:
-    """A torch file of a pickle without protocol and end, and of its storages."""
+    """A torch file with a pickle, given without protocol and end, and its storages."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", method) as archive:
         archive.writestr("archive/data.pkl", b"\x80\x02" + body + b".")
@@ -101,13 +101,13 @@ def zip_file(
 
 
 def torch_zip(given: Any, order: str = "little") -> bytes:
-    """A torch file of a value, each array a tensor."""
+    """A torch file with a value, whose arrays become tensors."""
     tensors = Tensors(order="<" if order == "little" else ">")
     return zip_file(value(given, tensors.array), tensors.stored, order)
 
 
 def legacy_file(body: bytes, stored: dict[str, tuple[int, bytes]], is_little: bool = True) -> bytes:
-    """A legacy stream of a pickle and of its storages, with their numbers of elements."""
+    """A legacy stream with a pickle and its storages, each after its number of elements."""
     system = {"protocol_version": 1001, "little_endian": is_little, "type_sizes": {"int": 4}}
     keys = value([*stored], lambda _: b"")
     pickles = MAGIC, whole(1001), value(system, lambda _: b""), body, keys
@@ -116,7 +116,7 @@ def legacy_file(body: bytes, stored: dict[str, tuple[int, bytes]], is_little: bo
 
 
 def torch_legacy(given: Any) -> bytes:
-    """A legacy file of a value, each array a tensor."""
+    """A legacy file with a value, whose arrays become tensors."""
     tensors = Tensors()
     body = value(given, tensors.array)
     sizes = [array.size for array in _arrays(given)]
@@ -147,7 +147,7 @@ def tensor_of(values: NDArray[Any]) -> bytes:
 
 
 def object_npy(given: Any, array: Callable[[NDArray[Any]], bytes] = tensor_of) -> bytes:
-    """An ``.npy`` of a single object, as ``numpy.save`` writes a dict."""
+    """An ``.npy`` file with a single object, as ``numpy.save`` writes a dict."""
     header = b"{'descr': '|O', 'fortran_order': False, 'shape': (), }".ljust(117) + b"\n"
     dtype = named("numpy", "dtype") + several(unicode("O8"), b"\x89", b"\x88") + b"R"
     state = several(whole(3), unicode("|"), b"N", b"N", b"N", whole(-1), whole(-1), whole(63))

@@ -1,4 +1,4 @@
-"""The published equations of the SMPL family, written again with plain loops over joints."""
+"""The published equations of the SMPL family, reimplemented with plain loops over joints."""
 
 from __future__ import annotations
 

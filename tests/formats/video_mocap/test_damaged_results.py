@@ -1,4 +1,4 @@
-"""Results with damaged bytes or foreign values: each gives a capture or one line."""
+"""Results with damaged bytes or foreign values: each gives a capture or a one-line error."""
 
 from __future__ import annotations
 

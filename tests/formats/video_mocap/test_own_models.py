@@ -1,4 +1,4 @@
-"""Captures drawn with the user's own model of the SMPL family, if the model folder has it."""
+"""Captures drawn with the user's own SMPL-family model, if the model folder contains it."""
 
 from __future__ import annotations
 

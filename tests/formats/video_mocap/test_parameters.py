@@ -81,6 +81,33 @@ def test_people_frames_and_shapes() -> None:
     assert [body.shape.shape for body in found.values()] == [(1, 10), (2, 10)]
 
 
+def test_single_frames_keep_their_numbers() -> None:
+    frames = [
+        {"rotmat": TURNED[row], "trans": PLACES[row], "frame_ids": np.array([number])}
+        for row, number in ((0, 7), (1, 5))
+    ]
+    (body,) = bodies(frames).values()
+    assert (body.timing.first_frame, body.timing.rows.tolist()) == (5, [0, -1, 1])
+    assert_allclose(body.translations, PLACES[[1, 0]], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "changes", [{"rotmat": TURNED[:1, :22]}, {"betas": np.zeros(5)}], ids=["joints", "shape"]
+)
+def test_single_frames_that_differ_are_people(changes: dict[str, Any]) -> None:
+    one = {"rotmat": TURNED[:1], "trans": PLACES[:1], "betas": np.zeros(10)}
+    assert sorted(bodies([one, one | changes])) == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("keys", "numbers"),
+    [(["1", "b"], [1, 2]), ([2, "b", "1"], [1, 2, 3]), (["\u00b2", "-4"], [0, 1])],
+)
+def test_keys_without_numbers_hide_nobody(keys: list[Any], numbers: list[int]) -> None:
+    one = {"rotmat": TURNED, "trans": PLACES}
+    assert sorted(bodies(dict.fromkeys(keys, one))) == numbers
+
+
 @pytest.mark.parametrize(
     ("count", "names"), [(22, "SMPL"), (24, "SMPL"), (52, "SMPL+H"), (55, "SMPL-X")]
 )

@@ -1,4 +1,4 @@
-"""Dicts that refer to the same values again and again: refused before they are multiplied."""
+"""Dicts that repeatedly refer to the same values: refused before these are multiplied."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import open_results
 
-BOUND = 64 << 20  # bytes of memory that a refusal may need
+BOUND = 64 << 20  # bytes of memory that may be allocated before the error
 
 
 def repeated(given: Any, times: int, name: str = "{}") -> bytes:

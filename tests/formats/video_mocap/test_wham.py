@@ -1,4 +1,4 @@
-"""WHAM: people with numbers and gaps, both spaces, a shape per frame, a guessed frame rate."""
+"""WHAM: people with IDs and gaps, both spaces, a shape per frame, an assumed frame rate."""
 
 from __future__ import annotations
 
@@ -91,6 +91,12 @@ def refusal(changes: dict[str, Any]) -> str:
 )
 def test_arrays_that_do_not_fit(changes: dict[str, Any], key: str) -> None:
     assert refusal(changes) == key
+
+
+def test_keys_are_numbers_of_people() -> None:
+    people: dict[Any, Any] = {**wham(), "x": wham()[0]}
+    with pytest.raises(FormatError, match="x: expected a person with a number"):
+        open_results(Source("a.pkl", joblib_file(people)))
 
 
 def test_nobody_is_refused() -> None:

@@ -37,7 +37,7 @@ def matrices(vectors: Any) -> Any:
 
 
 def gvhmr(length: int = 4) -> dict[str, Any]:
-    """One person in both spaces, turned by the same camera."""
+    """One person in both spaces, rotated by the same camera."""
     body = {
         "body_pose": single(waves(length, 63) / 2),
         "betas": single(np.tile(waves(10), (length, 1))),
@@ -60,7 +60,7 @@ def gvhmr(length: int = 4) -> dict[str, Any]:
 
 
 def wham(length: int = 4) -> dict[int, dict[str, Any]]:
-    """Two people, the second from frame 3 on and not in frame 5."""
+    """Two people; the second appears in frame 3 and is missing in frame 5."""
     people = {}
     for person, frames in ((0, range(length)), (4, [3, 4, 6, 7, 8][:length])):
         pose = waves(length, 72, seed=person)
@@ -89,15 +89,15 @@ def wham_file(folder: Path) -> Path:
 
 
 def body_model(kind: str, folder: Path) -> Path:
-    """A made-up body model, written as the published ones are."""
+    """A synthetic body model in the format of the published ones."""
     path = folder / f"{kind.upper()}_NEUTRAL.npz"
-    if not path.exists():  # two scenes of one file share it, and it must not change meanwhile
+    if not path.exists():  # two scenes of one file share it, so it must not change
         np.savez(path, **model(kind))
     return path
 
 
 def scene_of(path: Path, kind: str, space: str = "", **settings: Any) -> Scene:
-    """Results on a made-up body model."""
+    """Results for a synthetic body model."""
     body = body_model(kind, path.parent)
     return load(path, body, motion=MotionSettings(space=space, **settings))
 
@@ -118,7 +118,7 @@ def assert_drawn(scene: Scene, person: int, frame: int, wanted: Any) -> None:
 
 
 def phalp(length: int = 3) -> dict[str, Any]:
-    """Person 2 in all frames, person 5 seen in the first and a ghost in the others."""
+    """Person 2 in all frames; person 5 is visible in the first, and lost in the others."""
     frames: dict[str, Any] = {}
     for frame in range(length):
         detections = [phalp_body(person, frame) for person in (2, 5)]

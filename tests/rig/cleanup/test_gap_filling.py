@@ -15,7 +15,7 @@ def test_a_uniform_rotation_is_completed_exactly():
     found, gaps = interpolate_gaps(clip)
     assert gaps == Gaps(((3, 5), (6, 7)), ())
     expected = 0.3 * np.arange(9.0)
-    expected[[0, 8]] = np.nan  # nobody is added before the first and after the last frame
+    expected[[0, 8]] = np.nan  # no frame is added before the first or after the last one
     assert_allclose(angles_of(found), expected, atol=1e-12)
     inner = found.timing.rows[1:8]
     assert_allclose(found.figure_translations[inner, 2], -2.0 * np.arange(1, 8), atol=1e-12)

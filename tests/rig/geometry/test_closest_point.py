@@ -11,7 +11,7 @@ ROUNDING = 1e-12
 
 
 def cross(a, b):
-    """Return the cross product of two vectors, without what numpy's does for many."""
+    """Return the cross product of two vectors, without the overhead of numpy's."""
     (x, y, z), (u, v, w) = a, b
     return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 

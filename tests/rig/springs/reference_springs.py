@@ -1,4 +1,4 @@
-"""Spring joints one by one, written after the pseudocode of ``VRMC_springBone`` 1.0."""
+"""Reference simulation of spring joints, after the pseudocode of ``VRMC_springBone`` 1.0."""
 
 from __future__ import annotations
 

@@ -104,7 +104,7 @@ def test_the_first_step_moves_by_the_force_times_the_step() -> None:
 
 
 def test_a_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
-    # The sphere is below the pivot, on the way of a pendulum that swings down from +x.
+    # The sphere is below the pivot, in the path of a pendulum that swings down from +x.
     shape = Colliders(
         np.array([1]), np.array([[0, -1, 0]]), np.array([[0, -1, 0]]), np.array([0.5])
     )
@@ -149,7 +149,7 @@ def _random_figure(rng: np.random.Generator) -> Skeleton:
         rng.normal(size=(2, 3)) * 0.2,
         np.array([0.3, 0.2]),
     )
-    # Joint 3 hangs between spring joints, but does not swing itself.
+    # Joint 3 is between spring joints, but is not one itself.
     springs = Springs(
         np.array([2, 4, 5, 6]),
         rng.normal(size=(4, 3)) * 0.3,

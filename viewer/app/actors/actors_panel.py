@@ -108,7 +108,7 @@ def _draw_place(state: AppState, actor: Actor) -> None:
 
 
 def _draw_springs(state: AppState, actor: Actor) -> None:
-    """Draw the switch of joints that swing, if the chosen actor has any."""
+    """Draw the switch for spring joints, if the chosen actor has any."""
     if not has_springs(actor):
         return
     is_on = actor.springs is not None

@@ -1,4 +1,4 @@
-"""Switch of an actor's joints that swing."""
+"""Switch for the simulation of an actor's spring joints."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["no_springs", "toggle_springs"]
 
 def no_springs(state: AppState) -> str:
     """Return why springs cannot be switched; empty if they can."""
-    return "" if has_springs(state.actor) else f"{state.actor.name} has no joints that swing"
+    return "" if has_springs(state.actor) else f"{state.actor.name} has no spring joints"
 
 
 def toggle_springs(state: AppState) -> None:

@@ -18,13 +18,15 @@ def draw_space(state: AppState) -> None:
     if state.scene.in_space is None:
         return
     chosen = choice(state, "Space", state.scene.space, _SPACES)
-    explain("space of the people: the world, or the camera that filmed them; edits are discarded")
+    explain(
+        "space of the people: the world, or the camera that filmed them; switching discards edits"
+    )
     if chosen != state.scene.space:
         switch_space(state, chosen)
 
 
 def switch_space(state: AppState, space: str) -> None:
-    """Show the people in another space; time, selection, look and calibrated camera stay.
+    """Show the people in another space; time, selection, appearance and calibrated camera stay.
 
     The people are read again, so edits of their motions and the undo history are discarded.
     """
@@ -65,7 +67,7 @@ def _is_same(actor: Actor, other: Actor) -> bool:
 
 
 def _dress(actor: Actor, others: list[Actor]) -> None:
-    """Give an actor the look that it had in the other space."""
+    """Give an actor the appearance that it had in the other space."""
     for other in others:
         if _is_same(actor, other):
             actor.color, actor.visible, actor.opacity = other.color, other.visible, other.opacity

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
+from viewer.app.files.state import Files
 from viewer.errors import ViewerError
 from viewer.models import known_models, save_model_folder
 from viewer.phrases import counted, printable
@@ -19,5 +20,6 @@ def set_model_folder(state: AppState, paths: list[Path]) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
+    state.of(Files).model_folder = folder
     count = len(known_models(folder))
     state.say(f"{counted(count, 'body model')} in {printable(folder, 200)}")

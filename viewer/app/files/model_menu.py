@@ -79,7 +79,7 @@ def _draw_missing(state: AppState, kind: str, model: Publication) -> None:
         if imgui.menu_item(label, model.licence, False, not why)[0]:
             _start_adding(state, kind)
         note_item(state, label)
-        explain(f"{model.about}: downloads it with pip into your data folder", why)
+        explain(f"{model.about}; downloaded with pip into your data folder", why)
         return
     imgui.menu_item(f"{model.title}##missing", model.licence, False, False)
     note_item(state, f"missing {kind}")

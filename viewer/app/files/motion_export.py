@@ -76,7 +76,7 @@ def unsuited_formats(actor: Actor) -> dict[str, str]:
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
     found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
     if skeleton is not None and not is_humanoid(actor.figure):
-        found[".vrma"] = "for humanoids only: some human bones are not found"
+        found[".vrma"] = "for humanoids only: some human bones were not found"
     return found
 
 

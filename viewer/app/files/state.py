@@ -32,6 +32,8 @@ class Files:
         Rig of the body model that is opened next; empty for its default.
     models : dict
         Body models that were found, by name; searched for when the menu opens.
+    model_folder : Path or None
+        Folder of body models; read when the window "Preferences" opens.
     """
 
     dialog: FileDialog | None = None
@@ -41,3 +43,4 @@ class Files:
     recent: list[tuple[str, ...]] = field(default_factory=list)
     rig: str = ""
     models: dict[str, Path] = field(default_factory=dict)
+    model_folder: Path | None = None

@@ -50,6 +50,7 @@ _LISTED = 20.0  # rows of the list of keys
 def open_preferences(state: AppState) -> None:
     """Open the window."""
     state.of(Appearance).is_open = True
+    state.of(Files).model_folder = load_model_folder()
 
 
 def draw_preferences(state: AppState) -> None:
@@ -91,19 +92,25 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
         appearance.system_theme = system_theme()
     if preferences.theme == "system" and not appearance.system_theme:
         imgui.text_disabled("the theme of this system is unknown: dark is used")
-    why = "--scale was given on the command line" if appearance.given_scale else ""
-    scales = {"0": f"automatic ({100.0 * appearance.screen_scale:.0f} %)"}
-    scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
-    with disabled(state, why):
-        chosen = choice(state, "Interface scale", f"{preferences.scale:g}", scales)
-        explain("automatic follows the scale of the monitor", why)
-    preferences.scale = float(chosen)
+    _draw_scale(state, preferences)
     changed, size = slider_float(
         state, begin_field("Font size"), preferences.font_size, *FONT_SIZES, "%.0f", _ALWAYS_CLAMP
     )
     note_item(state, "Font size")
     if changed:
         preferences.font_size = float(round(size))
+
+
+def _draw_scale(state: AppState, preferences: Preferences) -> None:
+    given = state.of(Appearance).given_scale
+    if given:
+        with disabled(state, "--scale was given on the command line"):
+            choice(state, "Interface scale", "", {"": f"{100.0 * given:.0f} %"})
+        return
+    scales = {"0": f"automatic ({100.0 * state.of(Appearance).screen_scale:.0f} %)"}
+    scales |= {f"{scale:g}": f"{100.0 * scale:.0f} %" for scale in SCALES}
+    preferences.scale = float(choice(state, "Interface scale", f"{preferences.scale:g}", scales))
+    explain("automatic follows the scale of the monitor")
 
 
 def _draw_view(state: AppState, preferences: Preferences) -> None:
@@ -121,7 +128,7 @@ def _draw_view(state: AppState, preferences: Preferences) -> None:
 def _draw_files(state: AppState, preferences: Preferences) -> None:
     preferences.up = choice(state, "Up axis", preferences.up, UPS)
     explain("up axis of captures and BVH files that are opened from now on")
-    folder = load_model_folder()
+    folder = state.of(Files).model_folder
     begin_field("Model folder")
     if button(state, "Choose…##model folder"):
         state.of(Files).dialog = FileDialog(

@@ -222,7 +222,7 @@ def _span_text(state: AppState, settings: RecordSettings) -> str:
 
 
 def ask_where(state: AppState, settings: RecordSettings) -> None:
-    """Open the dialog for the name of a recording, which offers one after the scene's title."""
+    """Open the dialog for the name of a recording; the suggested name is the scene's title."""
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")

@@ -26,6 +26,7 @@ from viewer.rendering.part_colors import part_colors
 from viewer.rendering.passes.bone_style import skeleton_opacity
 from viewer.rendering.passes.ground_pass import grid_step, parse_color
 from viewer.rig.annotations import BodyParts
+from viewer.rig.scene import scene_unit
 
 __all__ = ["draw"]
 
@@ -71,8 +72,9 @@ def draw(state: AppState) -> None:
     _beside("Texture")
     options.texture = checkbox(state, "Texture", options.texture, no_texture(state))
     options.cull = checkbox(state, "Cull back faces", options.cull, why)
-    _beside("Grid (0.5)")
-    options.grid = checkbox(state, f"Grid ({grid_step(state.box):g})###Grid", options.grid)
+    grid = f"Grid ({grid_step(state.box):g} {scene_unit(state.scene)}".rstrip() + ")"
+    _beside(grid)
+    options.grid = checkbox(state, f"{grid}###Grid", options.grid)
     _draw_background(state)
     imgui.separator()
     _draw_joint_toggles(state)

@@ -13,7 +13,7 @@ from viewer.rendering.overlay.legend_columns import legend_columns
 __all__ = ["draw_legend"]
 
 _GAP = 10.0  # points from the edges of the view
-_BAR = (200.0, 12.0)  # points
+_BAR = (40.0 / 3.0, 0.8)  # width and height of the bar, in font sizes
 _TALL, _WIDE = 0.8, 0.4  # fractions of the view's height and width available for names
 _MANY, _SMALLER = 12, 0.8  # number of names above which the font is scaled, and its scale
 _LONGEST = 40  # characters of a name
@@ -38,7 +38,7 @@ def draw_legend(state: AppState) -> Rect | None:
     if begin_overlay("##legend", x + _GAP, y + _GAP, (0.0, 0.0)):
         imgui.text_unformatted(printable(legend.heading, 2 * _LONGEST))
         if len(legend.colors):
-            _draw_bar(legend, min(_BAR[0], width - 60.0))
+            _draw_bar(legend, min(_BAR[0] * imgui.get_font_size(), width - 60.0))
         smaller = _SMALLER if len(legend.entries) > _MANY else 1.0
         imgui.push_font(None, smaller * imgui.get_style().font_size_base)
         _draw_entries(legend, width, height)
@@ -53,6 +53,7 @@ def draw_legend(state: AppState) -> Rect | None:
 def _draw_bar(legend: Legend, width: float) -> None:
     """Draw the colours, lines at the isolines, and the numbers below."""
     place, draw_list = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list()
+    bottom = place.y + _BAR[1] * imgui.get_font_size()
     colors = legend.colors.astype(float) / 255.0
     # Discrete colours are drawn as they are, a continuous map in steps of a few points.
     steps = min(len(colors), round(width / 3.0)) if len(colors) == 256 else len(colors)
@@ -62,12 +63,12 @@ def _draw_bar(legend: Legend, width: float) -> None:
         right = round(place.x + width * (step + 1) / steps)
         row = colors[int((step + 0.5) / steps * len(colors))]
         color = imgui.get_color_u32((float(row[0]), float(row[1]), float(row[2]), 1.0))
-        draw_list.add_rect_filled((left, place.y), (right, place.y + _BAR[1]), color)
+        draw_list.add_rect_filled((left, place.y), (right, bottom), color)
     for at in legend.lines:
         middle = round(place.x + at * width) + 0.5
         ink = imgui.get_color_u32(_LINE)
-        draw_list.add_line((middle, place.y), (middle, place.y + _BAR[1]), ink)
-    imgui.dummy((width, _BAR[1]))
+        draw_list.add_line((middle, place.y), (middle, bottom), ink)
+    imgui.dummy((width, bottom - place.y))
     base = imgui.get_cursor_pos()
     for tick in legend.ticks:
         size = imgui.calc_text_size(tick.text).x

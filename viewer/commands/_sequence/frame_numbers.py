@@ -159,8 +159,10 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
     parser.set_defaults(frame_option="--frame")
 
 
-def parse_range(text: str, option: str = "--frames") -> Range:
-    """Parse ``A:B`` or ``A:B:STEP``; A and B may be omitted. ``option`` is for messages.
+def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> Range:
+    """Parse ``A:B`` or, where there are steps, ``A:B:STEP``; A and B may be omitted.
+
+    ``option`` is for messages.
 
     >>> parse_range("10:20:2"), parse_range(":5")
     (Range(first=10, stop=20, step=2), Range(first=None, stop=5, step=1))
@@ -169,10 +171,12 @@ def parse_range(text: str, option: str = "--frames") -> Range:
     if found:
         first, stop = (int(end) if end else None for end in found.group(1, 2))
         step = int(found[3] or 1)
-        if step >= 1 and (stop is None or (first or 0) < stop):
+        is_range = step >= 1 and (stop is None or (first or 0) < stop)
+        if is_range and (steps or found[3] is None):
             return Range(first, stop, step)
+    forms = "A:B or A:B:STEP" if steps else "A:B"
     raise ViewerError(
-        f'{option}: expected A:B or A:B:STEP with A below B, as in 0:100, found "{printable(text)}"'
+        f'{option}: expected {forms} with A below B, as in 0:100, found "{printable(text)}"'
     )
 
 

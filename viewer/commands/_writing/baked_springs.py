@@ -1,4 +1,4 @@
-"""Option that writes the simulated rotations of joints that swing."""
+"""Option that writes the simulated rotations of spring joints."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ def add_spring_argument(group: argparse._ArgumentGroup) -> None:
         action="store_const",
         const="on",
         default="off",
-        help="write the simulated rotations of joints that swing, such as hair in VRM files",
+        help="write the simulated rotations of spring joints, such as hair in VRM files",
     )
 
 
 def bake_springs(arguments: argparse.Namespace, scene: Scene, output: Path) -> list[Diagnostic]:
-    """Replace motions of figures with joints that swing by frames, if requested; return notes."""
+    """Replace motions of figures with spring joints by frames, if requested; return notes."""
     holds_motion = output.suffix.lower() not in (".vrm", ".vrma")
     actors = [a for a in scene.actors if isinstance(a.clip, JointMotion) and has_springs(a)]
     actors = actors if holds_motion else []
     bakes = arguments.springs == "on"
     if bakes and not holds_motion:
         raise ViewerError(
-            f"--bake-springs: {printable(output.suffix)} cannot store motions of joints that swing"
+            f"--bake-springs: {printable(output.suffix)} cannot store motions of spring joints"
         )
     if bakes and not actors:
-        raise ViewerError("--bake-springs: no figure with a motion has joints that swing")
+        raise ViewerError("--bake-springs: no figure with a motion has spring joints")
     notes = []
     for actor in actors:
         springs = actor.figure.require_skeleton().springs

@@ -19,19 +19,19 @@ def add_vrm_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME",
-        help="an author; may be repeated; needed for figures from other formats",
+        help="an author; may be repeated; required for figures from other formats",
     )
     group.add_argument(
         "--vrm-licence",
         metavar="URL",
-        help="address of the licence; needed for figures from other formats",
+        help="address of the licence; required for figures from other formats",
     )
 
 
 def vrm_meta(arguments: argparse.Namespace, output: Path | None) -> VrmMeta:
     """Return the requested meta data.
 
-    Raises ViewerError if there are any, but the output is no VRM file.
+    Raises ViewerError if there are any, but the output is not a VRM file.
     """
     given = {
         "--vrm-name": arguments.vrm_name,

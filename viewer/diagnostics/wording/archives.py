@@ -38,7 +38,7 @@ MESSAGES = {
     "F002.pickle-key": "expected a dict with string keys, found the key {found}",
     "F002.pickle-twice": "{item:text}: expected a single value with this name, found two",
     "F002.packed": "expected valid {method} data, found damaged data ({reason:text})",
-    "F002.packed-method": "expected a pickle packed by zlib, gzip, bz2, xz or lzma, found "
+    "F002.packed-method": "expected a pickle compressed with zlib, gzip, bz2, xz or lzma, found "
     "{method}: save it again by `joblib.dump(joblib.load(FILE), FILE, compress=0)`",
     "F002.packed-kind": "expected a pickle in the {method} data, found {found}",
     "F002.packed-size": "expected at most {most} bytes in {size} bytes of {method} data, "
@@ -165,7 +165,7 @@ PHRASES = {
     "pickle-array-state": "expected the state of an array, found {found}",
     "pickle-byte-order": "expected the byte order of an array, found {found}",
     "pickle-dtype-state": "expected the state of a dtype, found {found}",
-    "pickle-nested": "expected at most {most} pickles inside each other, found more",
+    "pickle-nested": "expected at most {most} nested pickles, found more",
     # Tensors
     "unread-storage": "storage of a tensor",
     "tensor-range": "expected a tensor within {found:#element} of its storage, found {shape:axes} "
@@ -179,12 +179,12 @@ PHRASES = {
     "tensor-storages": "expected one storage {item:quoted}, found two of different types or sizes",
     "tensor-no-storage": "expected a storage for each tensor, found none",
     "torch-bytes": "expected a storage saved by torch, found {found}",
-    "torch-magic": "expected a file of torch, found another pickle",
-    "torch-protocol": "expected protocol {expected} of torch, found another one",
+    "torch-magic": "expected a torch file, found another pickle",
+    "torch-protocol": "expected torch protocol {expected}, found another one",
     # Arrays of joblib
     "joblib-old": "expected arrays in the file, found {name}, which keeps them in other files: "
     "load and save it again with joblib 0.10 or later",
-    "joblib-wrapper": "expected the description of an array, found an unusual {name}",
+    "joblib-wrapper": "expected a standard array description, found an unusual {name}",
     "joblib-dtype": "expected an array of numbers or strings, found {shape:axes} of {dtype}",
     "joblib-objects": "expected an array of objects, found another value",
     "pickle-other": "unexpected object in the pickle",

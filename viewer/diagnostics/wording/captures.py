@@ -69,24 +69,24 @@ MESSAGES = {
     "({tool})",
     "F002.video-rows": "expected at most {most} frames of all people, found more",
     "F002.video-frames": "expected frames from 0, and at most {most}, found {low} to {high}",
-    "F002.video-frame-numbers": "{item:text}: expected whole numbers of frames, found others",
+    "F002.video-frame-numbers": "{item:text}: expected integer frame numbers, found other values",
     "F002.video-rotation": "{item:text}: expected rotations, found a matrix or vector of size "
     "{found:.3g}",
     "F002.video-count": "{item:text}: expected {expected:#number}, found {found}",
-    "F002.video-whole": "{item:text}: expected a list of whole numbers, found another value",
+    "F002.video-whole": "{item:text}: expected a list of integers, found another value",
     "F002.video-frame": "{item:text}: expected the detections of a frame, found another value",
-    "F002.video-person": "{item:text}: expected a person with a number, found another value",
+    "F002.video-person": "{item:text}: expected a person with an ID, found another value",
     "F002.video-lists": "{item:text}: expected as many bodies and cameras as tracks, found "
     "{counts:list}",
     "F002.video-camera": "{item:text}: expected a camera in each frame of person {person}, found "
     "{n:#frame}",
     "F002.video-points": "{item:text}: expected {expected:list} keypoints, joints and vertices, as "
     "in the first frame, found others",
-    "F007.video-vertices": "{n} of {all} vertices kept, as there are many frames",
+    "F007.video-vertices": "{n} of {all} vertices kept because there are many frames",
     "F007.video-focal": "camera omitted: expected a positive focal length, found {found:g} pixels",
     "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
-    "F007.video-last": "{n:#result} in the folder: {name:text} opened, that of the last iteration",
-    "F007.video-tracks": "ignored, as it does not match the people: all are present in all frames",
+    "F007.video-last": "{n:#result} in the folder: opened {name:text}, the last iteration",
+    "F007.video-tracks": "ignored because it does not match the people: all are in every frame",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "

@@ -19,9 +19,7 @@ CODES = {
     "C012": Code("note", "keypoints that are never visible", "none if the camera cannot see them"),
     "C013": Code("note", "unclear ground height", "specify it (--ground)"),
     "C014": Code("warning", "jitter", "smooth the motion (--smooth of viewer convert)"),
-    "C015": Code(
-        "warning", "people exchanged", "cut the motion there, or join tracks (--merge-ids)"
-    ),
+    "C015": Code("warning", "swapped IDs", "cut the motion there, or join tracks (--merge-ids)"),
     "C016": Code(
         "warning",
         "floating feet",
@@ -57,11 +55,11 @@ MESSAGES = {
     "checked",
     "C014.jitter": "{n:#frame/{all}}: {joint:text} jitters by {noise} from frame to frame (limit "
     "{limit}), most around frame {frame}",
-    "C015.exchanged": "jumps by {distance} to the place of {other}, who jumps to the place of this "
+    "C015.exchanged": "jumps by {distance} to the position of {other}, who jumps to that of this "
     "person, in {n:#frame}: {frames_text:list}",
     "C015.continued": "appears in frame {first}, {distance} from where {other} disappears in frame "
     "{last}: may be one person (--merge-ids {ids} of viewer convert)",
-    "C016.foot": "{n:#frame/{all}}: rests up to {height} above the ground with both feet, most "
+    "C016.foot": "{n:#frame/{all}}: both feet rest up to {height} above the ground, highest "
     "at frame {frame}",
 }
 

@@ -90,12 +90,12 @@ MESSAGES = {
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
     "keypoints3d folder",
-    "X003.springs": "{figure:text}: {n:#joint} that {n:?swings|swing} {n:?has|have} the rotations "
+    "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "
     "of the clip; viewer convert --bake-springs writes the simulated ones",
     "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
     "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
-    "X003.vrma-joints": "{n:#joint} that {n:?is|are} no human {n:?bone|bones} {n:?is|are} omitted",
+    "X003.vrma-joints": "{n:#joint} without a human bone {n:?is|are} omitted",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
     "X002.of-figure": "{figure:text}: {remark}",
@@ -104,7 +104,7 @@ MESSAGES = {
     "{n:?is|are} omitted: {names:list}",
     "X003.idle-shapes": "keys of {n:#blend shape} that {n:?changes|change} no vertex are omitted: "
     "{names:list}",
-    "X003.camera-lenses": "glTF cannot store distortion, skew or the centre of lenses, which "
+    "X003.camera-lenses": "glTF cannot store lens distortion, skew or principal points, which "
     "{n:?is|are} omitted: {names:list}",
     "X003.camera-motions": "{n:#camera|is|are} written at the first frame only, without "
     "{n:?its|their} motion: {names:list}",
@@ -137,7 +137,7 @@ MESSAGES = {
     "{n:?is|are} shifted to begin at 0: {names:list8}",
     "X005.t-pose": "the rest pose is a T-pose, as VRM requires: joints are rotated by up to "
     "{degrees:.3g} degrees",
-    "X005.vrm-licence": "programs may refuse a VRM 1.0 file with another licence than {licence}",
+    "X005.vrm-licence": "programs may refuse a VRM 1.0 file with a licence other than {licence}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",
     "X005.influences": _INFLUENCES,
@@ -150,8 +150,7 @@ MESSAGES = {
     "--model for exact translations)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
-    "X005.springs-baked": "{figure:text}: simulated rotations of {n:#joint} that {n:?swings|swing} "
-    "are written",
+    "X005.springs-baked": "{figure:text}: simulated rotations of {n:#spring joint} are written",
     "X005.untracked": "{names:all}: not tracked, possibly a different person in each frame",
     "X005.of-person": "{person}: {remark}",
     "X005.of-figure": "{figure:text}: {remark}",
@@ -177,12 +176,12 @@ PHRASES = {
     "vrm-springs": "{n:#spring chain}",
     "lost-bones": "{n:#human bone}",
     "lost-annotations": "{n:#first-person setting}",
-    "lost-morph-binds": "{n:#bind} of morph targets",
-    "lost-material-binds": "{n:#bind} of materials",
+    "lost-morph-binds": "{n:#morph target bind}",
+    "lost-material-binds": "{n:#material bind}",
     "lost-textures": "{n:#texture}",
     "lost-colliders": "{n:#collider}",
-    "lost-spring-joints": "{n:#joint} of springs",
-    "lost-centers": "{n:#centre} of springs",
+    "lost-spring-joints": "{n:#spring joint}",
+    "lost-centers": "{n:#spring centre}",
     # Replacements of missing frames
     "pose-held": "the last pose is held",
     "pose-held-and-marked": "the last pose is held, and the frames are marked in present",

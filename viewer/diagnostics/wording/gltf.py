@@ -20,8 +20,8 @@ MESSAGES = {
     "G006.constraint": "invalid constraint ignored: expected {expected}",
     "F002.constraint-cycle": "expected constraints without cycles, found a cycle of "
     "nodes {nodes:list12}",
-    "G006.spring": "invalid spring chain ignored: expected nodes, each below the one before, and "
-    "finite numbers",
+    "G006.spring": "invalid spring chain ignored: expected nodes, each a descendant of the "
+    "previous one, and finite numbers",
     "G006.collider": "invalid collider ignored: expected a node, and a sphere or a capsule",
     "G006.first-person": "expected a mesh and auto, both, thirdPersonOnly or firstPersonOnly, "
     "found {found:quoted}: ignored",

@@ -13,6 +13,8 @@ MESSAGES = {
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
     "{figure:text}: {idle:list8}",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
+    "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
+    "{found}",
     "F004.asymmetric": "{joint:text} has no mirror counterpart: the skeleton is not symmetric",
     "F007.coefficient-left-out": "{group} coefficient {last} omitted (largest value "
     "{largest:.3g}): {figure:text} has {most}",
@@ -26,6 +28,16 @@ MESSAGES = {
     "{pairs:list60}",
     "F007.joints-at-rest": "joints kept at rest: {names:list60}",
     "F007.joints-without-partner": "unmatched joints of {motion:text}: {names:list60}",
+    "F007.rest-asked": "rest pose of {motion:text}: frame {frame}, as requested",
+    "F007.rest-frame": "rest pose of {motion:text}: frame {frame}, which is {pose}; its zero pose "
+    "is not a standing pose; --source-rest overrides it",
+    "F007.rest-anatomy": "rest pose of {motion:text}: estimated from its trunk, soles, knees and "
+    "elbows; its zero pose is not a standing pose, and no frame is a T- or A-pose; --source-rest "
+    "overrides it",
+    "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
+    "{names:list}",
+    "F007.rest-unknown": "zero pose of {motion:text} used as its rest pose, though it is "
+    "not a standing pose: the motion is not upright; --source-rest N uses frame N",
     "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
@@ -46,15 +58,15 @@ MESSAGES = {
     "{longest} ({seconds:.2g} s)",
     "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
     "{gaps:list}",
-    "X006.locked": "{figure:text}: feet held in {n:#contact}, in which they slide by {after} "
+    "X006.locked": "{figure:text}: feet held in place in {n:#contact}; they slide by {after} "
     f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
     "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
-    "X006.no-legs": "{figure:text}: feet not held, since it has no legs with joints of known names",
+    "X006.no-legs": "{figure:text}: feet not held, since no legs were found by joint name",
     "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
     "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
     "lowest positions are at height 0",
-    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh or "
-    "joints of known names",
+    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh and "
+    "no joints of known names",
     "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",
@@ -76,6 +88,8 @@ PHRASES = {
     "left-place": "figure translation",
     "left-size": "figure scale",
     "left-shape": "figure shape",
+    "t-pose": "a T-pose",
+    "a-pose": "an A-pose",
     "scale-not-positive": "scale: expected a positive number, found {found:g}",
     "scale-out-of-range": "scale: expected {low:g} to {high:g}, found {found:g}",
     "translation-too-far": "translation: expected at most {most:g}, found {found:g}",

@@ -24,7 +24,7 @@ _ABOVE = {
     **{"ThumbMetacarpal": "Hand", "ThumbProximal": "ThumbMetacarpal"},
     "ThumbDistal": "ThumbProximal",
 }
-"""Bone below which another one must be."""
+"""Required ancestor of each listed bone."""
 
 _FINGERS = ("Index", "Middle", "Ring", "Little")
 _PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Intermediate"}
@@ -35,7 +35,7 @@ def human_bones(figure: Figure) -> dict[str, int]:
 
     Optional bones whose hierarchy VRM does not allow are left out.
 
-    ``figure``: figure with a skeleton, whose humanoid or joint names tell the bones.
+    ``figure``: figure with a skeleton, whose humanoid or joint names identify the bones.
     Raises RigError if a required bone is missing.
     """
     skeleton = figure.require_skeleton()
@@ -69,7 +69,7 @@ def _named(skeleton: Skeleton) -> dict[str, int]:
 
 
 def bone_above(bone: str) -> str:
-    """Return the bone below which a bone must be; empty for the hips."""
+    """Return the required ancestor of a bone; empty for the hips."""
     side = next((side for side in ("left", "right") if bone.startswith(side)), "")
     name = bone.removeprefix(side)
     for finger in _FINGERS:

@@ -1,6 +1,6 @@
 """Extensions of a VRM 1.0 file, with the indices of the file that is written.
 
-Members without indices are kept as they are, whatever they are.
+Members without indices are kept unchanged.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _list(told: Any, name: str) -> list[Any]:
 
 
 def _rows(told: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
-    """Return the objects of a list with a translated index, without those that have none."""
+    """Return the objects of a list with translated indices, except those whose index is lost."""
     rows = told if isinstance(told, list) else []
     return [
         {**each, name: index}

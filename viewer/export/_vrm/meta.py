@@ -18,7 +18,8 @@ LICENCE = "https://vrm.dev/licenses/1.0/"
 def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
     """Return the meta data of a new VRM 1.0 character.
 
-    Permissions are not stated, so that those of the specification apply, which allow least.
+    Permissions are not stated, so the defaults of the specification apply, which are the most
+    restrictive.
 
     ``meta``: as requested.
     ``figure``: name of the figure, the default name.

@@ -31,7 +31,7 @@ _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "L
 
 
 def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
-    """Return a figure with a joint-wise equal skeleton without DOFs, in VRM's axes and unit.
+    """Return a figure in VRM's axes and unit, whose skeleton has the same joints without DOFs.
 
     Its shape is baked in unless it has only morph targets; pose correctives are dropped. VRM
     characters keep their height above the ground.
@@ -114,7 +114,7 @@ def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
 
 
 def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
-    """Return a figure with its mesh and bindings transformed; joints are already."""
+    """Return a figure with its mesh and bindings transformed as its joints already are."""
     mesh, skin = figure.mesh, figure.skin
     if mesh is None:
         return figure
@@ -176,6 +176,6 @@ def _arc(start: Floats, end: Floats) -> Floats:
     if not middle.any():
         middle = unit(np.cross(start, np.eye(3)[np.abs(start).argmin()]))
         return 2.0 * np.outer(middle, middle) - np.eye(3)
-    # Two half turns, about the start and about the middle.
+    # Two rotations by 180 degrees: about the start, and about the middle.
     first = 2.0 * np.outer(start, start) - np.eye(3)
     return (2.0 * np.outer(middle, middle) - np.eye(3)) @ first

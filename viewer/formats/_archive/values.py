@@ -209,7 +209,7 @@ class Archive:
         return self._branches[key]
 
     def unread(self) -> set[str]:
-        """Return the names of values that nobody has asked for, also in the dicts inside."""
+        """Return the names of values that have not been read, including those in nested dicts."""
         found = {
             key for key in self.keys if key not in self._values and not self._branches.get(key)
         }

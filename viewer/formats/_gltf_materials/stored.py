@@ -1,4 +1,4 @@
-"""Textures and toon shading of a VRM file as they are listed, to be written back."""
+"""Textures and toon shading as listed in a VRM file, for writing them back."""
 
 from __future__ import annotations
 

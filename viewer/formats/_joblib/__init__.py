@@ -1,1 +1,1 @@
-"""Compressed pickles, as joblib writes them."""
+"""Compressed pickles as written by joblib."""

@@ -33,7 +33,7 @@ _DAMAGE = (zlib.error, lzma.LZMAError, OSError, EOFError, ValueError)
 
 
 class _Unpacker(Protocol):
-    """What the decompressors of bz2 and lzma have in common."""
+    """Common interface of the decompressors of bz2 and lzma."""
 
     @property
     def eof(self) -> bool: ...

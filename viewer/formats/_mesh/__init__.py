@@ -1,1 +1,1 @@
-"""Meshes as several formats have them: polygons, surfaces and textures."""
+"""Mesh data that several formats share: polygons, surfaces and textures."""

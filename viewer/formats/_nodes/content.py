@@ -303,7 +303,7 @@ class NodeFile:
     part_views : dict of PartView
         The views in which the meshes of some nodes are drawn.
     springs : Springs or None
-        Nodes (instead of joints) that swing.
+        Spring nodes (instead of joints).
     named_nodes : frozenset of int
         Further nodes that must become joints, because extensions refer to them.
     toon : dict

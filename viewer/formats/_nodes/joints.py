@@ -166,7 +166,7 @@ def skeleton_of(
     constraints : iterable of Constraint
         Constraints between nodes; constraints of other figures are ignored.
     springs : Springs, optional
-        Nodes that swing; those of other figures are ignored.
+        Spring nodes; those of other figures are ignored.
 
     Returns
     -------

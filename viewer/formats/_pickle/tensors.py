@@ -48,7 +48,7 @@ _LONGEST_KEY = 200
 
 @dataclass(slots=True, eq=False)
 class Storage:
-    """A flat array in a file, read at most once, whichever tensors show it.
+    """A flat array in a file, read at most once, whichever tensors use it.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Tensor:
 
 
 def storage_of(persistent: object) -> tuple[str, Storage] | None:
-    """Return key and storage of a persistent id ("storage", type, key, place, count); else None."""
+    """Return key and storage of a persistent id ("storage", type, key, place, count), or None."""
     match persistent:
         case (
             Span(coding=str()) as word,

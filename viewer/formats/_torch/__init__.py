@@ -1,1 +1,1 @@
-"""Files of torch: zip archives since version 1.6, and the legacy streams before."""
+"""Torch files: zip archives since version 1.6, and legacy streams before."""

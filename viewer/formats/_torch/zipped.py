@@ -33,7 +33,7 @@ _LARGEST_READ = 1 << 20
 
 
 def is_torch(directory: ZipDirectory) -> bool:
-    """Return whether a zip archive is a file of torch."""
+    """Return whether a zip archive is a torch file."""
     return any(member.filename.endswith(_PICKLE) for member in directory.members)
 
 

@@ -1,1 +1,1 @@
-"""Results of video motion capture: one module per tool, and what they have in common."""
+"""Results of video motion capture: one module per tool, and their common parts."""

@@ -32,7 +32,7 @@ _PERSON = 0
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     parts = [archive.inside(key) for key in _KEYS.values()]
     return any(has(part, "body_pose", "global_orient", "transl") for part in parts)
 
@@ -87,7 +87,7 @@ def _size(intrinsics: Floats) -> tuple[int, int]:
 def _camera(
     world: Track, camera: Track, frames: Frames, intrinsics: Floats, rest_roots: RestRoots
 ) -> Cameras:
-    """Return the camera that sees a figure in the world as its twin in camera space.
+    """Return the camera that sees a figure in the world like its counterpart in camera space.
 
     The pelvis is at J0 + t in either space, so R maps the roots' orientations and
     T = (J0 + t) - R (J0 + t_world), with the figure's own rest pelvis J0.

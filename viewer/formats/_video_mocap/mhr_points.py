@@ -11,7 +11,7 @@ from viewer.rig.captures.points import PointLayout
 __all__ = ["JOINTS", "KEYPOINTS", "ORIGIN", "PARENTS", "point_layout"]
 
 ORIGIN = "body_world"
-"""Name of the joint that is the origin of the rig, and no part of the body."""
+"""Name of the joint that is the origin of the rig, and not part of the body."""
 
 _TWISTS = ["twist1_proc", "twist2_proc", "twist3_proc", "twist4_proc"]
 

@@ -1,7 +1,8 @@
-"""Checked arrays of results: finite, of the expected shape, within reach."""
+"""Checked arrays of results: finite, of the expected shape, within limits."""
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ __all__ = [
     "intrinsics_of",
     "matrices",
     "numbers",
+    "person_number",
     "places",
     "rotations_of",
     "rows",
@@ -33,6 +35,7 @@ __all__ = [
 Frames = np.ndarray[Any, np.dtype[np.int64]]
 
 _MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
+_PERSON = re.compile(r"-?[0-9]{1,9}")
 _SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
 
 
@@ -48,7 +51,7 @@ class RowBudget:
         Raises
         ------
         FormatError
-            If there are more than any recording has.
+            If there are more than any plausible recording has.
         """
         self._left -= max(count, 1)
         if self._left < 0:
@@ -58,6 +61,15 @@ class RowBudget:
 def has(archive: Archive | None, *keys: str) -> bool:
     """Return whether an archive has all of some keys."""
     return archive is not None and all(archive.has(key) for key in keys)
+
+
+def person_number(key: str) -> int | None:
+    """Return the number of a person from a key, or None if the key is no number.
+
+    >>> person_number("-1"), person_number("camera")
+    (-1, None)
+    """
+    return int(key) if _PERSON.fullmatch(key) else None
 
 
 def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
@@ -99,7 +111,7 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
 
 
 def frames_of(archive: Archive, key: str, count: int) -> Frames:
-    """Return numbers of frames, whole and in any order: (N,)."""
+    """Return frame numbers, integers in any order: (N,)."""
     found = rows(archive, key, (count,))
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
         raise archive.fault("F002.video-frame-numbers", item=key)

@@ -1,4 +1,4 @@
-"""SMPL parameters in dicts of any layout, by the usual spellings of their keys.
+"""SMPL parameters in dicts of any layout, found by the usual spellings of their keys.
 
 ::
 
@@ -13,7 +13,8 @@ and single poses in their own spellings are read by ``amass.py`` and ``pose.py``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import itertools
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,7 +22,14 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import RowBudget, frames_of, places, rows, shape_of
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    frames_of,
+    person_number,
+    places,
+    rows,
+    shape_of,
+)
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
 from viewer.phrases import printable
@@ -75,7 +83,7 @@ class _Layout:
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive has such parameters, in a layout that is not AMASS's."""
+    """Return whether an archive has SMPL parameters in a layout other than AMASS's."""
     layout = _layout(archive)
     if layout is None:
         budget = RowBudget(archive, _COST * _LOOKED_AT)
@@ -170,15 +178,25 @@ def _found(
 
 
 def _people(found: list[tuple[tuple[str, ...], Archive, _Layout]]) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are the frames of one person."""
+    """Return the tracks of people: dicts of single frames are the frames of one person.
+
+    Single frames with different joints or numbers of coefficients are different people.
+    """
     tracks = [_track(archive, layout) for _, archive, layout in found]
-    if len(tracks) > 1 and all(len(track.frames) == 1 for track in tracks):
+    is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
+    if is_alike and len(tracks) > 1 and all(len(track.frames) == 1 for track in tracks):
         return {0: _joined(tracks)}
     people: dict[int, Track] = {}
     for index, ((path, _, _), track) in enumerate(zip(found, tracks, strict=True)):
-        number = next((int(part) for part in path if part.isdigit() and len(part) < 10), index)
-        people[index if number in people else number] = track
+        known = (person_number(part) for part in path)
+        number = next((each for each in known if each is not None and each >= 0), index)
+        people[number if number not in people else _unused(people, index)] = track
     return people
+
+
+def _unused(people: Mapping[int, Track], first: int) -> int:
+    """Return the lowest number from ``first`` that nobody has."""
+    return next(number for number in itertools.count(first) if number not in people)
 
 
 def _track(archive: Archive, layout: _Layout) -> Track:
@@ -207,15 +225,26 @@ def _coefficients(archive: Archive, key: str) -> Floats | None:
     return found.reshape(-1, found.shape[-1])
 
 
+def _width(shape: Floats | None) -> int:
+    return 0 if shape is None else shape.shape[1]
+
+
 def _joined(tracks: list[Track]) -> Track:
-    """Return the frames of one person, each of which is a dict of its own."""
+    """Return the frames of one person, each of which is a separate dict.
+
+    Frames keep their numbers if all are different; else they are in the given order.
+    """
+    numbers = np.concatenate([track.frames for track in tracks])
+    frames, order = np.unique(numbers, return_index=True)
+    if len(frames) < len(tracks):
+        frames = order = np.arange(len(tracks))
     vectors = [track.vectors for track in tracks if track.vectors is not None]
     placed = [track.translations for track in tracks if track.translations is not None]
     shapes = [track.shape for track in tracks if track.shape is not None]
     return Track(
-        np.arange(len(tracks)),
+        frames,
         tracks[0].joint_names,
-        np.concatenate(vectors),
-        np.concatenate(placed),
-        np.concatenate(shapes) if len(shapes) == len(tracks) else None,
+        np.concatenate(vectors)[order],
+        np.concatenate(placed)[order],
+        np.concatenate(shapes)[order] if len(shapes) == len(tracks) else None,
     )

@@ -1,4 +1,4 @@
-"""4D-Humans and PHALP: ``results/NAME.pkl``, joblib's file of a dict from frame to detections.
+"""4D-Humans and PHALP: ``results/NAME.pkl``, a joblib file with the detections of each frame.
 
 ::
 
@@ -43,13 +43,13 @@ _LARGEST = 1 << 20  # pixels along a side
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     first = archive.inside(archive.keys[0]) if archive.keys else None
     return first is not None and all(map(first.has, ("tid", "smpl", "camera", "time")))
 
 
 def read(source: Source, archive: Archive) -> Results:
-    """Read all people who are seen, frame by frame."""
+    """Read all visible people, frame by frame."""
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     size, n_ghosts, n_cuts = None, 0, 0
     budget = RowBudget(archive)

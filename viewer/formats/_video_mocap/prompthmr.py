@@ -1,4 +1,4 @@
-"""PromptHMR (yufu-wang/PromptHMR): ``results.pkl``, joblib's file of people and a camera.
+"""PromptHMR (yufu-wang/PromptHMR): ``results.pkl``, a joblib file of people and a camera.
 
 ::
 
@@ -24,6 +24,7 @@ from viewer.formats._video_mocap.numbers import (
     intrinsics_of,
     matrices,
     numbers,
+    person_number,
     places,
     rotations_of,
     rows,
@@ -41,7 +42,7 @@ _WAYS = (("Rcw", "Tcw", False), ("Rwc", "Twc", True), ("pred_cam_R", "pred_cam_T
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     people = archive.inside("people")
     persons = [] if people is None else [people.inside(key) for key in people.keys[:1]]
     return any(has(person, "frames", key) for person in persons for key in _SPACES.values())
@@ -53,13 +54,14 @@ def read(source: Source, archive: Archive) -> Results:
     found: list[tuple[int, str, Archive, Archive]] = []
     for key in () if tracks is None else tracks.keys:
         person = None if tracks is None else tracks.inside(key)
-        if person is None or not key.lstrip("-").isdigit():
+        number = person_number(key)
+        if person is None or number is None:
             raise archive.fault("F002.video-person", item=f"people.{key}")
         for space, part in _SPACES.items():
             body = person.inside(part)
             if body is not None and body.has("trans"):
                 budget.spend(sum(shape_of(body, "trans")[:1]))
-                found.append((int(key), space, person, body))
+                found.append((number, space, person, body))
     people: dict[str, dict[int, Track]] = {}
     for number, space, person, body in found:
         people.setdefault(space, {})[number] = _track(person, body)

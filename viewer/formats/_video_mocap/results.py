@@ -1,4 +1,4 @@
-"""What the results of every tool consist of, and their conversion to a capture."""
+"""Results of a tool in a common form, and their conversion to a capture."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Track:
     layout, points : PointLayout, (N, P, 4)
         Captured points, in place of a body.
     rig : tuple of (N, P), (N, S), (N, E), (N, 3), or None
-        Model parameters, identity, expression and place of the Momentum Human Rig.
+        Model parameters, identity, expression and position of the Momentum Human Rig.
     """
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
@@ -118,7 +118,7 @@ class Results:
     frame_rate : float or None
         Frames per second, if the tool always uses the same.
     facts : tuple of (str, str)
-        What was recognised and what was ignored, for ``viewer info``.
+        Recognised and ignored contents, for ``viewer info``.
     notes : tuple of Diagnostic
         Messages about the file.
     """
@@ -140,7 +140,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     Raises
     ------
     FormatError
-        If no person is present in any frame, the numbers of frames are absurd, or the requested
+        If no person is present in any frame, the frame numbers are implausible, or the requested
         space is missing.
     """
     if not any(

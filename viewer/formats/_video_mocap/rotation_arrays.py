@@ -27,7 +27,7 @@ _TITLES = {3: "rotation vectors", 6: "6D rotations", 9: "matrices"}
 
 @dataclass(frozen=True, slots=True)
 class Form:
-    """How an array stores rotations: frames, joints, and numbers per rotation."""
+    """Layout of rotations in an array: frames, joints, and numbers per rotation."""
 
     n_frames: int
     n_joints: int

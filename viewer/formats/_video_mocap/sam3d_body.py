@@ -137,7 +137,7 @@ def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
+    """Return whether an archive contains results of this tool."""
     if _is_person(archive):
         return True
     firsts = [inner for key in archive.keys[:_LOOKED_AT] if (inner := archive.inside(key))]
@@ -174,7 +174,7 @@ def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
 
 
 def claims_folder(source: Source, names: set[str]) -> bool:
-    """Return whether the first file of a folder is such a file."""
+    """Return whether the first file of a folder contains results of this tool."""
     first = next((name for name in sorted(names) if name.lower().endswith(_SUFFIXES)), None)
     if first is None or any(name.lower().endswith(".json") for name in names):
         return False
@@ -245,7 +245,7 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
 
 
 class _Row(NamedTuple):
-    """One person in one frame: points, place, and the parameters of the rig."""
+    """One person in one frame: points, position, and the parameters of the rig."""
 
     frame: int
     points: Floats
@@ -269,7 +269,7 @@ def _track(rows: list[_Row], layout: PointLayout) -> Track:
 
 
 def _rig(rows: list[_Row]) -> tuple[Floats, Floats, Floats, Floats] | None:
-    """Return parameters and places of the rig; None unless every frame has all of them."""
+    """Return parameters and positions of the rig; None unless every frame has all of them."""
     sizes = {tuple(map(len, row.parameters)) for row in rows}
     if len(sizes) != 1 or len(next(iter(sizes))) != len(_MODEL):
         return None

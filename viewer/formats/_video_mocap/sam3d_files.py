@@ -32,7 +32,7 @@ def frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
         parts = {name: (match[1], int(match[2])) for name, match in matches.items() if match}
         stems = [*dict.fromkeys(stem for stem, _ in parts.values())]
         people = {person for _, person in parts.values()}
-        # A number that is the same nowhere counts frames, not people.
+        # A number that never repeats counts frames, not people.
         is_used = len(people) < len(names) or pattern is _PERSON
         if len(set(parts.values())) == len(names) and is_used:
             return {name: (stems.index(stem), person) for name, (stem, person) in parts.items()}

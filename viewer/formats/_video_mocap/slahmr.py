@@ -43,14 +43,14 @@ _SIZE = 32 << 20  # bytes of the file of tracks
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file: its arrays have an axis of people."""
+    """Return whether an archive has SLAHMR's results: its arrays have an axis of people."""
     if not has(archive, "trans", "root_orient", "pose_body"):
         return False
     return all(len(shape_of(archive, key)) == 3 for key in ("trans", "root_orient"))
 
 
 def claims_folder(source: Source, names: set[str]) -> bool:
-    """Return whether a folder contains such files."""
+    """Return whether a folder contains results of this tool."""
     return any(map(_RESULT.fullmatch, names))
 
 
@@ -117,7 +117,7 @@ def _bodies(archive: Archive, n_people: int, n_frames: int) -> list[Track]:
 
 
 def _selected(track: Track, seen: Bools) -> Track:
-    """Return the frames of a person who is not always in the scene."""
+    """Return a track without the frames in which the person is not in the scene."""
     if seen.all() or track.vectors is None or track.translations is None:
         return track
     frames = np.flatnonzero(seen)

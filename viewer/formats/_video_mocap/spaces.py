@@ -1,4 +1,4 @@
-"""Bodies carried from one space of a video to the other, with the camera's pose in each frame."""
+"""Transfer of bodies between the spaces of a video by the camera's pose in each frame."""
 
 from __future__ import annotations
 

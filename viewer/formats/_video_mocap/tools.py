@@ -14,7 +14,7 @@ __all__ = ["TOOLS", "Tool", "folder_tool", "module_of", "tool_of"]
 
 @dataclass(frozen=True, slots=True)
 class Tool:
-    """A tool, and what its results contain.
+    """A tool, and the form of its results.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ def module_of(tool: str) -> ModuleType:
 
 
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool, None if it is none of them."""
+    """Return the key in ``TOOLS`` of an archive's tool; None if there is none."""
     return next((tool for tool in TOOLS if module_of(tool).recognises(archive)), None)
 
 

@@ -1,4 +1,4 @@
-"""TRAM (yufu-wang/tram): a folder of a file per person, and of the camera's path.
+"""TRAM (yufu-wang/tram): a folder with one file per person, and the camera's path.
 
 ::
 
@@ -51,7 +51,7 @@ def recognises(archive: Archive) -> bool:
 
 
 def claims_folder(source: Source, names: set[str]) -> bool:
-    """Return whether a folder contains such results, or the files of people."""
+    """Return whether a folder contains results of this tool, or the files of people."""
     return {_FOLDER, _CAMERA} <= names or any(map(_TRACK.fullmatch, names))
 
 

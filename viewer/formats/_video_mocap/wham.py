@@ -1,4 +1,4 @@
-"""WHAM (yohanshin/WHAM): ``wham_output.pkl``, joblib's file of a dict from track to results.
+"""WHAM (yohanshin/WHAM): ``wham_output.pkl``, a joblib file with the results of each track.
 
 ::
 
@@ -6,7 +6,7 @@
            frame_ids (T,)  verts (T, 6890, 3), which are not read
 
 SMPL with a shape per frame. The world has y up; its ``trans_world`` is read as SMPL's translation,
-whereas WHAM's own pictures move the middle of the hips there. The camera's focal length is the
+whereas WHAM's own renderings place the midpoint of the hips there. The camera's focal length is the
 diagonal of the video, whose size is not in the file.
 """
 
@@ -16,7 +16,15 @@ import numpy as np
 
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import RowBudget, frames_of, has, places, rows, shape_of
+from viewer.formats._video_mocap.numbers import (
+    RowBudget,
+    frames_of,
+    has,
+    person_number,
+    places,
+    rows,
+    shape_of,
+)
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.rig.smpl_family import FAMILY
 
@@ -26,8 +34,8 @@ _KEYS = {"world": ("pose_world", "trans_world"), "camera": ("pose", "trans")}
 
 
 def recognises(archive: Archive) -> bool:
-    """Return whether an archive is such a file."""
-    if not archive.keys or not archive.keys[0].lstrip("-").isdigit():
+    """Return whether an archive contains results of this tool."""
+    if not archive.keys or person_number(archive.keys[0]) is None:
         return False
     person = archive.inside(archive.keys[0])
     return any(has(person, *keys, "betas", "frame_ids") for keys in _KEYS.values())
@@ -36,7 +44,7 @@ def recognises(archive: Archive) -> bool:
 def read(source: Source, archive: Archive) -> Results:
     """Read both spaces of all people."""
     found = [
-        (int(key), space, person, names)
+        (_number(archive, key), space, person, names)
         for key in archive.keys
         if (person := archive.inside(key)) is not None
         for space, names in _KEYS.items()
@@ -49,6 +57,13 @@ def read(source: Source, archive: Archive) -> Results:
     for number, space, person, names in found:
         people.setdefault(space, {})[number] = _track(person, *names)
     return Results("WHAM", "SMPL", people, {"world": "y", "camera": "-y"})
+
+
+def _number(archive: Archive, key: str) -> int:
+    number = person_number(key)
+    if number is None:
+        raise archive.fault("F002.video-person", item=key)
+    return number
 
 
 def _track(person: Archive, poses: str, translations: str) -> Track:

@@ -7,7 +7,7 @@
                     points at its first child, and the last one 7 cm further
     colliderGroups  node, colliders (offset, radius)
 
-Vectors are in Unity's axes: their z is negative here.
+Vectors are in Unity's axes, whose z axis is reversed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Nodes to which the extensions of a VRM file refer, so that none of them is left out."""
+"""Nodes to which the extensions of a VRM file refer, so that all of them are kept."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class SpringJoint:
-    """One joint that swings, and the settings of its chain."""
+    """One spring joint, and the settings of its chain."""
 
     node: int
     tail: Floats

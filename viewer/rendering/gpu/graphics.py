@@ -36,7 +36,7 @@ class Graphics:
         self.context.info  # noqa: B018 - cached, so that it is available without a current context
 
     def rest(self) -> None:
-        """Bind a framebuffer that stays, in place of one that is about to be released."""
+        """Bind a framebuffer that remains valid, before another one is released."""
         self._framebuffer.use()
 
     def release(self) -> None:

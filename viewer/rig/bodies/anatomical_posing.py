@@ -112,14 +112,14 @@ DOF_NAMES = tuple(
 _AXES = np.array([axis for _, axes, _ in _TABLE for axis in axes])
 _OWNERS = np.repeat(np.arange(len(_TABLE)), [len(axes) for _, axes, _ in _TABLE])
 _RANKS = np.concatenate([np.arange(len(axes)) for _, axes, _ in _TABLE])
-# Joints whose frames do not follow the shape: the root and the ends of chains.
+# Joints whose frames are independent of the shape: the root and the ends of chains.
 _FIXED = [JOINTS.index(name) for name in ("pelvis", "toes_r", "toes_l", "head", "hand_r", "hand_l")]
 _ARCS = (("lumbar_body", "pelvis"), ("thorax", "lumbar_body"), ("head", "thorax"))
 _TILT = 0.25 * np.pi  # of the shoulder blades on their ellipsoid, at rest
 
 
 def dof_table() -> tuple[Ints, Ints]:
-    """Return joint and kind of each DOF, (46,) int32; the kind is the nearest axis of the bone."""
+    """Return the joint and kind of each DOF, (46,) int32; the kind is the nearest bone axis."""
     kinds = 3 + np.abs(_AXES).argmax(axis=1)
     return _OWNERS.astype(np.int32), kinds.astype(np.int32)
 
@@ -135,7 +135,7 @@ class AnatomicalPosing:
     data_frames : (24, 3, 3)
         A: frames of the bones in the pose of the data.
     data_steps : (24, 3)
-        Places of the joints relative to their parents in that pose.
+        Positions of the joints relative to their parents in that pose.
     learned : (24, 3, 3)
         Learned rotations from the pose of the data to the T-pose.
     joints : (24, 3)
@@ -187,7 +187,7 @@ class AnatomicalPosing:
         return frames @ own @ np.swapaxes(frames, 1, 2)
 
     def translations(self, dofs: Floats) -> Floats:
-        """Return how far joints leave their rest places in the parent: (..., 24, 3)."""
+        """Return the displacement of joints from rest, in their parents: (..., 24, 3)."""
         found = np.zeros((*dofs.shape[:-1], len(JOINTS), 3))
         joint = {name: self.joints[row] for row, name in enumerate(JOINTS)}
         number = {name: dofs[..., row] for row, name in enumerate(DOF_NAMES)}
@@ -212,7 +212,7 @@ class AnatomicalPosing:
 def _on_ellipsoid(
     sign: float, abduction: Floats, elevation: Floats, width: float, height: float
 ) -> Floats:
-    """Return a place of a shoulder blade; ``sign`` is 1 on the right side."""
+    """Return the position of a shoulder blade; ``sign`` is 1 on the right side."""
     angle = elevation - _TILT
     along = -sign * 0.25 * width * np.cos(angle) * np.cos(abduction)
     up = -0.5 * height * np.sin(angle)
@@ -227,7 +227,7 @@ def _arc_end(bending: Floats, extension: Floats, length: float) -> Floats:
 
 
 def _arc(angle: Floats, length: float) -> tuple[Floats, Floats]:
-    """Return shift aside and change of height of the end of an arc of an angle and a length."""
+    """Return the lateral and vertical shift of the end of an arc of given angle and length."""
     half = np.sinc(0.5 * angle / np.pi)  # sin(a / 2) / (a / 2)
     aside = 0.5 * length * angle * half * half
     return aside, length * (np.sinc(angle / np.pi) - 1.0)

@@ -19,7 +19,7 @@ class Animal:
     title : str
         Name of the model.
     chains : tuple of tuple of str
-        Names in order; each joint of a chain but the first hangs on the previous one.
+        Names in order; each joint of a chain except the first is a child of the previous one.
     """
 
     title: str
@@ -63,7 +63,7 @@ _ANIMALS = {
 
 
 def animal_of(parents: Sequence[int]) -> Animal | None:
-    """Return the layout with these joints; None if limbs are not where they should be.
+    """Return the layout with these joints; None if the limbs do not match.
 
     >>> animal_of([-1, 0, 1]) is None
     True

@@ -1,4 +1,4 @@
-"""Features: numbers that a pose gives to the correctives of a body model."""
+"""Features: weights of a body model's correctives as functions of the pose."""
 
 from __future__ import annotations
 

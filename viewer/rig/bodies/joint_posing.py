@@ -1,4 +1,4 @@
-"""Joints whose rotations and places follow their DOFs by other rules than Euler angles."""
+"""Joints that follow their DOFs by rules other than Euler angles."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class ModelParameters:
 
 
 def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
-    """Return joint and kind of each joint parameter, other than scales, that is ever not 0.
+    """Return joint and kind of each joint parameter, except scales, that can be nonzero.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Feature of MHR: a sparse layer of joint rotations, without negative values.
+"""Feature of MHR: a sparse linear layer of joint rotations with a ReLU.
 
 The input has six numbers for each joint from the third on: the first two columns of its rotation
 relative to its rest, minus those of the identity. ``MHRPoseCorrectivesModel`` of the Momentum Human

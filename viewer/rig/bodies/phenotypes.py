@@ -6,7 +6,7 @@ two variations a weight; a target's coefficient is the product of the weights of
 
     c_t = prod_{v in t} w_v        w_v: piecewise linear in the phenotype, sums to 1
 
-The numbers of the origins are normalised to a sum of 1.
+The values of the origins are normalised to a sum of 1.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ VARIATIONS = {
     "cupsize": ("mincup", "averagecup", "maxcup"),
     "firmness": ("minfirmness", "averagefirmness", "maxfirmness"),
 }
-"""Variations of each phenotype, at equal distances from the lowest number to 1."""
+"""Variations of each phenotype, at equal distances from the lowest value to 1."""
 
 ORIGINS = ("african", "asian", "caucasian")
 """Phenotypes that are variations themselves."""
@@ -38,14 +38,14 @@ PHENOTYPES = (*VARIATIONS, *ORIGINS)
 """Names of the phenotypes, in the order of Anny's sliders."""
 
 TYPICAL = 0.5
-"""Number of every phenotype of the mean body."""
+"""Value of every phenotype of the mean body."""
 
 _NEWBORN = -1.0 / 3.0  # the age of the first anchor; a baby is at 0
 _ALL = tuple(name for names in VARIATIONS.values() for name in names) + ORIGINS
 
 
 def phenotype_range(name: str) -> tuple[float, float]:
-    """Return the smallest and largest number of a phenotype.
+    """Return the smallest and largest value of a phenotype.
 
     >>> phenotype_range("muscle")
     (0.0, 1.0)
@@ -78,7 +78,7 @@ def weights_of(values: Floats, masks: Bools) -> Floats:
     Parameters
     ----------
     values : (11,)
-        Numbers of ``PHENOTYPES``; those beyond their range count as its end.
+        Values of ``PHENOTYPES``, clamped to their ranges.
     masks : (R, N) bool
         From ``target_masks``.
 
@@ -102,6 +102,6 @@ def _anchored(value: float, count: int, low: float) -> Floats:
 
 
 def _fractions(values: Floats) -> Floats:
-    """Return the fractions of the origins; equal ones if all numbers are 0."""
+    """Return the fractions of the origins; equal ones if all values are 0."""
     total = float(values.sum())
     return values / total if total else np.full(len(values), 1.0 / len(values))

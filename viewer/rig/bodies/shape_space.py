@@ -1,4 +1,4 @@
-"""Shape spaces: rest meshes and joints that are no weighted sum of offsets."""
+"""Shape spaces: rest meshes and joints that are not weighted sums of offsets."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
 
 
 def motion_times(view: CameraView, most: int) -> Floats:
-    """Return some times at which a camera is placed, the first and the last among them: (T,).
+    """Return sample times of a camera's motion, including the first and the last: (T,).
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
 
 
 def placed_view(view: CameraView, placement: Floats) -> CameraView:
-    """Return a camera that is moved together with the scene that it shows.
+    """Return a camera that is moved together with its scene.
 
     With the placement X' = P X + p: R' = R P^T and T' = T - R' p.
 

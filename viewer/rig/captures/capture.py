@@ -16,7 +16,7 @@ from viewer.rig.motion.parameter_clip import ParameterMotion
 __all__ = ["Capture", "CapturePart", "RestRoots"]
 
 RestRoots = Callable[[Floats | None], Floats]
-"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or without any."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,7 +69,7 @@ class Capture:
     views_of : callable or None
         Returns further cameras, whose places depend on the figure that shows the bodies.
     facts : tuple of (str, str)
-        What was recognised in the file, for ``viewer info``.
+        Recognised contents of the file, for ``viewer info``.
     space : "world", "camera" or ""
         The space of its bodies, of those that the file contains; empty if it has only one.
     in_space : callable or None

@@ -13,7 +13,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = ["Displacement", "joint_displacement", "point_displacement"]
 
-_TOGETHER = 1000  # frames per batch, whose matrices are in memory together
+_TOGETHER = 1000  # frames per batch, to limit the memory for their matrices
 
 
 @dataclass(frozen=True, slots=True)

@@ -30,7 +30,7 @@ _EASE = 0.2  # seconds over which a correction begins and ends outside contacts
 
 @dataclass(frozen=True, slots=True)
 class FootLock:
-    """What locking changed.
+    """Changes made by foot locking.
 
     Attributes
     ----------
@@ -127,7 +127,7 @@ def _rotations(
     drop: Floats,
     shifts: list[Floats],
 ) -> Floats:
-    """Return local rotations (N, J, 4) with which the ankles of all legs are at their targets."""
+    """Return local rotations (N, J, 4) that bring the ankles of all legs to their targets."""
     result = rotations.copy()
     # Knees bend about the axis from the right to the left.
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
@@ -146,7 +146,7 @@ def _corrections(
         for joint, a, b in _parts(leg, toe, start, stop):
             part = places[a:b, joint]
             slid += _path(part, up)
-            # A contact that follows another one continues where that one has put the foot.
+            # A contact that follows another one continues from the foot's position there.
             kept = part.mean(axis=0) if held is None else part[0] + held
             shift[a:b] = kept - part
             held = shift[b - 1].copy()
@@ -156,7 +156,7 @@ def _corrections(
 
 
 def _parts(leg: Leg, toe: Bools, start: int, stop: int) -> list[tuple[int, int, int]]:
-    """Return the joint that is held in each part of a contact, and the part's frames."""
+    """Return the joint that is held in each part of a contact, and the frames of the part."""
     own = np.where(toe[start:stop], leg.toe, leg.ankle)
     edges = [0, *(np.flatnonzero(np.diff(own)) + 1).tolist(), stop - start]
     return [(int(own[a]), start + a, start + b) for a, b in pairwise(edges)]

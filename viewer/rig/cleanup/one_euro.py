@@ -41,7 +41,7 @@ class OneEuro:
         return self._turned(once[::-1], rate)[::-1]
 
     def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
-        """Return filtered positions (N, ..., 3), of which one unit has some metres."""
+        """Return filtered positions (N, ..., 3); ``metres``: length of their unit."""
         once = self._shifted(positions, rate, metres)
         return self._shifted(once[::-1], rate, metres)[::-1]
 

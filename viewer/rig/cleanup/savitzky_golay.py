@@ -13,7 +13,7 @@ from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 __all__ = ["SavitzkyGolay"]
 
 _SECONDS = 0.2  # default length of the window
-_PASSES = 2  # the second is about the rotation found by the first, which is less noisy
+_PASSES = 2  # the second is relative to the result of the first, which is less noisy
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,7 +22,7 @@ class Filter(Protocol):
         """Return filtered unit quaternions (N, J, 4) of N frames at a rate per second."""
 
     def positions(self, positions: Floats, rate: float, metres: float) -> Floats:
-        """Return filtered positions (N, J, 3), of which one unit has some metres."""
+        """Return filtered positions (N, J, 3); ``metres``: length of their unit."""
 
 
 def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:

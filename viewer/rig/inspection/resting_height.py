@@ -15,7 +15,7 @@ from viewer.rig.shape import shaped
 __all__ = ["RestingHeight", "resting_height"]
 
 _MOST = 4000  # frames that are evaluated
-_LOW = 0.02  # fraction of the frames below the height of feet that never rest
+_LOW = 0.02  # quantile of the heights, for feet that never rest
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class RestingHeight:
 
 
 def resting_height(actor: Actor, up: str) -> RestingHeight | None:
-    """Return the height at which an actor's feet rest; None without two feet by name.
+    """Return the height at which an actor's feet rest; None unless two feet are found by name.
 
     Parameters
     ----------

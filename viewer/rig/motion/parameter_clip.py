@@ -64,7 +64,7 @@ def parameter_clip(motion: ParameterMotion, figure: Figure) -> SampledClip:
     Raises
     ------
     RigError
-        If the figure has no model parameters, or a number of values is wrong.
+        If the figure has no model parameters, or the number of values is wrong.
     """
     if len(motion.parameters) == 0:
         raise RigError("expected model parameters of at least one frame")

@@ -79,7 +79,7 @@ class SpringMotion:
         set_joint_rotations(skeleton, pose, skeleton.springs.joints, matrices, clamp=False)
 
     def rotations(self, actor: Actor, times: Floats) -> Floats:
-        """Return the rotations of the spring joints at some times (F,) s: (F, N, 4)."""
+        """Return the rotations of the spring joints (F, N, 4) at times (F,) in seconds."""
         clip, figure = actor.clip, actor.figure
         if not isinstance(clip, JointMotion):
             raise RigError(f"{actor.name} has no motion of joints")
@@ -103,7 +103,8 @@ class SpringMotion:
         middle = unit(own + self._up)
         if not middle.any():
             middle = np.eye(3)["yzx".index(figure.up)]
-        # Two half turns, about the figure's up axis and about the middle of both.
+        # Two rotations by 180 degrees: about the figure's up axis, and about the middle of both
+        # axes.
         first = 2.0 * np.outer(own, own) - np.eye(3)
         turn = (2.0 * np.outer(middle, middle) - np.eye(3)) @ first
         springs = skeleton.springs

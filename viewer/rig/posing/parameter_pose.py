@@ -33,7 +33,7 @@ def parameter_pose(
     Raises
     ------
     RigError
-        If the figure has no model parameters, or a number of values is wrong.
+        If the figure has no model parameters, or the number of values is wrong.
     """
     if figure.parameters is None:
         raise RigError(f"figure {figure.name} has no model parameters")

@@ -31,6 +31,7 @@ from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
+from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
 from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["retarget", "scaled_motion"]
@@ -82,7 +83,10 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 
 
 def retarget(
-    motion: SkeletonMotion, figure: Figure, mapping: Mapping[str, str] | None = None
+    motion: SkeletonMotion,
+    figure: Figure,
+    mapping: Mapping[str, str] | None = None,
+    source_rest: SourceRest = "zero",
 ) -> tuple[SampledClip, list[Diagnostic]]:
     """Return a motion made for another skeleton as a clip of a figure.
 
@@ -100,6 +104,9 @@ def retarget(
         Figure with a skeleton; its unmatched joints stay in their rest pose.
     mapping : mapping of str to str, optional
         Maps the motion's joint names to the figure's.
+    source_rest : int, "zero" or "auto"
+        The motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with "auto", a motion of
+        the figure's own skeleton keeps its own rest pose.
 
     Returns
     -------
@@ -107,22 +114,23 @@ def retarget(
         Clip for this figure. A skinned figure moves as a whole (``figure_translations``), a
         skeleton without a skin moves at its root.
     notes : list of Diagnostic
-        Messages about matched and unmatched joints, and the scale of the path.
+        Messages about matched and unmatched joints, the rest pose, and the scale of the path.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a missing joint.
+        If too few joints match, the mapping names a missing joint, or a frame is missing.
     """
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
         raise RigError(Diagnostic("F004.no-skeleton", values={"figure": named}))
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
-    to_target = _up_rotation(motion.figure.up, figure.up)
-    rests = rest_of(source, to_target, figure.up), rest_of(target, np.eye(3), figure.up)
-    is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
-    job = _Job(motion.clip, source, target, rests, matches, to_target, is_same)
+    job = _job(motion, source, (target, figure.up), matches)
+    rested: list[Diagnostic] = []
+    if not (job.is_same and source_rest == "auto"):
+        motion, rested = with_source_rest(motion, source_rest)
+        job = _job(motion, motion.figure.skeleton or source, (target, figure.up), matches)
     worlds = _source_rotations(job)
     rotations = _target_rotations(job, worlds)
     scale, by = _scale(job)
@@ -141,7 +149,7 @@ def retarget(
         shape_weights=weights,
     )
     scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
-    return clip, [*matches.notes, scaled, *notes, *missing]
+    return clip, [*matches.notes, *rested, scaled, *notes, *missing]
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +163,17 @@ class _Job:
     matches: Matches
     to_target: Floats  # (3, 3), the source's axes to the figure's
     is_same: bool
+
+
+def _job(
+    motion: SkeletonMotion, source: Skeleton, to: tuple[Skeleton, str], matches: Matches
+) -> _Job:
+    """Return the inputs of a retargeting; ``to``: the figure's skeleton and up axis."""
+    target, up = to
+    to_target = _up_rotation(motion.figure.up, up)
+    rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
+    is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
+    return _Job(motion.clip, source, target, rests, matches, to_target, is_same)
 
 
 def _up_rotation(source: str, target: str) -> Floats:

@@ -1,1 +1,1 @@
-"""Joints that swing behind the motion of others, such as hair and skirts."""
+"""Spring joints, which lag behind the motion of others, such as hair and skirts."""

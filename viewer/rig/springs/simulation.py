@@ -86,7 +86,7 @@ class Simulation:
         return self._rests
 
     def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> Tails:
-        """Return points without speed, in the rest pose of the spring joints; as for ``step``."""
+        """Return points at rest, in the rest pose of the spring joints; as for ``step``."""
         springs, world = self._springs, world.copy()
         points = np.zeros((springs.n_joints, 3))
         for level in self._levels:

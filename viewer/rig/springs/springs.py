@@ -54,7 +54,7 @@ class Springs:
     Attributes
     ----------
     joints : (N,) int32
-        Joints that swing, each once.
+        The spring joints, each listed once.
     tails : (N, 3)
         The point that swings, in the rest space of the joint.
     stiffness : (N,)
@@ -107,5 +107,5 @@ class Springs:
 
     @property
     def n_joints(self) -> int:
-        """Number of joints that swing, N."""
+        """Number of spring joints, N."""
         return len(self.joints)

@@ -1,7 +1,8 @@
 """Rotations of spring joints over the time of a motion, computed once and in order.
 
-The simulation starts at rest at the start of the motion and proceeds in equal steps, so that every
-time has one result, whether it is played or chosen. Between two steps, rotations are interpolated.
+The simulation starts at rest at the start of the motion and proceeds in equal steps, so the result
+at a given time does not depend on what was played before. Between two steps, rotations are
+interpolated.
 """
 
 from __future__ import annotations
@@ -110,7 +111,7 @@ class SpringTrack:
         rotations = []
         for number, pose in enumerate(rows):
             if block == 0 and number == 0:
-                # Without speed, the first step only applies stiffness and gravity.
+                # Starting at rest, the first step applies only stiffness and gravity.
                 tails = self._simulation.start(*pose)
                 rotations.append(self._simulation.rests)
                 continue

@@ -1,0 +1,161 @@
+"""Rest pose of a body from its anatomy, for motions without a frame in a T- or A-pose.
+
+The trunk stands upright in its mean posture, the legs hang straight down with the knees' axes
+sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
+level. All other joints keep their mean rotation. A bend of the spine or a twist of the
+forearms that never changes cannot be seen: it counts as part of the rest pose.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.retargeting.limb_axes import LimbAxes, limb_axes
+from viewer.rig.retargeting.postures import SIDES, Postures, unit
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["anatomical_rest", "upright_frames"]
+
+_TRUNK = ("pelvis", "spine", "neck", "head", "collar")
+_UPRIGHT = np.cos(np.radians(30.0))
+_STOOPED = np.cos(np.radians(60.0))
+_ENOUGH = 0.05  # fraction of the frames
+_STANCE = 25.0  # percent of the frames in which a foot is lowest, and its sole level
+
+
+def upright_frames(postures: Postures) -> Postures | None:
+    """Return the poses with an upright trunk; None if most poses are not upright."""
+    heights = postures.trunk() @ postures.up
+    if np.median(heights) < _STOOPED:
+        return None
+    chosen = heights > _UPRIGHT
+    return postures.chosen(chosen if chosen.mean() > _ENOUGH else heights > _STOOPED)
+
+
+def anatomical_rest(postures: Postures, skeleton: Skeleton) -> tuple[Floats, list[LimbAxes]]:
+    """Return the rotations of the joints in a standing pose.
+
+    Parameters
+    ----------
+    postures : Postures
+        Upright poses of the motion.
+    skeleton : Skeleton
+        Its skeleton.
+
+    Returns
+    -------
+    rotations : (J, 3, 3)
+        World rotations, in the skeleton's axes.
+    limbs : list of LimbAxes
+        The limbs; those whose axis is not seen have an estimated roll.
+    """
+    parents = skeleton.parents
+    body = _body_axes(postures)
+    stands = _stands(postures.up)
+    fixed = _trunk(postures, skeleton, body, stands)
+    limbs = limb_axes(postures)
+    for limb in limbs:
+        fixed |= _limb(limb, stands, postures.joints)
+    for side in SIDES:
+        fixed |= _foot(postures, side, stands)
+    result = np.empty((len(parents), 3, 3))
+    for joint, parent in enumerate(parents):
+        if joint in fixed:
+            result[joint] = fixed[joint]
+        elif parent < 0:
+            result[joint] = stands @ _mean(body, postures.rotations[:, joint])
+        else:
+            above = postures.rotations[:, parent]
+            result[joint] = result[parent] @ _mean(above, postures.rotations[:, joint])
+    return result, limbs
+
+
+def _stands(up: Floats) -> Floats:
+    """Return axes of the standing body as columns: left, up and forward: (3, 3)."""
+    left = np.array([1.0, 0.0, 0.0])
+    return np.stack([left, up, np.cross(left, up)], axis=1)
+
+
+def _body_axes(postures: Postures) -> Floats:
+    """Return the body's axes in each frame as columns: left, up and forward: (F, 3, 3)."""
+    up = np.broadcast_to(postures.up, (len(postures.rows), 3))
+    return np.stack([postures.left(), up, postures.forward()], axis=2)
+
+
+def _mean(axes: Floats, rotations: Floats) -> Floats:
+    """Return the mean of rotations relative to axes, both (F, 3, 3)."""
+    return nearest_rotations(np.einsum("fba,fbc->ac", axes, rotations) / len(axes))[0]
+
+
+def _trunk(
+    postures: Postures, skeleton: Skeleton, body: Floats, stands: Floats
+) -> dict[int, Floats]:
+    """Return the mean rotations of the trunk's joints, with the neck above the hips."""
+    joints = {j for name, j in postures.joints.items() if name.startswith(_TRUNK)}
+    joints |= {
+        postures.joints[f"{side}_collar"] for side in SIDES if f"{side}_collar" in postures.joints
+    }
+    top = postures.joints["neck" if "neck" in postures.joints else "head"]
+    hips = [postures.joints[f"{side}_hip"] for side in SIDES]
+    above = {joint for end in (top, *hips) for joint in _ancestors(skeleton.parents, end)}
+    joints |= above - set(hips)
+    found = {joint: stands @ _mean(body, postures.rotations[:, joint]) for joint in joints}
+    place = {joint: _place(skeleton, found, joint) for joint in (top, *hips)}
+    height = unit(place[top] - (place[hips[0]] + place[hips[1]]) / 2.0)
+    side = place[hips[0]] - place[hips[1]]
+    tilt = stands @ _axes_along(height, side).T
+    return {joint: tilt @ rotation for joint, rotation in found.items()}
+
+
+def _ancestors(parents: Ints, joint: int) -> list[int]:
+    found = []
+    while parents[joint] >= 0:
+        joint = int(parents[joint])
+        found.append(joint)
+    return found
+
+
+def _place(skeleton: Skeleton, rotations: dict[int, Floats], joint: int) -> Floats:
+    """Return a joint's position relative to the root."""
+    place = np.zeros(3)
+    while skeleton.parents[joint] >= 0:
+        parent = int(skeleton.parents[joint])
+        place = place + rotations[parent] @ skeleton.rest_translations[joint]
+        joint = parent
+    return place
+
+
+def _limb(limb: LimbAxes, stands: Floats, joints: dict[str, int]) -> dict[int, Floats]:
+    """Return the rotations of a limb's two joints, straight and with its axis as in a T-pose."""
+    left, up, forward = stands.T
+    if limb.upper.endswith("hip"):
+        wanted = _axes_along(-up, left)
+    else:
+        side = left if limb.upper.startswith("left") else -left
+        wanted = _axes_along(side, np.cross(side, forward))
+    return {
+        joints[name]: wanted @ _axes_along(bone, bend).T
+        for name, bone, bend in zip((limb.upper, limb.lower), limb.bones, limb.bends, strict=True)
+    }
+
+
+def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
+    """Return the rotation of a foot with a level sole and the toes forward."""
+    ankle, toes = postures.joints[f"{side}_ankle"], postures.joints.get(f"{side}_foot")
+    hips = postures.points[:, postures.joints[f"{side}_hip"]]
+    heights = (postures.points[:, ankle] - hips) @ postures.up
+    low = postures.chosen(heights <= np.percentile(heights, _STANCE))
+    axes = low.rotations[:, ankle]
+    ahead = low.forward() if toes is None else low.points[:, toes] - low.points[:, ankle]
+    front = np.einsum("fba,fb->a", axes, ahead)
+    sole = np.einsum("fba,b->a", axes, low.up)
+    left, up, _ = stands.T
+    return {ankle: _axes_along(up, left) @ _axes_along(sole, np.cross(sole, front)).T}
+
+
+def _axes_along(main: Floats, side: Floats) -> Floats:
+    """Return axes as columns: near ``side``, along ``main``, and across."""
+    second, third = unit(main), unit(np.cross(side, main))
+    return np.stack([np.cross(second, third), second, third], axis=1)

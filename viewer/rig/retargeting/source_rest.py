@@ -1,0 +1,193 @@
+"""The rest pose of a motion whose zero pose is not a standing pose.
+
+Retargeting relates two skeletons by their rest poses. Some programs write skeletons whose zero pose
+is arbitrary, for instance with all bones along +x. The rest pose is then a frame in a T- or A-pose,
+if there is one, or estimated from the anatomy of the body in motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
+from viewer.errors import RigError
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.anatomical_rest import anatomical_rest, upright_frames
+from viewer.rig.retargeting.limb_axes import limb_axes
+from viewer.rig.retargeting.postures import SIDES, Postures, postures_of, rest_posture
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["SourceRest", "rest_fault", "with_source_rest"]
+
+SourceRest = int | str
+"""Number of a frame, ``"zero"`` for the zero pose, or ``"auto"``."""
+
+_FOLDED = np.cos(np.radians(60.0))  # legs this close to the trunk's direction are no legs
+_NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
+_A_POSE = np.radians(55.0)  # steepest arms of an A-pose, below the horizontal
+_T_POSE = np.radians(20.0)  # steepest arms of a T-pose
+_ROLLED = np.cos(np.radians(60.0))  # limbs that are rolled further are no T- or A-pose
+
+
+def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
+    """Return a message if a motion lacks the frame that is its rest pose.
+
+    Parameters
+    ----------
+    motion : SkeletonMotion
+        The motion.
+    choice : int, "zero" or "auto"
+        Frame number as in its file.
+    """
+    timing = motion.clip.timing
+    if isinstance(choice, str) or _row(motion, choice) >= 0:
+        return None
+    last = timing.first_frame + timing.n_frames - 1
+    values = {"first": timing.first_frame, "last": last, "found": choice}
+    return Diagnostic("F004.rest-frame", values=values)
+
+
+def with_source_rest(
+    motion: SkeletonMotion, choice: SourceRest
+) -> tuple[SkeletonMotion, list[Diagnostic]]:
+    """Return a motion whose skeleton has the requested rest pose; the motion is the same.
+
+    Parameters
+    ----------
+    motion : SkeletonMotion
+        Skeleton and clip.
+    choice : int, "zero" or "auto"
+        The frame that is the rest pose; the skeleton's own rest pose; or that one if it is a
+        standing pose or its limbs have no known names, otherwise the best T- or A-pose among the
+        frames, otherwise an estimate from the anatomy.
+
+    Returns
+    -------
+    motion : SkeletonMotion
+        The same clip, with another rest pose of the skeleton.
+    notes : list of Diagnostic
+        The chosen rest pose, unless it is the skeleton's own.
+
+    Raises
+    ------
+    RigError
+        If there is no such frame.
+    """
+    fault = rest_fault(motion, choice)
+    if fault is not None:
+        raise RigError(fault)
+    skeleton, called = motion.figure.skeleton, {"motion": motion.figure.name}
+    if skeleton is None or choice == "zero":
+        return motion, []
+    if not isinstance(choice, str):
+        local = motion.clip.rotations[_row(motion, choice)]
+        note = Diagnostic("F007.rest-asked", values={**called, "frame": choice})
+        return _replaced(motion, skeleton, local), [note]
+    still = rest_posture(skeleton, motion.figure.up)
+    if still is None or _is_body(still):
+        return motion, []
+    postures = postures_of(motion)
+    upright = None if postures is None else upright_frames(postures)
+    if upright is None:
+        return motion, [Diagnostic("F007.rest-unknown", values=called)]
+    return _estimated(motion, skeleton, upright)
+
+
+def _estimated(
+    motion: SkeletonMotion, skeleton: Skeleton, upright: Postures
+) -> tuple[SkeletonMotion, list[Diagnostic]]:
+    """Return a motion with a rest pose from its upright frames."""
+    called = {"motion": motion.figure.name}
+    row, drop = _calibration(upright)
+    if row >= 0:
+        timing = motion.clip.timing
+        frame = timing.first_frame + int(np.flatnonzero(timing.rows == row)[0])
+        pose = Phrase("t-pose" if drop < _T_POSE else "a-pose")
+        note = Diagnostic("F007.rest-frame", values={**called, "frame": frame, "pose": pose})
+        return _replaced(motion, skeleton, motion.clip.rotations[row]), [note]
+    worlds, limbs = anatomical_rest(upright, skeleton)
+    notes = [Diagnostic("F007.rest-anatomy", values=called)]
+    hidden = [skeleton.names[upright.joints[limb.lower]] for limb in limbs if not limb.is_seen]
+    if hidden:
+        notes.append(Diagnostic("F007.rest-straight", values={**called, "names": hidden}))
+    above = worlds[skeleton.parents]
+    above[skeleton.parents < 0] = np.eye(3)
+    local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
+    return _replaced(motion, skeleton, local), notes
+
+
+def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:
+    """Return a motion whose skeleton rests with other local rotations: (J, 4)."""
+    rested = replace(skeleton, rest_rotations=local)
+    return replace(motion, figure=replace(motion.figure, skeleton=rested))
+
+
+def _row(motion: SkeletonMotion, frame: int) -> int:
+    """Return the row of a frame, -1 if it is missing."""
+    timing = motion.clip.timing
+    place = frame - timing.first_frame
+    return int(timing.rows[place]) if 0 <= place < timing.n_frames else -1
+
+
+def _is_body(still: Postures) -> bool:
+    """Return whether a rest pose is that of a body: legs apart from the trunk, limbs unfolded.
+
+    It need not be upright, and may be that of an animal, whose legs are across its trunk.
+    """
+    trunk = still.trunk()[0]
+    side = still.direction("right_hip", "left_hip")[0]
+    for name, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        thigh, shin = _bones(still, name, "hip knee ankle")
+        arm, forearm = _bones(still, name, "shoulder elbow wrist")
+        if trunk @ thigh[0] > _FOLDED or trunk @ shin[0] > _FOLDED or thigh[0] @ shin[0] < 0.0:
+            return False
+        if arm[0] @ forearm[0] < -_FOLDED or sign * (side @ arm[0]) < -_FOLDED:
+            return False
+    return abs(side @ trunk) < _FOLDED
+
+
+def _bones(postures: Postures, side: str, parts: str) -> tuple[Floats, Floats]:
+    """Return the directions of a limb's two bones: (F, 3) each."""
+    start, middle, end = (f"{side}_{part}" for part in parts.split())
+    return postures.direction(start, middle), postures.direction(middle, end)
+
+
+def _calibration(postures: Postures) -> tuple[int, float]:
+    """Return the row closest to a T- or A-pose, -1 if none is, and how far its arms are lowered."""
+    left, up, forward = postures.left(), postures.up, postures.forward()
+    angles = [_angles(postures.trunk(), up)]
+    drops = []
+    for name, sign in zip(SIDES, (1.0, -1.0), strict=True):
+        angles += [_angles(bone, -up) for bone in _bones(postures, name, "hip knee ankle")]
+        arms = _bones(postures, name, "shoulder elbow wrist")
+        outward = np.einsum("fa,fa->f", arms[0], sign * left)
+        drop = np.clip(np.arctan2(-arms[0] @ up, outward), 0.0, _A_POSE)
+        wanted = np.cos(drop)[:, None] * sign * left - np.sin(drop)[:, None] * up
+        angles += [_angles(bone, wanted) for bone in arms]
+        drops.append(drop)
+    largest = np.max(angles, axis=0)
+    largest[_is_rolled(postures, left, forward)] = np.inf
+    best = int(largest.argmin())
+    row = int(postures.rows[best]) if largest[best] < _NEAR else -1
+    return row, float(np.mean(drops, axis=0)[best])
+
+
+def _is_rolled(postures: Postures, left: Floats, forward: Floats) -> Bools:
+    """Return in which frames a limb's bending axis is not that of a T- or A-pose: (F,)."""
+    result = np.zeros(len(postures.rows), dtype=bool)
+    for limb in limb_axes(postures):
+        if limb.is_seen:
+            axes = postures.rotations[:, postures.joints[limb.upper]]
+            is_leg = limb.upper.endswith("hip")
+            wanted = left if is_leg else np.cross(axes @ limb.bones[0], forward)
+            result |= np.einsum("fa,fa->f", axes @ limb.bends[0], wanted) < _ROLLED
+    return result
+
+
+def _angles(vectors: Floats, others: Floats) -> Floats:
+    """Return the angles between unit vectors: (F,)."""
+    return np.arccos(np.clip((vectors * others).sum(axis=-1), -1.0, 1.0))
