@@ -269,6 +269,13 @@ def test_invalid_combinations_are_refused_in_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_an_author_is_required_before_the_transfer(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(rig, "transfer", lambda *_, **__: pytest.fail("transferred"))
+    target = str(next(folder.glob("*.obj")))
+    assert run(["rig", target, "--from", "fox", "-o", str(tmp_path / "a.vrm")]) == 2
+    assert "add --vrm-author NAME and --vrm-licence" in capsys.readouterr().err
+
+
 def test_the_target_is_never_replaced(folder, capsys):
     target = folder / "scan.obj"
     before = target.read_bytes()

@@ -110,7 +110,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     if not kinds:
         raise UnsupportedFormatError(f'no exporter for "{suffix}"; supported: {_known_suffixes()}')
     if arguments.optimize and suffix not in _OPTIMIZED:
-        raise ViewerError(f"--optimize: expected .glb or .gltf, found {printable(suffix)}")
+        raise ViewerError(f"--optimize: expected .glb, .gltf or .vrm, found {printable(suffix)}")
     vrm_meta(arguments, output)
     check_kind(arguments, output)
     check_numbered(arguments, output)

@@ -29,6 +29,7 @@ from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
+from viewer.export._vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
 from viewer.models import resolve
@@ -175,6 +176,8 @@ def run(arguments: argparse.Namespace) -> int:
         require_stdout(output)
         check_targets(files_of(output), inputs, arguments.force)
     target = _target(arguments, inputs)
+    if output is not None and output.suffix.lower() == ".vrm":
+        checked_meta(meta, target.name)  # before the rig transfer, which takes long
     template = _template(arguments, inputs)
     settings = _settings(arguments, template, output)
     clips = read_clips(arguments, _files(arguments), template.figure)

@@ -232,4 +232,4 @@ def test_only_gltf_is_optimised(tmp_path, capsys):
     export_clips(Actor(two_parts()), tmp_path / "in.glb")
     command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]
     assert run(command) == 2
-    assert "--optimize: expected .glb or .gltf, found .bvh" in capsys.readouterr().err
+    assert "--optimize: expected .glb, .gltf or .vrm, found .bvh" in capsys.readouterr().err

@@ -61,7 +61,7 @@ MESSAGES = {
     "to {length}{extent:+ ({})}",
     "X002.quantized": "quantised with rounding errors of up to {parts:all}",
     "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
-    "({})}, compared at {times} times{causes:+: {}}",
+    "({})}, compared at {times:#time}{causes:+: {}}",
     # Omitted data
     "X005.hidden-parts": "{n:#hidden part|is|are} written, too",
     "X003.parts": "not stored in {format}: {parts:all}",
@@ -207,7 +207,7 @@ PHRASES = {
     "farthest-vertex": "up to {length} (vertex {vertex})",
     "farthest-vertex-in-frame": "up to {length} (vertex {vertex}, frame {frame})",
     "compared-frames": "vertices compared in {n} of {all} frames",
-    "estimated-times": "an estimate from {n} times",
+    "estimated-times": "an estimate from {n:#time}",
     # Causes of vertex errors
     "weights-unnormalized": "weights of {n:#vertex} do not add up to 1: scaled, as glTF requires",
     "weights-negative": "weights of {negative:#vertex} are negative: omitted and the others "
