@@ -115,13 +115,15 @@ def _assembled_in(
 
     ``builders``: captures of the scene that is replaced; their reading ends.
     """
-    for builder in builders:
-        builder.is_cut = True
     captures = [
         (path, capture if capture.in_space is None else capture.in_space(space))
         for path, capture in contents.captures
     ]
-    return assemble(replace(contents, captures=captures), settings)
+    scene = assemble(replace(contents, captures=captures), settings)
+    # Only now: if the switch fails, the old scene is read to its end.
+    for builder in builders:
+        builder.is_cut = True
+    return scene
 
 
 def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
