@@ -180,7 +180,12 @@ def add_animation_argument(group: argparse._ArgumentGroup) -> None:
 
 
 def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
-    """Return the requested settings for reading motions."""
+    """Return the requested settings for reading motions.
+
+    Raises ViewerError if there are both a video and a folder of images.
+    """
+    if arguments.video is not None and arguments.images is not None:
+        raise ViewerError("--video and --images: expected one of them, found both")
     model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
         model=None if model is None else Path(model),

@@ -79,3 +79,9 @@ def test_changes_are_printed_and_written(tmp_path, capsys):
     assert lines[3].startswith("take 0: resampled from 30 to 60 fps, 7 frames to 13")
     with np.load(out) as arrays:
         assert len(arrays["poses"]) == 13 and float(arrays["mocap_framerate"]) == 60.0
+
+
+def test_a_video_beside_a_folder_of_images_is_refused(capsys):
+    command = ["convert", "a.bvh", "-o", "b.bvh", "--video", "a.mp4", "--images", "pictures"]
+    assert run(command) == 2
+    assert "--video and --images: expected one of them" in capsys.readouterr().err
