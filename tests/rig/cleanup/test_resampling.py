@@ -29,6 +29,11 @@ def test_a_uniform_rotation_is_exact_at_any_rate():
     assert_allclose(angles_of(found), 3.0 * times, atol=1e-12)
 
 
+def test_a_rate_that_gives_millions_of_frames_is_refused():
+    with pytest.raises(RigError, match="at most 1,000,000 frames, found 3,000,001"):
+        resampled(turning(0.1 * np.arange(91)), 1e6)
+
+
 def test_frames_beside_a_gap_are_not_invented():
     clip = turning(np.arange(4.0), rows=[0, 1, -1, 2, 3])
     found = resampled(clip, 60.0)

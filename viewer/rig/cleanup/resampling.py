@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frame_rows import Captured
@@ -15,6 +16,7 @@ from viewer.rig.motion.timing import Timing
 __all__ = ["resampled"]
 
 _ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
+_MOST_FRAMES = 1_000_000  # 9 hours at 30 frames per second
 
 
 def resampled(clip: Captured, rate: float) -> Captured:
@@ -30,9 +32,19 @@ def resampled(clip: Captured, rate: float) -> Captured:
         Any clip.
     rate : float
         Frames per second.
+
+    Raises
+    ------
+    RigError
+        If there would be more than a million frames.
     """
     timing = clip.timing
     count = int(np.floor((timing.n_frames - 1) / timing.frame_rate * rate + _ON_FRAME)) + 1
+    if count > _MOST_FRAMES:
+        raise RigError(
+            f"{clip.name}: expected at most {_MOST_FRAMES:,} frames, found {count:,} at "
+            f"{rate:g} fps: choose a lower rate or trim the motion"
+        )
     times = timing.start + np.arange(count if timing.n_frames else 0) / rate
     present = _present(timing, times)
     rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
