@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -80,11 +81,14 @@ def tiny_disk(tmp_path: Path) -> Iterator[Path]:
         subprocess.run(["umount", str(folder)], check=True)
 
 
+_NUMBERS = itertools.count()
+
+
 @pytest.fixture(autouse=True)
 def own_settings(tmp_path_factory, monkeypatch) -> None:
-    """No test reads or changes the settings of the user who runs it."""
-    folder = tmp_path_factory.getbasetemp() / "settings"
-    for name in ("XDG_CONFIG_HOME", "XDG_STATE_HOME"):
+    """No test reads or changes the settings of the user who runs it, or those of another test."""
+    folder = tmp_path_factory.getbasetemp() / f"settings{next(_NUMBERS)}"
+    for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(folder / name))
 
 

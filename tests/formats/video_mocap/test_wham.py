@@ -95,8 +95,10 @@ def test_arrays_that_do_not_fit(changes: dict[str, Any], key: str) -> None:
 
 def test_keys_are_numbers_of_people() -> None:
     people: dict[Any, Any] = {**wham(), "x": wham()[0]}
-    with pytest.raises(FormatError, match="x: expected a person with a number"):
+    with pytest.raises(FormatError) as caught:
         open_results(Source("a.pkl", joblib_file(people)))
+    assert caught.value.diagnostic.key == "F002.video-person"
+    assert caught.value.diagnostic.values["item"] == "x"
 
 
 def test_nobody_is_refused() -> None:
