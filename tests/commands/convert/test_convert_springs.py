@@ -29,7 +29,7 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     assert run(["convert", str(path), "-o", str(out), "--fps", "60", *options]) == 0
     said = capsys.readouterr().out
     assert ("simulated rotations of 3 spring joints are written" in said) == bakes
-    assert "the humanoid bone map, 1 spring chain" in said
+    assert "the humanoid bone map, 1 spring chain, authors and licence of the VRM" in said
     assert ("viewer convert --bake-springs writes the simulated ones" in said) == (not bakes)
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors

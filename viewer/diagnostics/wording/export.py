@@ -222,6 +222,7 @@ PHRASES = {
     "part-blend-shapes": "{n:#blend shape}",
     "part-expressions": "{n:#expression} (combinations of morph targets, as in VRM)",
     "part-humanoid": "the humanoid bone map",
+    "part-vrm-meta": "authors and licence of the VRM character",
     "part-springs": "{n:#spring chain}",
     "part-baked-shapes": "{n:#blend shape} (baked into the mesh)",
     "part-current-shape": "{n:#blend shape} (the current shape is kept)",

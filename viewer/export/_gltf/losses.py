@@ -205,6 +205,8 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
         lost.append(Phrase("part-humanoid"))
     if skeleton is not None and skeleton.springs is not None and not is_vrm:
         lost.append(Phrase("part-springs", n=skeleton.springs.n_chains))
+    if figure.record is not None and figure.record.vrm is not None and not is_vrm:
+        lost.append(Phrase("part-vrm-meta"))
     if figure.correctives is not None:
         lost.append(Phrase("part-correctives"))
     lost += extra_parts(figure)
