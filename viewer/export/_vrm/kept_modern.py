@@ -9,7 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 from viewer.export._vrm.maps import Maps
-from viewer.formats._vrm.json_parts import part
+from viewer.formats._vrm.json_parts import listed, part
 
 __all__ = ["kept_modern", "kept_toon"]
 
@@ -64,11 +64,6 @@ def _character(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     return result
 
 
-def _list(told: Any, name: str) -> list[Any]:
-    found = part(told, name)
-    return found if isinstance(found, list) else []
-
-
 def _rows(told: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
     """Return the objects of a list with translated indices, except those whose index is lost."""
     rows = told if isinstance(told, list) else []
@@ -93,7 +88,7 @@ def _expression(told: Any, maps: Maps) -> Any:
 def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     """Return the spring bones; chains with a lost joint are left out as a whole."""
     result, places, colliders = dict(told), dict[int, int](), list[Any]()
-    for index, each in enumerate(_list(told, "colliders")):
+    for index, each in enumerate(listed(told, "colliders")):
         node = maps.joint(part(each, "node"), "colliders")
         if node is not None:
             places[index] = len(colliders)
@@ -104,10 +99,10 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
             {
                 **each,
                 "colliders": [
-                    places[i] for i in _list(each, "colliders") if type(i) is int and i in places
+                    places[i] for i in listed(each, "colliders") if type(i) is int and i in places
                 ],
             }
-            for each in _list(told, "colliderGroups")
+            for each in listed(told, "colliderGroups")
             if isinstance(each, dict)
         ]
     else:
@@ -115,7 +110,7 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
         result.pop("colliderGroups", None)
     springs = [
         spring
-        for each in _list(told, "springs")
+        for each in listed(told, "springs")
         if isinstance(each, dict) and (spring := _spring(each, maps, bool(colliders)))
     ]
     return {**result, "springs": springs}

@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Any
 
 from viewer.export._vrm.maps import Maps
-from viewer.formats._vrm.json_parts import part
+from viewer.formats._vrm.json_parts import listed, part
 
 __all__ = ["kept_old"]
 
@@ -31,7 +31,7 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
     """
     told = maps.record.extensions["VRM"]
     result = dict(told)
-    bones = _list(told, "humanoid", "humanBones")
+    bones = listed(told, "humanoid", "humanBones")
     result["humanoid"] = {
         **(told["humanoid"] if isinstance(told.get("humanoid"), dict) else {}),
         "humanBones": _nodes(bones, maps, "bones"),
@@ -43,7 +43,7 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
     result["meta"] = meta
     if isinstance(told.get("firstPerson"), dict):
         result["firstPerson"] = _first_person(told["firstPerson"], maps)
-    groups = _list(told, "blendShapeMaster", "blendShapeGroups")
+    groups = listed(told, "blendShapeMaster", "blendShapeGroups")
     if groups:
         result["blendShapeMaster"] = {
             **told["blendShapeMaster"],
@@ -55,13 +55,8 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
         }
     if isinstance(told.get("secondaryAnimation"), dict):
         result["secondaryAnimation"] = _springs(told["secondaryAnimation"], maps)
-    result["materialProperties"] = _materials(_list(told, "materialProperties"), maps, names)
+    result["materialProperties"] = _materials(listed(told, "materialProperties"), maps, names)
     return {"VRM": result}
-
-
-def _list(told: Any, *names: str) -> list[Any]:
-    found = part(told, *names)
-    return found if isinstance(found, list) else []
 
 
 def _nodes(rows: list[Any], maps: Maps, kind: str) -> list[Any]:
@@ -95,18 +90,17 @@ def _first_person(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
 def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
     """Return the springs; groups of colliders keep their places, because springs index them."""
     groups = []
-    for each in _list(told, "boneGroups"):
+    for each in listed(told, "boneGroups"):
         if not isinstance(each, dict):
             continue
-        listed = _list(each, "bones")
-        bones = [maps.joint(bone, "spring-joints") for bone in listed]
+        bones = [maps.joint(bone, "spring-joints") for bone in listed(each, "bones")]
         group = {**each, "bones": [bone for bone in bones if bone is not None]}
         if part(each, "center") not in (None, -1):
             center = maps.joint(each["center"], "centers")
             group["center"] = -1 if center is None else center
         groups.append(group)
     colliders = []
-    for each in _list(told, "colliderGroups"):
+    for each in listed(told, "colliderGroups"):
         node = maps.joint(part(each, "node"), "colliders")
         # A group without a joint would be invalid: it moves to the first joint, without colliders.
         empty = {"node": maps.first_joint, "colliders": []}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["is_index", "part"]
+__all__ = ["is_index", "listed", "part"]
 
 
 def part(told: Any, *names: str) -> Any:
@@ -24,6 +24,12 @@ def part(told: Any, *names: str) -> Any:
     for name in names:
         value = value.get(name) if isinstance(value, dict) else None
     return value
+
+
+def listed(told: Any, *names: str) -> list[Any]:
+    """Return a nested list; an empty one if it is missing or no list."""
+    found = part(told, *names)
+    return found if isinstance(found, list) else []
 
 
 def is_index(value: Any, count: int) -> bool:

@@ -19,12 +19,11 @@ import numpy as np
 
 from viewer.formats._nodes.content import NodeFile, NodeTree
 from viewer.formats._source import Source
-from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.json_parts import is_index, listed, part
 from viewer.formats._vrm.numbers import rows_of, value_of
 from viewer.formats._vrm.spring_parts import (
     Shape,
     SpringJoint,
-    listed,
     node_matrix,
     node_world,
     obstacles_of,

@@ -8,14 +8,13 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._nodes.content import NodeTree
-from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.json_parts import is_index, listed
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 
 __all__ = [
     "Shape",
     "SpringJoint",
-    "listed",
     "node_matrix",
     "node_world",
     "obstacles_of",
@@ -45,12 +44,6 @@ class Shape:
     offset: Floats
     tail: Floats
     radius: float
-
-
-def listed(told: Any, *names: str) -> list[Any]:
-    """Return a nested list; an empty one if it is missing or no list."""
-    found = part(told, *names)
-    return found if isinstance(found, list) else []
 
 
 def obstacles_of(spring: Any, groups: list[tuple[int, ...]]) -> tuple[int, ...]:

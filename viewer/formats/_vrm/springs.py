@@ -20,13 +20,12 @@ import numpy as np
 
 from viewer.formats._nodes.content import NodeFile, NodeTree
 from viewer.formats._source import Source
-from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.json_parts import is_index, listed, part
 from viewer.formats._vrm.numbers import rows_of, value_of
 from viewer.formats._vrm.old_springs import old_chains, old_shapes
 from viewer.formats._vrm.spring_parts import (
     Shape,
     SpringJoint,
-    listed,
     obstacles_of,
     tail_between,
 )
