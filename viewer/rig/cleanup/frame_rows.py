@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bools
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = ["Captured", "in_frame_order", "runs_of", "with_rows"]
+__all__ = ["Captured", "in_frame_order", "is_shared", "runs_of", "with_rows"]
 
 Captured = SampledClip | PointClip
 """Clips of frames: of joints, or of points."""
@@ -52,15 +52,21 @@ def with_rows(clip: Captured, frames: Indices) -> Captured:
     for field in fields(clip):
         value = getattr(clip, field.name)
         # A single row that applies to all frames stays as it is.
-        if isinstance(value, np.ndarray) and len(value) == count and _is_per_row(clip, field.name):
+        if (
+            isinstance(value, np.ndarray)
+            and len(value) == count
+            and not is_shared(clip, field.name)
+        ):
             arrays[field.name] = value[kept]
     return replace(clip, timing=moved, **arrays)
 
 
-def _is_per_row(clip: SampledClip | PointClip, name: str) -> bool:
-    """Return whether an array has a row for each row of the clip, not one for all of them."""
-    is_shared = name in ("shape_weights", "scales") and len(getattr(clip, name)) == 1
-    return not is_shared
+def is_shared(clip: Captured, name: str) -> bool:
+    """Return whether an array of a clip has a single row, which applies to all frames."""
+    if name not in ("shape_weights", "scales"):
+        return False
+    rows = getattr(clip, name)
+    return rows is not None and len(rows) == 1
 
 
 def in_frame_order(clip: Captured) -> Captured:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import Captured, runs_of
+from viewer.rig.cleanup.frame_rows import Captured, is_shared, runs_of
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 
 __all__ = ["Gaps", "inner_gaps", "interpolate_gaps"]
@@ -80,7 +80,7 @@ def _extended(clip: SampledClip, times: Floats) -> SampledClip:
 
     def longer(name: str) -> Floats | None:
         own = getattr(clip, name)
-        if own is None or (name in ("shape_weights", "scales") and len(own) == 1):
+        if own is None or is_shared(clip, name):
             return None if own is None else np.asarray(own)
         return np.concatenate([own, getattr(found, name)])
 

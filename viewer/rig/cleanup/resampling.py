@@ -9,7 +9,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import Captured
+from viewer.rig.cleanup.frame_rows import Captured, is_shared
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.timing import Timing
 
@@ -59,8 +59,8 @@ def resampled(clip: Captured, rate: float) -> Captured:
         found.translations,
         found.figure_translations,
         found.figure_scales,
-        clip.shape_weights if _is_shared(clip.shape_weights) else found.shape_weights,
-        clip.scales if _is_shared(clip.scales) else found.scales,
+        clip.shape_weights if is_shared(clip, "shape_weights") else found.shape_weights,
+        clip.scales if is_shared(clip, "scales") else found.scales,
     )
 
 
@@ -76,10 +76,6 @@ def _present(timing: Timing, times: Floats) -> Bools:
     after = np.clip(np.ceil(place).astype(int), 0, last)
     both: Bools = timing.present[before] & timing.present[after]
     return both
-
-
-def _is_shared(rows: Floats | None) -> bool:
-    return rows is not None and len(rows) == 1
 
 
 def _points(clip: PointClip, times: Floats) -> Floats:
