@@ -11,7 +11,7 @@ from viewer.diagnostics.codes import SEVERITIES, Code
 from viewer.diagnostics.collector import Collector
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic, Part
-from viewer.diagnostics.phrase import Phrase
+from viewer.diagnostics.phrase import Phrase, frame_range
 from viewer.diagnostics.wording import CODES, MESSAGES
 
 __all__ = [
@@ -24,4 +24,5 @@ __all__ = [
     "Part",
     "Phrase",
     "described",
+    "frame_range",
 ]

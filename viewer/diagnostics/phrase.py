@@ -39,3 +39,14 @@ class Phrase:
         return isinstance(other, Phrase) and (self.key, self.values) == (other.key, other.values)
 
     __hash__ = None  # type: ignore[assignment]
+
+
+def frame_range(first: int, last: int) -> Phrase:
+    """Return the phrase for one frame, or for a range that includes its last frame.
+
+    >>> str(frame_range(3, 3)), str(frame_range(3, 5))
+    ('frame 3', 'frames 3 to 5')
+    """
+    if first == last:
+        return Phrase("one-frame", frame=first)
+    return Phrase("frame-range", first=first, last=last)

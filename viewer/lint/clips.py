@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from viewer.diagnostics import Phrase
+from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices, Track
 from viewer.lint._tracks import frame_numbers, key_times, track_of
@@ -57,7 +57,7 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     if len(gaps) == 0:
         return []
     runs = np.split(gaps, np.flatnonzero(np.diff(gaps) > 1) + 1)
-    numbers = gaps + timing.first_frame
+    first = timing.first_frame
     times = timing.start + gaps / timing.frame_rate + subject.actor.offset
     return [
         subject.found(
@@ -65,21 +65,14 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
             n=len(gaps),
             all=int(there[-1] - there[0]) + 1,
             n_gaps=len(runs),
-            gaps=[_gap(run + timing.first_frame) for run in runs],
+            gaps=[frame_range(int(run[0]) + first, int(run[-1]) + first) for run in runs],
             part="clip",
-            frames=numbers,
+            frames=gaps + first,
             times=times,
             # In the gap itself the person is not visible.
             seek=float(times[0]) - 1.0 / timing.frame_rate,
         )
     ]
-
-
-def _gap(numbers: Indices) -> Phrase:
-    """Return the numbers of consecutive frames as text."""
-    if len(numbers) == 1:
-        return Phrase("one-frame", frame=int(numbers[0]))
-    return Phrase("frame-range", first=int(numbers[0]), last=int(numbers[-1]))
 
 
 def _keys(subject: Subject, clip: Clip) -> list[Finding]:

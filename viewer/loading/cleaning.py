@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
 from viewer.loading.merging import merge_people
 from viewer.rig.captures.points import PointClip
@@ -243,21 +243,17 @@ def _interpolated(
         values = {
             "n": sum(b - a for a, b in gaps.closed),
             "gaps": len(gaps.closed),
-            "longest": _frames(first + timing.first_frame, stop + timing.first_frame),
+            "longest": frame_range(first + timing.first_frame, stop + timing.first_frame - 1),
             "seconds": (stop - first) / timing.frame_rate,
         }
         notes.append(Diagnostic("X006.gaps", values={"figure": actor.name, **values}))
     if gaps.left:
-        spans = [_frames(a + timing.first_frame, b + timing.first_frame) for a, b in gaps.left]
+        spans = [
+            frame_range(a + timing.first_frame, b + timing.first_frame - 1) for a, b in gaps.left
+        ]
         values = {"n": len(gaps.left), "limit": limit, "gaps": spans}
         notes.append(Diagnostic("X006.gaps-left", values={"figure": actor.name, **values}))
     return clip, notes
-
-
-def _frames(first: int, stop: int) -> Phrase:
-    if stop == first + 1:
-        return Phrase("one-frame", frame=first)
-    return Phrase("frame-range", first=first, last=stop - 1)
 
 
 def _filter_phrase(chosen: Smoothing, rate: float) -> Phrase:

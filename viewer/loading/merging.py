@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, frame_range
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.person import person_label
@@ -84,16 +84,13 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
     if len(both):
         is_both = np.zeros(int(both[-1]) + 1, dtype=np.bool_)
         is_both[both] = True
-        spans = [_span(a + timing.first_frame, b + timing.first_frame) for a, b in runs_of(is_both)]
+        spans = [
+            frame_range(a + timing.first_frame, b + timing.first_frame - 1)
+            for a, b in runs_of(is_both)
+        ]
         values = {"frames": spans, "distance": length_text(kept.figure, apart)}
         notes.append(Diagnostic("X006.overlap", values={**names, "n": len(both), **values}))
     return notes
-
-
-def _span(first: int, stop: int) -> Phrase:
-    if stop == first + 1:
-        return Phrase("one-frame", frame=first)
-    return Phrase("frame-range", first=first, last=stop - 1)
 
 
 def _apart(

@@ -11,7 +11,7 @@ from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.commands._writing.baked_springs import add_spring_argument
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
@@ -214,10 +214,7 @@ class _Part:
     @property
     def span(self) -> Phrase:
         first = self.animation.first_frame
-        last = first + len(self.present) - 1
-        if first == last:
-            return Phrase("one-frame", frame=first)
-        return Phrase("frame-range", first=first, last=last)
+        return frame_range(first, first + len(self.present) - 1)
 
 
 def _write(
