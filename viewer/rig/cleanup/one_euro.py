@@ -14,7 +14,10 @@ __all__ = ["OneEuro"]
 
 @dataclass(frozen=True, slots=True)
 class OneEuro:
-    """One Euro filter, applied forwards and then backwards, so that nothing is delayed.
+    """One Euro filter, applied forwards and then backwards, so that the delays cancel.
+
+    They remain within about 1 / (2 pi f) seconds of both ends: a pass starts at its first value, so
+    values that are changing there are pulled inwards.
 
     Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
     is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
