@@ -34,6 +34,7 @@ PARTS = {
         *("rendering", "rig", "interrupts", "resources"),
     },
     "lint": {"loading", "formats", "rig"},
+    "batching": {"formats", "media", "interrupts", "streams"},
     "manual": {"resources"},
     "models": {"formats", "interrupts"},
     "interrupts": set(),

@@ -1,0 +1,77 @@
+"""Items of a batch and their results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+__all__ = ["Item", "Result", "Status"]
+
+Status = Literal["done", "failed", "timeout", "crashed", "memory", "cancelled", "unchanged"]
+
+
+@dataclass(frozen=True)
+class Item:
+    """One call of a job.
+
+    Attributes
+    ----------
+    index : int
+        Position in the sorted list of all items of the batch, before shards are taken.
+    files : tuple of str
+        Input files or folders, as the job's command would be given them. A member of a zip archive
+        is written as ``archive.zip/member``.
+    output : str
+        File or folder that the job writes; empty for jobs that only print.
+    name : str
+        Path relative to the folder that all inputs share: what tables and reports show.
+    """
+
+    index: int
+    files: tuple[str, ...]
+    output: str
+    name: str
+
+
+@dataclass(frozen=True)
+class Result:
+    """The result of one item, a line of ``report.jsonl``.
+
+    Attributes
+    ----------
+    status : str
+        ``done``, or why there is no result: ``failed`` (the job's message says why), ``timeout``,
+        ``crashed`` (the worker process died), ``memory``, ``cancelled``; ``unchanged`` if an
+        earlier run has done it.
+    exit_code : int
+        That of the job's command: 0 success, 1 findings or differences, 2 bad input ...
+    seconds : float
+        Wall time of the last attempt.
+    attempts : int
+        1, or more if the item was retried.
+    message : str
+        The error in one line; empty if there is none.
+    diagnostics : list of dict
+        Warnings and losses, as ``lint --json`` writes them.
+    outputs : tuple of str
+        Files and folders written.
+    text : str
+        The text that the job's command printed.
+    values : dict
+        Data of the job for tables: distances of ``diff``, findings of ``lint``.
+    key : str
+        Hash of the inputs, the options and the program's version, by which ``--resume``
+        recognises finished items.
+    """
+
+    item: Item
+    status: Status
+    exit_code: int = 0
+    seconds: float = 0.0
+    attempts: int = 1
+    message: str = ""
+    diagnostics: list[dict[str, Any]] = field(default_factory=list)
+    outputs: tuple[str, ...] = ()
+    text: str = ""
+    values: dict[str, Any] = field(default_factory=dict)
+    key: str = ""
