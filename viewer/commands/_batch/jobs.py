@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from viewer.batching.attempts import attempt
 from viewer.batching.items import Item, Result
 from viewer.commands._batch.options import add_batch_arguments
 from viewer.commands._usage import Parser
+from viewer.formats._kept import keeping_figures
+from viewer.loading import bundled_body, bundled_files
 from viewer.phrases import printable
 
 __all__ = ["JOBS", "CommandJob", "JobKind", "add_job_arguments", "job_parser"]
@@ -99,16 +102,23 @@ class CommandJob:
 
     ``command``: a key of ``JOBS``.
     ``arguments``: its arguments, without files and output.
-    ``fixed``: files that all items read.
+    ``fixed``: files that are opened with every item.
+    ``shared``: files that all items read, also those that options name.
     """
 
     command: str
     arguments: argparse.Namespace
     fixed: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
+
+    @cached_property
+    def _shared(self) -> list[Path]:
+        return [*map(Path, self.shared), bundled_body(), *bundled_files()]
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
-        result = attempt(item, self._run)
+        with keeping_figures(self._shared):
+            result = attempt(item, self._run)
         if result.status == "failed" and not result.message:
             # Commands that report on several files print what is wrong with one of them.
             lines: Sequence[str] = result.text.strip().splitlines() or [""]

@@ -65,7 +65,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
         memory=memory,
         report=arguments.report or "",
     )
-    return request, CommandJob(name, command, tuple(fixed))
+    return request, CommandJob(name, command, tuple(fixed), tuple(request.shared))
 
 
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
