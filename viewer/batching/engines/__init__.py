@@ -93,6 +93,7 @@ class EngineKind:
 
 ENGINES = {
     "sequential": EngineKind("in this process", is_isolated=False),
+    "dask_cluster": EngineKind("on a cluster", ("dask", "distributed")),
 }
 
 
