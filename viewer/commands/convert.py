@@ -35,6 +35,7 @@ from viewer.commands._writing.motion_export import (
 )
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
 from viewer.export._motion_paths import motion_paths
@@ -91,6 +92,8 @@ def run(arguments: argparse.Namespace) -> int:
     if writes_keys(arguments, output, scene):
         write = _write_clips
     notes = [*write(arguments, scene, output, skinning), *baked]
+    for note in notes:
+        note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

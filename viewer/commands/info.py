@@ -20,6 +20,7 @@ from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
+from viewer.diagnostics.record import note_values
 from viewer.phrases import counted, listed, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.material import Material
@@ -53,6 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     found = describe(scene, skinning)
+    note_values(found)
     if arguments.json:
         print(json.dumps(found, indent=1, allow_nan=False))
     else:
