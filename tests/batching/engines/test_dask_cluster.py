@@ -9,10 +9,10 @@ from dataclasses import replace
 
 import pytest
 
-import viewer
 from tests.batching.engines.cluster_jobs import Job, Missing, items
 from viewer.batching.engines import Limits
 from viewer.errors import ViewerError
+from viewer.version import VERSION
 
 pytest.importorskip("distributed")
 from viewer.batching.engines import dask_cluster
@@ -106,12 +106,11 @@ def test_workers_without_the_package_or_of_another_version(address, monkeypatch)
             list(dask_cluster.run(items(5), job, Limits(cluster=address)))
         return str(caught.value)
 
-    mine = viewer.__version__
-    assert f"a worker has no viewer {mine} (No module named 'viewer.batching')" in refusal(
+    assert f"a worker has no viewer {VERSION} (No module named 'viewer.batching')" in refusal(
         Missing()
     )
-    monkeypatch.setattr(viewer, "__version__", "99.1")
-    assert f"has viewer {mine}, expected 99.1: install the same version" in refusal(Job())
+    monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
+    assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
 
 
 def test_address_without_a_scheduler(monkeypatch) -> None:

@@ -94,3 +94,17 @@ class EngineKind:
 ENGINES = {
     "sequential": EngineKind("in this process", is_isolated=False),
     "processes": EngineKind("in worker processes", ("pebble",)),
+    "dask_cluster": EngineKind("on a cluster", ("dask", "distributed")),
+}
+
+
+def load_engine(name: str) -> Engine:
+    """Return an engine.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``ENGINES``.
+    """
+    engine: Engine = import_module(f"viewer.batching.engines.{name}")
+    return engine

@@ -12,10 +12,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
-import viewer
 from viewer.batching.engines import Job
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import name_worker
+from viewer.version import VERSION
 
 __all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
 
@@ -72,8 +72,8 @@ def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVer
     from distributed import get_worker
 
     worker = get_worker()
-    if version != viewer.__version__:
-        return OtherVersion(worker.address, viewer.__version__)
+    if version != VERSION:
+        return OtherVersion(worker.address, VERSION)
     asked = Call(*call)
     with _lock:
         item: Item = pickle.loads(asked.item)

@@ -15,13 +15,13 @@ from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
-import viewer
 from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.engines._remote import ENDED, Call, OtherVersion, run_item
 from viewer.batching.items import Item, Result
 from viewer.errors import ViewerError
 from viewer.phrases import printable
+from viewer.version import VERSION
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
@@ -125,7 +125,7 @@ class _Flight:
         call = Call(self._job, pickle.dumps(attempt.item), self.limits.timeout, self.limits.memory)
         future = self.client.submit(
             run_item,
-            viewer.__version__,
+            VERSION,
             key,
             astuple(call),
             key=key,
@@ -161,7 +161,10 @@ class _Flight:
 
     def _results(self, done: list[Future]) -> list[tuple[Future, Result | None]]:
         """Return the results of attempts that ended; None if the item itself was not at fault."""
-        finished = [future for future in done if future.status == "finished"]
+        finished: list[Future] = []
+        ended: list[Future] = []
+        for future in done:
+            (finished if future.status == "finished" else ended).append(future)
         try:
             answers = self.client.gather(finished)
         except (OSError, CancelledError):
@@ -169,7 +172,6 @@ class _Flight:
         for answer in answers:
             if isinstance(answer, OtherVersion):
                 raise _other_version(answer)
-        ended = [future for future in done if future.status != "finished"]
         return [*zip(finished, answers, strict=True), *((one, self._failure(one)) for one in ended)]
 
     def _failure(self, future: Future) -> Result | None:
@@ -179,12 +181,14 @@ class _Flight:
         item = self.flying[future].item
         if future.status == "cancelled":
             raise _lost()
+        if future.status != "error":
+            return None  # the result was on a worker that died meanwhile
         problem = future.exception()
         if isinstance(problem, KilledWorker):
             return self._killed(item, future, problem)
         if isinstance(problem, ModuleNotFoundError) and (problem.name or "").startswith("viewer"):
             raise ViewerError(
-                f"--cluster: a worker has no viewer {viewer.__version__} ({printable(problem)}): "
+                f"--cluster: a worker has no viewer {VERSION} ({printable(problem)}): "
                 "install the same version for the Python of all workers"
             )
         reason = printable(f"{type(problem).__name__}: {problem}", 2000)
@@ -223,5 +227,5 @@ def _lost() -> ViewerError:
 def _other_version(answer: OtherVersion) -> ViewerError:
     return ViewerError(
         f"--cluster: the worker {answer.worker} has viewer {printable(answer.version, 40)}, "
-        f"expected {viewer.__version__}: install the same version on all workers"
+        f"expected {VERSION}: install the same version on all workers"
     )
