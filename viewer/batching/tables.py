@@ -12,7 +12,16 @@ from typing import Any
 from viewer.batching.items import Result
 from viewer.media.saving import save_bytes
 
-__all__ = ["MEASURES", "ordered", "save_table", "table_rows", "worst_measure"]
+__all__ = [
+    "MEASURES",
+    "comparisons",
+    "mismatches_of",
+    "ordered",
+    "row_message",
+    "save_table",
+    "table_rows",
+    "worst_measure",
+]
 
 Cell = str | int | float | None
 
@@ -70,7 +79,7 @@ def table_rows(job: str, results: Iterable[Result]) -> list[list[Cell]]:
             result.status,
             result.exit_code,
             *cells_of(result),
-            _message(result),
+            row_message(result),
             round(result.seconds, 3),
         ]
         for result in ordered(results)
@@ -91,7 +100,8 @@ def _safe(cell: Cell) -> Cell:
     return cell
 
 
-def _message(result: Result) -> str:
+def row_message(result: Result) -> str:
+    """Return why an item failed, in one line; empty if it did not."""
     errors = [one.get("error") or "" for one in comparisons(result)]
     return "; ".join(filter(None, errors)) or result.message
 
