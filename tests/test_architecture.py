@@ -93,6 +93,7 @@ HOMES = {
     "av": {"media/video.py", "media/video_frames.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 

@@ -36,6 +36,10 @@ _EXTRAS = {
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
     "scipy": "viewer rig, comparing different meshes",
+    "pebble": "worker processes of viewer batch",
+    "dask": "viewer batch on clusters",
+    "distributed": "viewer batch on clusters",
+    "dask-jobqueue": "viewer batch on SLURM clusters",
 }
 _WINDOW_SECONDS = 20
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
