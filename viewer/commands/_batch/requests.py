@@ -40,10 +40,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         raise ViewerError(
             f"expected -o OUT, a folder or a template, found none ({name} writes files)"
         )
-    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
-    for file in fixed:
-        if not os.path.exists(file):
-            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
+    fixed = _fixed(arguments)
     command = _command_arguments(arguments)
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a run that was killed.
@@ -80,6 +77,15 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if name == "diff":
         job = submission_job(job, command.reference, arguments.expect)
     return request, job
+
+
+def _fixed(arguments: argparse.Namespace) -> list[str]:
+    """Return the files that are opened with every item; raise if one is missing."""
+    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
+    for file in fixed:
+        if not os.path.exists(file):
+            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
+    return fixed
 
 
 def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
