@@ -108,7 +108,8 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         If dask-jobqueue is missing, or ``cpus`` is not a positive integer.
     """
     try:
-        from dask_jobqueue import SLURMCluster
+        with _handlers_kept():  # importing it replaces the one of Ctrl-C
+            from dask_jobqueue import SLURMCluster
     except ImportError:
         raise ViewerError(
             "--cluster slurm needs dask-jobqueue: pip install skinning-viewer[batch]"
@@ -139,6 +140,19 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         silence_logs=logging.CRITICAL,
         **known,
     )
+
+
+@contextmanager
+def _handlers_kept() -> Iterator[None]:
+    """Restore the signal handlers that the block replaces."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            if signal.getsignal(number) is not handler:
+                signal.signal(number, handler)
 
 
 @contextmanager
