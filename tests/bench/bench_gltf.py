@@ -162,7 +162,7 @@ def main(rounds: int = 9) -> None:
 
 
 def compare(path: Path, title: str, rounds: int) -> None:
-    """Print how long a file takes to be read, posed and drawn, relative to its bytes and JSON."""
+    """Print the time to read, pose and draw a file, relative to its bytes and JSON."""
     base, opened = "bytes and json.loads", load(path)
     options = DisplayOptions(quality="draft")
 

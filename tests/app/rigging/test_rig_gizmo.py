@@ -101,7 +101,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
 def test_ring_turns_the_template_about_its_middle(hand):
     hand.click("rig tool rotate")
     before, (center, place) = similarity(hand), middle(hand)
-    # The ring about z, which points at the eye, by a quarter turn.
+    # The ring about z, which points at the eye, by 90 degrees.
     radius = next(
         r for r in range(30, 200, 2) if hovers(hand, place + r * np.array([1, -1]) / 2**0.5)
     )
@@ -285,7 +285,7 @@ def faces_eye(hand, mesh, matrix, triangle):
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     if normals[triangle] @ direction > -0.3:
         return False
-    # The middles of other triangles as near to the line stand for all of their points.
+    # Each triangle near the line is represented by its centre.
     ways = corners.mean(axis=1) - origin
     depths = ways @ direction
     beside = np.linalg.norm(ways - depths[:, None] * direction, axis=1)

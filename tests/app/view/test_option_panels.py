@@ -1,4 +1,4 @@
-"""The Display, Camera, Lights and Stats panels: every widget changes what it names."""
+"""The Display, Camera, Lights and Stats panels: every widget changes the option that it names."""
 
 from __future__ import annotations
 
