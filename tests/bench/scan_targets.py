@@ -1,6 +1,6 @@
 """Meshes as scanners and modellers leave them, made from the bundled figures: no rig, true weights.
 
-People unlike the bundled body, made with its shape directions, in A- and T-pose, with noise, another
+People unlike the bundled body, made with its blend shapes, in A- and T-pose, with noise, another
 tessellation, holes, clothes and hair as open shells, a missing foot, or in centimetres with z up;
 and an animal with other proportions than the fox. Run as a program, it writes them as .obj, and
 a walk for each template as .bvh:

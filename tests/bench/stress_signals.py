@@ -2,7 +2,7 @@
 
     python tests/bench/stress_signals.py [--tries N] [--seed S] [WORK:SIGNAL ...]
 
-Each try runs a command that would replace an old output file, and sends it a signal at a random time
+Each try runs a command that would replace an old output file, and signals it at a random time
 between the start of the viewer and slightly after its usual end. Allowed are exit code 0 with a new
 file, and 130 (Ctrl-C) or 143 (SIGTERM) with the old file and one line of text. All other outcomes
 are printed with the program's output, and the exit code is then 1. PYTHONPATH selects another copy

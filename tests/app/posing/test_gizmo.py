@@ -42,7 +42,7 @@ def world_of(hand, joint):
     return posed_joint(hand.state.actor, joint).world[joint]
 
 
-def test_view_ring_turns_the_joint_by_the_angle_on_screen(arm):
+def test_view_ring_rotates_the_joint_by_the_angle_on_screen(arm):
     center, before = joint_seen(arm, 0), world_of(arm, 0)[:3, :3]
     to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
     drag_along(arm, around(center, VIEW_RADIUS, 0.3, 1.1))

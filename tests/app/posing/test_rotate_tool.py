@@ -102,7 +102,7 @@ def test_face_on_ring_rotates_by_the_pointer_angle(angle, parallel) -> None:
     assert not actor.pose.dofs.any()  # the initial pose is not modified
 
 
-def test_rotation_accumulates_beyond_full_turns() -> None:
+def test_rotation_accumulates_beyond_360_degrees() -> None:
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
     for turn in np.linspace(0, 4.5 * np.pi, 40):

@@ -98,7 +98,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert alignment.how == "given" and alignment.error > 0.01
 
 
-def test_ring_turns_the_template_about_its_middle(hand):
+def test_ring_rotates_the_template_about_its_middle(hand):
     hand.click("rig tool rotate")
     before, (center, place) = similarity(hand), middle(hand)
     # The ring about z, which points at the eye, by 90 degrees.
@@ -116,13 +116,13 @@ def test_ring_turns_the_template_about_its_middle(hand):
 
 
 @pytest.mark.parametrize("kind", ["factors", "own_factors"])
-def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
+def test_ring_rotates_a_stretched_template_about_its_middle(hand, kind):
     laid = aligned_template(hand.state)
     stretch = np.array([1.3, 1.0, 1.0]) / 1.3 ** (1 / 3)
     straight = replace(similarity(hand), rotation=np.eye(3), **{kind: stretch})
     move_by_hand(hand.state, laid, straight)
     hand.step(2)
-    test_ring_turns_the_template_about_its_middle(hand)
+    test_ring_rotates_the_template_about_its_middle(hand)
     assert_allclose(similarity(hand).own_factors, stretch, atol=0.01)
     assert (similarity(hand).factors == 1.0).all()
 
