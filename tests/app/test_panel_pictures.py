@@ -12,6 +12,7 @@ import pytest
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
+from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
 from viewer.app.layout import Layout
 from viewer.app.linting.actions import check_rig
@@ -50,8 +51,10 @@ def _message(hand):
 
 
 def _dialog(hand):
-    hand.key("o", "ctrl")
-    hand.state.of(Files).dialog.folder = Path("/figures")
+    dialog = FileDialog(hand.state.paths[0].parent)
+    # Before the field of the path has the focus, which keeps its text.
+    dialog.folder = Path("/figures")
+    hand.state.of(Files).dialog = dialog
 
 
 def _lint(hand):
