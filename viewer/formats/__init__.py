@@ -7,30 +7,30 @@ import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._file_bytes import unreadable
-from viewer.formats._mesh.texture import read_picture
-from viewer.formats._references import referenced_path
 from viewer.formats._source import MAX_SIZE, Source
-from viewer.media.file_names import file_stem, folder_name, opened_text
-from viewer.media.image import is_picture, save_image
-from viewer.media.saving import (
-    all_or_none,
-    free_path,
-    keeping_written,
-    save_arrays,
-    save_bytes,
-    save_text,
-)
-from viewer.media.targets import check_folder_target, check_targets
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from viewer.formats._archive.values import Archive
+    from viewer.formats._mesh.texture import read_picture
+    from viewer.formats._references import referenced_path
     from viewer.formats.rig import NamedFiles
+    from viewer.media.file_names import file_stem, folder_name, opened_text
+    from viewer.media.image import is_picture, save_image
+    from viewer.media.saving import (
+        all_or_none,
+        free_path,
+        keeping_written,
+        save_arrays,
+        save_bytes,
+        save_text,
+    )
+    from viewer.media.targets import check_folder_target, check_targets
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
     from viewer.rig.figure_group import FigureGroup
@@ -80,6 +80,25 @@ __all__ = [
     "save_text",
     "write",
 ]
+
+_HOMES = {
+    "all_or_none": "viewer.media.saving",
+    "check_folder_target": "viewer.media.targets",
+    "check_targets": "viewer.media.targets",
+    "file_stem": "viewer.media.file_names",
+    "folder_name": "viewer.media.file_names",
+    "free_path": "viewer.media.saving",
+    "is_picture": "viewer.media.image",
+    "keeping_written": "viewer.media.saving",
+    "opened_text": "viewer.media.file_names",
+    "read_picture": "viewer.formats._mesh.texture",
+    "referenced_path": "viewer.formats._references",
+    "save_arrays": "viewer.media.saving",
+    "save_bytes": "viewer.media.saving",
+    "save_image": "viewer.media.image",
+    "save_text": "viewer.media.saving",
+}
+"""Modules of names that are imported on first use, as few commands need them to start."""
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
@@ -216,6 +235,12 @@ FORMATS = {
     ),
 }
 """Modules in this folder; each has ``read(source)``, ``write(content, path)``, or both."""
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
 
 
 def detect(source: Source) -> str:
