@@ -23,7 +23,7 @@ from viewer.app.weights.actions import pin_vertex
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
-MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
+MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after a blur that removes letters and hinting
 
 
 def _nothing(hand):

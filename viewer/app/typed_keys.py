@@ -6,8 +6,8 @@ Characters arrive as separate events, so a text field needs no key events for le
 Keys with an effect, such as Enter, Backspace and Ctrl+A, and the mouse stay in the queue, so that a
 press and release within one frame still works.
 
-ImGui sees the modifiers at the end of a frame's events. A shortcut would be lost if its modifier is
-released in the frame in which its key was pressed, as happens on a slow machine.
+ImGui sees modifiers at the end of a frame's events. If the modifier of a shortcut is released in
+the frame in which its key was pressed, as happens on a slow machine, the shortcut would be lost.
 """
 
 from __future__ import annotations

@@ -126,7 +126,7 @@ def _draw_name(state: AppState, dialog: FileDialog) -> bool:
 
 
 def _close_on_escape(state: AppState) -> None:
-    """Close the dialog if Escape left the field drawn last, and there was nothing to restore."""
+    """Close the dialog if Escape was pressed in the last field, which had nothing to restore."""
     is_left = imgui.is_item_deactivated() and not imgui.is_item_deactivated_after_edit()
     if is_left and imgui.is_key_pressed(imgui.Key.escape, False):
         state.of(Files).dialog = None
