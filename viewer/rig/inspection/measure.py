@@ -16,8 +16,8 @@ __all__ = ["DENSITY", "Measures", "measure"]
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 
-# Share of the surface that may be missing, as at the eyes or the mouth of a body, without making the
-# volume meaningless.
+# Part of the surface that may be missing, as at the eyes or the mouth of a body, without making
+# the volume meaningless.
 _HOLE = 0.01
 
 
@@ -75,11 +75,11 @@ def measure(figure: Figure) -> Measures:
 
 def _open_edges(positions: Floats, triangles: Ints) -> Ints:
     """Return the edges that belong to one triangle only, (E, 2) vertices."""
-    corners = triangles
+    corners: Ints = triangles
     for merges in (False, True):
         if merges:
             # Vertices are often doubled along texture seams.
-            same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1)
+            same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
             corners = same[triangles]
         following = np.roll(corners, -1, axis=1)
         low, high = np.minimum(corners, following), np.maximum(corners, following)
