@@ -177,7 +177,7 @@ def _slider_range(shapes: BlendShapes, index: int) -> tuple[float, float, str]:
         low, high = shapes.ranges[index].tolist()
         return low, high, f"{low:.2g} to {high:.2g}"
     if shapes.groups[index] == MORPH_GROUP:
-        return 0.0, 1.0, "1 is the full morph target"
+        return 0.0, 1.0, "the whole morph target applies at 1"
     return -_REACH, _REACH, _SIGMA
 
 
