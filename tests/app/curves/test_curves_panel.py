@@ -1,4 +1,4 @@
-"""The Curves panel: keys, tangents and modes edited by mouse and keys; what is read-only is."""
+"""The Curves panel: keys, tangents and modes edited by mouse and keyboard; read-only curves."""
 
 from __future__ import annotations
 

@@ -292,7 +292,7 @@ def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
     for fraction in (0.25, 1.0, 1.3):
         _drag(morphed, 0, fraction)
         assert _weights(morphed)[0] == pytest.approx(min(fraction, 1.0), abs=0.02)
-    assert morphed.undo_steps == 2  # beyond the end nothing changes any more
+    assert morphed.undo_steps == 2  # nothing changes beyond the end
     height = _rest(morphed).mesh.positions[0] - morphed.state.actor.figure.mesh.positions[0]
     assert_allclose(height, [0, 1, 0], atol=1e-6)
 
@@ -321,7 +321,7 @@ def test_reset_returns_to_the_weights_of_the_file(morphed):
 
 
 def _with_ranges(hand):
-    """Give the box two phenotypes: 0.5 is their mean, and one reaches further down."""
+    """Give the box two phenotypes: 0.5 is their mean, and one has a lower minimum."""
     figure = hand.state.actor.figure
     ranged = replace(
         figure.blend_shapes,

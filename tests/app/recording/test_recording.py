@@ -86,7 +86,7 @@ def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
             with Image.open(file) as picture:
                 found = np.array(picture.convert("RGB")).astype(int)
             height, width = found.shape[:2]
-            # An odd row or column of the view is left out, which moves edges by a fraction.
+            # An odd row or column of the view is omitted, which shifts edges by a fraction.
             differences[number, other] = np.abs(found - shown[:height, :width, :3]).mean()
     assert (differences.argmin(axis=1) == range(5)).all()
     assert np.diag(differences).max() < 2.0 < differences[0, 1]
