@@ -12,6 +12,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._format import Format
+from viewer.formats._kept import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source
 
 if TYPE_CHECKING:
@@ -315,7 +316,7 @@ def _is_video_folder(source: Source, names: set[str]) -> bool:
 
 def read(source: Source) -> Content:
     """Read a file of any format; see the format modules for the errors that they raise."""
-    return import_module(f"{__name__}.{detect(source)}").read(source)
+    return kept_or_read(source, lambda one: import_module(f"{__name__}.{detect(one)}").read(one))
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
