@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.formats._borrowed import HOMES
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._source import MAX_SIZE, Source
 from viewer.phrases import printable
@@ -80,25 +81,6 @@ __all__ = [
     "save_text",
     "write",
 ]
-
-_HOMES = {
-    "all_or_none": "viewer.media.saving",
-    "check_folder_target": "viewer.media.targets",
-    "check_targets": "viewer.media.targets",
-    "file_stem": "viewer.media.file_names",
-    "folder_name": "viewer.media.file_names",
-    "free_path": "viewer.media.saving",
-    "is_picture": "viewer.media.image",
-    "keeping_written": "viewer.media.saving",
-    "opened_text": "viewer.media.file_names",
-    "read_picture": "viewer.formats._mesh.texture",
-    "referenced_path": "viewer.formats._references",
-    "save_arrays": "viewer.media.saving",
-    "save_bytes": "viewer.media.saving",
-    "save_image": "viewer.media.image",
-    "save_text": "viewer.media.saving",
-}
-"""Modules of names that are imported on first use, as few commands need them to start."""
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
@@ -238,9 +220,9 @@ FORMATS = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(HOMES[name]), name)
 
 
 def detect(source: Source) -> str:
@@ -318,7 +300,9 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    if _is_video_folder(source, names):
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    if folder_tool(source, names) is not None:
         return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
@@ -358,12 +342,6 @@ def _detect_archive(source: Source) -> str:
         raise source.fault("F002.empty-archive", wanted=wanted)
     found = [printable(key, 40) for key in keys]
     raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
-
-
-def _is_video_folder(source: Source, names: set[str]) -> bool:
-    from viewer.formats._video_mocap.tools import folder_tool
-
-    return folder_tool(source, names) is not None
 
 
 def _is_video_mocap(archive: Archive) -> bool:
