@@ -34,9 +34,9 @@ _MANTISSA = np.uint64((1 << 52) - 1)
 
 def integers(values: NDArray[np.integer]) -> Digits:
     """Return the digits of integers below 10^16: (N,)."""
-    zeros = np.zeros(len(values), dtype=np.uint64)
+    count = len(values)
     whole = np.abs(values.astype(np.int64)).view(np.uint64)
-    return Digits(values < 0, whole, zeros, zeros.view(np.intp))
+    return Digits(values < 0, whole, np.zeros(count, np.uint64), np.zeros(count, np.intp))
 
 
 def fixed(values: Floats, decimals: int) -> Digits:

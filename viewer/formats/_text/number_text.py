@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from viewer.formats._text.swar import Indices, Words, eight_letters
 from viewer.rig.arrays import Bools
 
 __all__ = ["Digits", "joined", "row_texts"]
+
+Number = TypeVar("Number", bound=np.generic)
 
 _U = np.uint64
 _EIGHT = _U(10**8)
@@ -48,6 +51,15 @@ class Digits:
     decimals: Indices
     tails: Words | None = None
     odd: dict[int, bytes] = field(default_factory=dict)
+
+    def put(self, other: Digits, places: Indices) -> None:
+        """Replace the digits of the numbers at some places by those of other numbers."""
+        for name in ("minus", "whole", "fraction", "decimals"):
+            getattr(self, name)[places] = getattr(other, name)
+        if other.tails is not None:
+            self.tails = np.zeros(len(self.whole), np.uint64) if self.tails is None else self.tails
+            self.tails[places] = other.tails
+        self.odd.update({int(places[index]): text for index, text in other.odd.items()})
 
 
 def joined(digits: Digits, separators: Sequence[bytes], which: NDArray[np.uint8]) -> bytes:
@@ -84,10 +96,11 @@ def joined(digits: Digits, separators: Sequence[bytes], which: NDArray[np.uint8]
 
 
 def row_texts(
-    rows: NDArray[np.generic],
-    digits_of: Callable[[NDArray[np.generic]], Digits],
+    rows: NDArray[Number],
+    digits_of: Callable[[NDArray[Number]], Digits],
     between: bytes | Sequence[bytes] = b" ",
     end: bytes = b"\n",
+    start: bytes = b"",
 ) -> Iterator[bytes]:
     """Yield the text of a table in parts.
 
@@ -99,8 +112,8 @@ def row_texts(
         Returns the digits of numbers, (n,): ``fixed``, ``shortest``, ``significant``, ``integers``.
     between : bytes, or C - 1 of them
         Separators of the numbers in a row.
-    end : bytes
-        Text after each row.
+    end, start : bytes
+        Text after and before each row.
     """
     width = rows.shape[1]
     separators = [between] if isinstance(between, bytes) else [*between]
@@ -110,7 +123,8 @@ def row_texts(
     for first in range(0, len(rows), step):
         part = rows[first : first + step]
         which = np.tile(columns.astype(np.uint8), len(part))
-        yield joined(digits_of(part.ravel()), [*separators, end], which)
+        text = joined(digits_of(part.ravel()), [*separators, end + start], which)
+        yield start + text[: len(text) - len(start)]
 
 
 def _count_digits(values: Words) -> Indices:
