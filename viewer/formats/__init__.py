@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         keeping_written,
         save_arrays,
         save_bytes,
+        save_parts,
         save_text,
     )
     from viewer.media.targets import check_folder_target, check_targets
@@ -77,6 +78,7 @@ __all__ = [
     "save_arrays",
     "save_bytes",
     "save_image",
+    "save_parts",
     "save_text",
     "write",
 ]
