@@ -90,6 +90,7 @@ HOMES = {
         "rendering/overlay/lettering.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
+    "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
 }

@@ -35,6 +35,7 @@ _EXTRAS = {
     "ufbx": "reading .fbx files",
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
+    "isal": "PNG images in less time",
     "scipy": "viewer rig, comparing different meshes",
 }
 _WINDOW_SECONDS = 20
