@@ -9,7 +9,6 @@ from functools import cached_property
 import moderngl
 import numpy as np
 
-from viewer.rendering.bounds import Bounds
 from viewer.rendering.casters import Casters
 from viewer.rendering.effects import Effects, Shadow
 from viewer.rendering.gpu.program import Programs
@@ -42,7 +41,6 @@ class Lighting:
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
         self._size = 0.0  # size of the largest figure, scene units
@@ -76,7 +74,7 @@ class Lighting:
         options = casters.options
         if options.quality == "draft":
             return
-        of_actors = casters.spheres(self.bounds)
+        of_actors = casters.spheres()
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
