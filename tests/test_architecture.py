@@ -94,6 +94,7 @@ HOMES = {
     "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 
