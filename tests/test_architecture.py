@@ -85,8 +85,10 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",
+        "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
     },
