@@ -5,10 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import shutil
 import stat
-import tempfile
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
@@ -17,6 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
@@ -102,6 +100,8 @@ def save_text(path: str | Path, text: str) -> None:
 
 def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
+    import zipfile
+
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
@@ -158,6 +158,7 @@ def save_parts(path: str | Path, parts: Iterable[bytes]) -> None:
             _write_through(path, parts)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
             _replace(path.resolve(), parts, stat.S_IMODE(mode))
+            note_output(path)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
@@ -198,6 +199,8 @@ class Replacement:
 
     def begin(self) -> Path:
         """Create the temporary file, with the target's suffix, and return its path."""
+        import tempfile
+
         target = self._target
         try:
             handle, name = tempfile.mkstemp(
@@ -224,6 +227,7 @@ class Replacement:
             self.discard()
             raise self.error(problem) from None
         self.temporary = None
+        note_output(self.path)
         return size
 
     def discard(self) -> None:
@@ -297,6 +301,9 @@ def _keep_copy(path: Path, copies: _Copies) -> None:
 
 
 def _copy(target: Path) -> Path:
+    import shutil
+    import tempfile
+
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     os.close(handle)
     try:
@@ -326,6 +333,8 @@ def _write_through(target: Path, parts: Iterable[bytes]) -> None:
 
 
 def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
+    import tempfile
+
     _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     note_unfinished(Path(name))
