@@ -74,6 +74,7 @@ ALLOWED_IN_APP = {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
     },
     "linting": {"core", "shown_panels", "playback", "view", "linting"},
+    "retargeting": {"core", "files", "retargeting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
 }

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.formats._borrowed import HOMES
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._format import Format
 from viewer.formats._kept import kept_or_read
@@ -81,26 +82,6 @@ __all__ = [
     "save_text",
     "write",
 ]
-
-_HOMES = {
-    "all_or_none": "viewer.media.saving",
-    "check_folder_target": "viewer.media.targets",
-    "check_targets": "viewer.media.targets",
-    "file_stem": "viewer.media.file_names",
-    "folder_name": "viewer.media.file_names",
-    "free_path": "viewer.media.saving",
-    "is_picture": "viewer.media.image",
-    "keeping_written": "viewer.media.saving",
-    "opened_text": "viewer.media.file_names",
-    "read_picture": "viewer.formats._mesh.texture",
-    "referenced_path": "viewer.formats._references",
-    "save_arrays": "viewer.media.saving",
-    "save_bytes": "viewer.media.saving",
-    "save_image": "viewer.media.image",
-    "save_parts": "viewer.media.saving",
-    "save_text": "viewer.media.saving",
-}
-"""Modules of names that are imported on first use, as few commands need them to start."""
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
@@ -208,9 +189,9 @@ FORMATS = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(HOMES[name]), name)
 
 
 def detect(source: Source) -> str:
@@ -288,7 +269,9 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    if _is_video_folder(source, names):
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    if folder_tool(source, names) is not None:
         return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
@@ -309,12 +292,6 @@ def _detect_archive(source: Source) -> str:
     from viewer.formats._archive.recognition import archive_format
 
     return archive_format(source, FORMATS)
-
-
-def _is_video_folder(source: Source, names: set[str]) -> bool:
-    from viewer.formats._video_mocap.tools import folder_tool
-
-    return folder_tool(source, names) is not None
 
 
 def read(source: Source) -> Content:
