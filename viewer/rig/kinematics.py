@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.pose import Pose, local_matrices
@@ -21,6 +25,9 @@ __all__ = [
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
 # normals by at most half of it, in radians.
 _RIGID = 1e-5
+_MOST_JOINTS = 4096  # of hierarchies whose passes are kept
+
+Indices = NDArray[np.intp]
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
@@ -50,14 +57,27 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     3.0
     """
     world = local.copy()
-    ancestors = parents.copy()
+    parents = np.asarray(parents, dtype=np.int32)
+    is_kept = len(parents) <= _MOST_JOINTS
+    for above, below in _kept_passes(parents.tobytes()) if is_kept else _passes(parents):
+        world[below] = world[above] @ world[below]
+    return world if root is None else root @ world
+
+
+def _passes(parents: Ints) -> Iterator[tuple[Indices, Indices]]:
+    """Yield the ancestors and joints whose matrices are multiplied in each pass."""
+    ancestors = parents.astype(np.intp)
     below = np.flatnonzero(ancestors >= 0)
     while len(below):
         above = ancestors[below]
-        world[below] = world[above] @ world[below]
+        yield above, below
         ancestors[below] = ancestors[above]
         below = below[ancestors[below] >= 0]
-    return world if root is None else root @ world
+
+
+@lru_cache(64)
+def _kept_passes(parents: bytes) -> tuple[tuple[Indices, Indices], ...]:
+    return tuple(_passes(np.frombuffer(parents, dtype=np.int32)))
 
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
