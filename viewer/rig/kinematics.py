@@ -167,7 +167,5 @@ def is_rigid(palette: Floats) -> Bools:
     squares = gram[..., 0, 0].max(axis=-1, initial=0.0)
     errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
     is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
-    first, second, third = np.moveaxis(linear, -1, 0)
-    volumes = np.einsum("...a,...a->...", np.cross(first, second), third)
     # A reflection also has orthogonal columns, but a negative determinant.
-    return is_uniform & (volumes > 0.0).all(axis=-1)
+    return is_uniform & (np.linalg.det(linear) > 0.0).all(axis=-1)
