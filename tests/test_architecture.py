@@ -91,6 +91,7 @@ HOMES = {
         "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
+        "rendering/overlay/typeface.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
     "isal": {"media/png.py"},
