@@ -12,6 +12,7 @@ import pytest
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
+from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
 from viewer.app.layout import Layout
 from viewer.app.linting.actions import check_rig
@@ -22,7 +23,7 @@ from viewer.app.weights.actions import pin_vertex
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
-MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
+MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after a blur that removes letters and hinting
 
 
 def _nothing(hand):
@@ -50,8 +51,10 @@ def _message(hand):
 
 
 def _dialog(hand):
-    hand.key("o", "ctrl")
-    hand.state.of(Files).dialog.folder = Path("/figures")
+    dialog = FileDialog(hand.state.paths[0].parent)
+    # Before the field of the path has the focus, which keeps its text.
+    dialog.folder = Path("/figures")
+    hand.state.of(Files).dialog = dialog
 
 
 def _lint(hand):

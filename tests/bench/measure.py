@@ -1,4 +1,4 @@
-"""Shared by the benchmarks: interleaved rounds, ratios, processes."""
+"""Measurements for all benchmarks: interleaved rounds, ratios, processes."""
 
 from __future__ import annotations
 

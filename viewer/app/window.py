@@ -36,7 +36,7 @@ from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
 from viewer.app.theme import apply_theme  # noqa: E402
-from viewer.app.typed_keys import TypedKeys  # noqa: E402
+from viewer.app.typed_keys import TypedKeys, end_frame_before  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
@@ -183,6 +183,7 @@ class _Window:
     def _on_key(self, _: Any, key: int, code: int, action: int, modifiers: int) -> None:
         is_typing = imgui.get_io().want_text_input
         if self._typed_keys.passes(key, action, modifiers, is_typing):
+            end_frame_before(self._imgui.input_events_queue, key, action)
             imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
     def _on_change(self, *_: Any) -> None:

@@ -107,10 +107,11 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
     lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
     if "rest" in model:
         rest = model["rest"]
-        lines.append(
-            f"  rest       {rest['height']:.3f} m high, {1000.0 * rest['volume']:.2f} litres, "
-            f"{rest['mass']:.1f} kg at 985 kg/m3"
-        )
+        solid = "open mesh without a volume"
+        if rest["volume"] is not None:
+            litres = 1000.0 * rest["volume"]
+            solid = f"{litres:.2f} litres, {rest['mass']:.1f} kg at 985 kg/m3"
+        lines.append(f"  rest       {rest['height']:.3f} m high, {solid}")
     if any(model.get("shape_weights", [])):
         weights = ", ".join(number_text(weight) for weight in model["shape_weights"])
         lines.append(f"  shape      {weights}")

@@ -14,8 +14,9 @@ from viewer.commands._cleanup import clean_up_of
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, ViewerError
-from viewer.formats import SUFFIXES
+from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning_settings import CleanUp
 from viewer.models import resolve
@@ -26,6 +27,7 @@ from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.retargeting.joint_map import JointMap
 
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
@@ -131,6 +133,13 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         "auto: the zero pose if it is a standing pose, otherwise a frame in a T- or A-pose, "
         "otherwise estimated from the motion (default: auto)",
     )
+    group.add_argument(
+        "--joint-map",
+        metavar="FILE",
+        help="joints of the driven figure and the joints that drive them, one pair per line, as in "
+        "LeftUpLeg = lThigh; others are matched by name (convert --save-joint-map writes such a "
+        "file)",
+    )
 
 
 def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
@@ -195,6 +204,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         space=arguments.space or "",
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
+        joint_map=_joint_map(arguments),
         find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
@@ -210,15 +220,28 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     )
 
 
+def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
+    """Return the requested match of joints; raises FormatError if its file cannot be read."""
+    if arguments.joint_map is None:
+        return None
+    from viewer.formats._joint_map import read_joint_map
+
+    return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
+
+
 def size_limit(arguments: argparse.Namespace) -> int:
     """Return the file size limit in bytes."""
-    return _parse_bytes(arguments.max_size)
+    return parse_bytes(arguments.max_size)
 
 
-def _parse_bytes(text: str) -> int:
+def parse_bytes(text: str, option: str = "--max-size") -> int:
+    """Return the number of bytes that an option gives, such as ``2G``.
+
+    Raises ViewerError if the text is no such number.
+    """
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
-        raise ViewerError(f'--max-size: expected a number with k, M or G, found "{text}"')
+        raise ViewerError(f'{option}: expected a number with k, M or G, found "{text}"')
     return int(found[1]) * _UNITS.get(found[2].lower(), 1)
 
 
@@ -277,7 +300,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     _announce(files)
     settings = motion_settings(arguments)
     try:
-        contents = read_files(files or bundled_files(), _parse_bytes(arguments.max_size), settings)
+        contents = read_files(files or bundled_files(), parse_bytes(arguments.max_size), settings)
         scene, builders = begin(contents, settings)
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
@@ -314,6 +337,7 @@ def _announce(files: Sequence[str | Path]) -> None:
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line per warning to the error stream."""
+    """Print one line per warning to the error stream, unless the run is recorded."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        if not note_found(warning):
+            print(f"warning: {warning}", file=sys.stderr)

@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
 from viewer.export._family_frames import (
     FamilyFrames,
@@ -240,6 +241,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
             if old.exists():
                 old.replace(target)
             raise
+        note_output(target, instead_of=fresh)
     except BaseException as problem:  # also Ctrl-C: no partial output may be left behind
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
@@ -145,6 +146,7 @@ def save_bytes(path: str | Path, data: bytes) -> None:
             _write_through(path, data)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
             _replace(path.resolve(), data, stat.S_IMODE(mode))
+            note_output(path)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
@@ -213,6 +215,7 @@ class Replacement:
             self.discard()
             raise self.error(problem) from None
         self.temporary = None
+        note_output(self.path)
         return size
 
     def discard(self) -> None:
