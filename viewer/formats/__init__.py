@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         keeping_written,
         save_arrays,
         save_bytes,
+        save_parts,
         save_text,
     )
     from viewer.media.targets import check_folder_target, check_targets
@@ -77,6 +78,7 @@ __all__ = [
     "save_arrays",
     "save_bytes",
     "save_image",
+    "save_parts",
     "save_text",
     "write",
 ]
@@ -267,7 +269,9 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    if _is_video_folder(source, names):
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    if folder_tool(source, names) is not None:
         return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
@@ -288,12 +292,6 @@ def _detect_archive(source: Source) -> str:
     from viewer.formats._archive.recognition import archive_format
 
     return archive_format(source, FORMATS)
-
-
-def _is_video_folder(source: Source, names: set[str]) -> bool:
-    from viewer.formats._video_mocap.tools import folder_tool
-
-    return folder_tool(source, names) is not None
 
 
 def read(source: Source) -> Content:

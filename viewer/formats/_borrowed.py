@@ -11,7 +11,7 @@ _BY_MODULE = {
     "viewer.media.image": ("is_picture", "save_image"),
     "viewer.media.saving": (
         *("all_or_none", "free_path", "keeping_written"),
-        *("save_arrays", "save_bytes", "save_text"),
+        *("save_arrays", "save_bytes", "save_parts", "save_text"),
     ),
     "viewer.media.targets": ("check_folder_target", "check_targets"),
 }
