@@ -15,7 +15,7 @@ from pathlib import Path
 import viewer
 from viewer.commands._printing import print_line
 from viewer.errors import RenderError
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 
 __all__ = ["Finding", "add_arguments", "examine", "run"]
 
@@ -82,6 +82,7 @@ def examine() -> Iterator[Finding]:
     yield from _examine_drawing()
     yield from _examine_display()
     yield _examine_state_folder()
+    yield _examine_cache()
 
 
 def _examine_packages() -> Iterator[Finding]:
@@ -199,3 +200,15 @@ def _examine_state_folder() -> Finding:
         return Finding("settings", "ok", str(folder))
     cure = "set XDG_STATE_HOME to a writable folder"
     return Finding("settings", "note", f"{folder} is not writable: settings are not saved", cure)
+
+
+def _examine_cache() -> Finding:
+    """Report where parsed numbers and decoded images are kept, and how many."""
+    from viewer.media.array_cache import LIMIT, VARIABLE, cache_folder, cache_use
+
+    folder = cache_folder()
+    if folder is None:
+        return Finding("cache", "ok", f"switched off by {VARIABLE}")
+    count, size = cache_use()
+    used = f"{counted(count, 'array')}, {size / 1e6:.1f} of at most {LIMIT / 1e6:.0f} MB"
+    return Finding("cache", "ok", f"{folder}: {used} ({VARIABLE}=off for none)")
