@@ -85,15 +85,19 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",
+        "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
+        "rendering/overlay/typeface.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
     "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 
