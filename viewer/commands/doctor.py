@@ -58,7 +58,12 @@ class Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options; it has none."""
+    """Add the command's option."""
+    parser.add_argument(
+        "--bench",
+        action="store_true",
+        help="also measure how fast programs start and frames are drawn here (takes a minute)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -72,7 +77,18 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.flush()  # the next finding may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
+    if arguments.bench and not code:
+        _print_measurements()
     return code
+
+
+def _print_measurements() -> None:
+    """Print how fast this machine is; all times are medians."""
+    from viewer.commands._benchmarks import measured
+
+    for found in measured():
+        print_line(f"{'bench':<8}", str(found))
+        sys.stdout.flush()
 
 
 def examine() -> Iterator[Finding]:

@@ -28,6 +28,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.version import VERSION
+
 __all__ = ["LIMIT", "VARIABLE", "Slot", "cache_folder", "cache_use", "slot_of", "without_cache"]
 
 VARIABLE = "VIEWER_CACHE"
@@ -42,9 +44,7 @@ _LARGEST = 1 << 27  # bytes of an entry
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
 _BINARY = getattr(os, "O_BINARY", 0)
-# The package is not imported here, because it refers to modules that import this one.
-_VERSION = sys.modules[__name__.partition(".")[0]].__version__
-_MAGIC = f"viewer {_VERSION}".encode()[:15].ljust(16, b"\0")
+_MAGIC = f"viewer {VERSION}".encode()[:15].ljust(16, b"\0")
 _is_off = False
 
 
