@@ -20,7 +20,7 @@ OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.
-EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress"}
 PARTS = {
     "rig": set(),
     "autorig": {"rig"},
@@ -46,6 +46,7 @@ LEAVES = {
     "diagnostics": {"phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
+    "progress": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
     name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
@@ -84,15 +85,19 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",
+        "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
+        "rendering/overlay/typeface.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
     "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 

@@ -35,7 +35,7 @@ from viewer.app.preferences.applying import scale_of, start_with  # noqa: E402
 from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
-from viewer.app.theme import apply_theme  # noqa: E402
+from viewer.app.theme import add_system_fonts, apply_theme  # noqa: E402
 from viewer.app.typed_keys import TypedKeys, end_frame_before  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
@@ -58,6 +58,7 @@ __all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
+_FIRST_FRAMES = 3  # frames after which fonts for further scripts are read
 _IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
 _BUSY_SECONDS = 0.05  # the same interval while a file is being read
 
@@ -163,6 +164,7 @@ class _Window:
             raise
         self._dropped: list[Path] = []
         self._is_dirty = True
+        self._n_drawn = 0
         self._title = ""
         self._typed_keys = TypedKeys()
         self._set_callbacks()
@@ -272,6 +274,9 @@ class _Window:
         if min(size) < 1:
             return False
         self._set_title()
+        self._n_drawn += 1
+        if self._n_drawn == _FIRST_FRAMES:
+            add_system_fonts()
         self.state.of(Appearance).screen_scale = self._screen_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()

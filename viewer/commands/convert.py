@@ -15,6 +15,7 @@ from viewer.commands._pose import (
     add_skinning_arguments,
     skinning_of,
 )
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
@@ -36,6 +37,7 @@ from viewer.commands._writing.motion_export import (
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
 from viewer.export._motion_paths import motion_paths
@@ -92,8 +94,10 @@ def run(arguments: argparse.Namespace) -> int:
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    with saving_joint_map(arguments, scene):
+    with saving_joint_map(arguments, scene), shown_progress("converting"):
         notes = [*write(arguments, scene, output, skinning), *baked]
+    for note in notes:
+        note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

@@ -19,7 +19,7 @@ from viewer.app.retargeting.match_actions import (
 )
 from viewer.app.retargeting.state import JointMatch, shown_match
 from viewer.formats import Source
-from viewer.formats._joint_map import read_joint_map
+from viewer.formats._text.joint_map import read_joint_map
 from viewer.rig.retargeting.driven_clip import driven_clip
 
 SIZE = (1000, 900)

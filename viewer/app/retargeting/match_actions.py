@@ -12,7 +12,7 @@ from viewer.app.files.saving import save_files
 from viewer.app.files.state import Files
 from viewer.errors import ViewerError
 from viewer.formats import Source, file_stem
-from viewer.formats._joint_map import read_joint_map, write_joint_map
+from viewer.formats._text.joint_map import read_joint_map, write_joint_map
 from viewer.phrases import printable
 from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
