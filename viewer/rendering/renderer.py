@@ -158,9 +158,8 @@ class Renderer:
         target.framebuffer.use()
         view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
-        casters = Casters(
-            self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
-        )
+        parts = self.programs, self.mesh_pass, self.late, self.buffers
+        casters = Casters(*parts, meshes, scene.actors, options)
         self.lighting.begin(casters, camera.up, box)
         count = n_passes(options)
         for index in range(count) if passes is None else passes:
