@@ -20,7 +20,7 @@ OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.
-EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress"}
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress", "version"}
 PARTS = {
     "rig": set(),
     "autorig": {"rig"},
@@ -47,6 +47,7 @@ LEAVES = {
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
     "progress": set(),
+    "version": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
     name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
@@ -85,8 +86,10 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",
+        "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
         "rendering/overlay/typeface.py",
@@ -95,6 +98,7 @@ HOMES = {
     "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 

@@ -92,6 +92,10 @@ def _progress(state: AppState) -> _Progress | None:
     loader, stream = files.loader, files.stream
     if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
         title = f"Opening {printable(loader.paths[-1].name, 60)}"
+        done, total, unit = loader.progress
+        if total:
+            text = f"{done:,} of {total:,} {unit}"
+            return _Progress(title, done / total, text, "Cancel opening")
         return _Progress(title, -loader.seconds, f"{loader.seconds:.0f} s", "Cancel opening")
     if stream is not None:
         read, total = stream.progress

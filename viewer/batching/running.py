@@ -69,6 +69,11 @@ class KeyedJob:
     shared: tuple[str, ...]
     finished: frozenset[str]
 
+    @property
+    def uses_gpu(self) -> bool:
+        """Whether the job draws."""
+        return bool(getattr(self.job, "uses_gpu", False))
+
     def __call__(self, item: Item) -> Result:
         """Run one item, unless it is finished."""
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import re
 import sys
 from collections.abc import Iterable, Sequence
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import clean_up_of
 from viewer.commands._pose import add_pose_arguments, apply_pose
+from viewer.commands._progress import shown_progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
@@ -20,7 +20,6 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning_settings import CleanUp
 from viewer.models import resolve
-from viewer.phrases import printable
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
 from viewer.streams import summary_stream
@@ -34,7 +33,6 @@ LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # names in a message
-_SLOW_BYTES = 60e6  # bytes; takes about a second to read
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
@@ -297,11 +295,12 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
 
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
-    _announce(files)
     settings = motion_settings(arguments)
     try:
-        contents = read_files(files or bundled_files(), parse_bytes(arguments.max_size), settings)
-        scene, builders = begin(contents, settings)
+        with shown_progress("reading"):
+            limit = parse_bytes(arguments.max_size)
+            contents = read_files(files or bundled_files(), limit, settings)
+            scene, builders = begin(contents, settings)
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
         raise _with_models(problem, named) from None
@@ -323,17 +322,6 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     values = {"folder": folder, "near": near, "names": models[:_MOST_MODELS]}
     key = "F001.no-model-near" if near else "F001.no-model"
     return FormatError(Diagnostic(key, problem.path, values=values))
-
-
-def _announce(files: Sequence[str | Path]) -> None:
-    """In a terminal, print a message about files that take longer than a second to read."""
-    if not sys.stderr.isatty():
-        return
-    for file in files:
-        with contextlib.suppress(OSError, ValueError):  # reported by the reader
-            size = Path(file).stat().st_size
-            if size > _SLOW_BYTES:
-                print(f"reading {printable(file)} ({size / 1e6:.0f} MB) …", file=sys.stderr)
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:

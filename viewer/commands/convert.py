@@ -15,6 +15,7 @@ from viewer.commands._pose import (
     add_skinning_arguments,
     skinning_of,
 )
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
@@ -93,7 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    with saving_joint_map(arguments, scene):
+    with saving_joint_map(arguments, scene), shown_progress("converting"):
         notes = [*write(arguments, scene, output, skinning), *baked]
     for note in notes:
         note_found(note)

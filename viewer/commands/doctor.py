@@ -37,6 +37,10 @@ _EXTRAS = {
     "av": "videos",
     "isal": "PNG images in less time",
     "scipy": "viewer rig, comparing different meshes",
+    "pebble": "worker processes of viewer batch",
+    "dask": "viewer batch on clusters",
+    "distributed": "viewer batch on clusters",
+    "dask-jobqueue": "viewer batch on SLURM clusters",
 }
 _WINDOW_SECONDS = 20
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}

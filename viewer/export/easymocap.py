@@ -41,6 +41,7 @@ from viewer.formats._text.decimals import fixed
 from viewer.formats._text.number_text import row_texts
 from viewer.interrupts import hold, poll
 from viewer.phrases import printable
+from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_label
 from viewer.rig.motion.evaluation import frames_between
@@ -115,6 +116,7 @@ def export_animations(
     with _new_folder(path) as folder:
         for frame in range(first, stop):
             poll()
+            report(frame - first, stop - first, "frames", f"writing {path.name}")
             rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")

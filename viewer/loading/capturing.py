@@ -94,6 +94,7 @@ class Builder:
     swings: bool = False
     joint_map: JointMap | None = None
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
+    _has_parameters: bool = False
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -137,9 +138,10 @@ class Builder:
         notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
+        self._has_parameters |= bool(part.parameters)
         shown = part.parameters if self.model.parameters is not None else {}
         for person, parameters in sorted(shown.items(), key=_order):
-            self._add_clip(person, parameter_clip(parameters, self.model), new)
+            notes += self._add_driven(person, parameter_clip(parameters, self.model), new)
         points = {person: both for person, both in part.points.items() if person not in shown}
         for person, (layout, clip) in sorted(points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
@@ -154,7 +156,11 @@ class Builder:
         return new, [*reversed(fresh.values())]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """At the end, return a message if bodies have the mean shape because none was given."""
+        """At the end, return messages about bodies without a shape, and a model without bodies."""
+        if self.is_done and self.target is not None and not self._bodies:
+            key = "F007.model-of-parameters" if self._has_parameters else "F007.model-of-points"
+            values = {"member": self.capture.model}
+            return [Diagnostic(key, self.path, values=values)]
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
@@ -168,12 +174,17 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)
-        drive: Drive | None = None
-        if self.target is not None:
-            drive = self._drive(clip)
-            clip, more = driven_clip(drive, self.target)
-            notes += more
-        self._add_clip(person, clip, new, drive)
+        notes += self._add_driven(person, clip, new)
+        return [replace(note, path=self.path) for note in notes]
+
+    def _add_driven(self, person: int, clip: SampledClip, new: list[Actor]) -> list[Diagnostic]:
+        """Append a clip of the model, or the motion of the target that it drives."""
+        if self.target is None:
+            self._add_clip(person, clip, new)
+            return []
+        drive = self._drive(clip)
+        found, notes = driven_clip(drive, self.target)
+        self._add_clip(person, found, new, drive)
         return [replace(note, path=self.path) for note in notes]
 
     def _drive(self, clip: SampledClip) -> Drive:
@@ -273,6 +284,7 @@ class Builder:
             actor.drive = drive
             actor.pose = figure_pose(target)
             pose_actor(actor, 0.0)
+        notes += self._shape_notes()
         fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
         self._notes.update(str(note) for note in fresh.values())
         return [*reversed(fresh.values())]

@@ -20,7 +20,7 @@ from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
 from viewer.media.unfinished import note_unfinished
 from viewer.phrases import printable
-from viewer.progress import report
+from viewer.progress import report_bytes
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
@@ -329,7 +329,7 @@ def _write_through(target: Path, parts: Iterable[bytes]) -> None:
     # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
     # forever, so signals must be able to interrupt it.
     with raising(), target.open("wb") as stream:
-        _write_parts(stream, parts)
+        _write_parts(stream, parts, target.name)
 
 
 def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
@@ -340,7 +340,7 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
-            _write_parts(stream, parts)
+            _write_parts(stream, parts, target.name)
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
@@ -352,13 +352,13 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
         raise
 
 
-def _write_parts(stream: BinaryIO, parts: Iterable[bytes]) -> None:
+def _write_parts(stream: BinaryIO, parts: Iterable[bytes], name: str) -> None:
     written = 0
     for part in parts:
         poll()
         stream.write(part)
         written += len(part)
-        report(written, 0)
+        report_bytes(written, 0, f"writing {name}")
 
 
 def _require_folder(target: Path) -> None:

@@ -111,6 +111,11 @@ class CommandJob:
     fixed: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
 
+    @property
+    def uses_gpu(self) -> bool:
+        """Whether clusters hand the job to workers with a graphics card, if there are any."""
+        return self.command == "render"
+
     @cached_property
     def _shared(self) -> list[Path]:
         return [*map(Path, self.shared), bundled_body(), *bundled_files()]

@@ -5,11 +5,12 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from viewer.batching.engines import Limits
+from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.inputs import find_inputs
 from viewer.batching.items import Item
 from viewer.batching.naming import check_outputs, has_fields, items_of, template_of
@@ -131,8 +132,10 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
     if timeout is not None and timeout < 0.0:
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
-    limits = Limits(request.workers or 1, request.retries, timeout, request.memory, request.cluster)
+    n_workers = request.workers or _cores()
+    limits = Limits(n_workers, request.retries, timeout, request.memory, request.cluster)
     if request.cluster:
+        parse_cluster(request.cluster)
         return "dask_cluster", limits, []
     is_limited = request.timeout is not None or request.memory is not None
     workers = request.workers
@@ -146,8 +149,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
         raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
     if workers == 0:
         return "sequential", limits, []
-    limits = Limits(max(1, min(workers, len(items))), request.retries, timeout, request.memory)
-    return "processes", limits, []
+    return "processes", replace(limits, workers=max(1, min(workers, len(items)))), []
 
 
 def _size(items: Sequence[Item]) -> int:

@@ -57,6 +57,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
         shared=tuple(dict.fromkeys([*fixed, *_files_in(command)])),
         few=kind.few,
         workers=arguments.workers,
+        cluster=arguments.cluster,
         shard=arguments.shard,
         resume=arguments.resume,
         force=arguments.force,

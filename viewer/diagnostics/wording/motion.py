@@ -98,7 +98,8 @@ PHRASES = {
     "translation-too-far": "translation: expected at most {most:g}, found {found:g}",
     # Clean-up of captured motions
     "one-euro": "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
-    "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
+    "savgol": "Savitzky-Golay filter, {shortest:+{} to }{n:#frame}, degree {order}{left:+; {}}",
+    "savgol-short": "{n:#run} of too few frames {n:?is|are} unchanged",
     "moved-joints": "joints",
     "moved-points": "points",
     "part-body": "body",

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.formats._text.decimal_words import parse_decimals, parse_exponentials, parse_short
 from viewer.formats._text.swar import Indices, Words, padded
+from viewer.progress import report_bytes
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = [
@@ -43,6 +44,7 @@ _NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
 _SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest positive float64
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporary arrays stay in the processor's cache
+_LONG = 1 << 20  # bytes
 _FEW = 0.25  # fraction of words with more than 8 characters that are evaluated separately
 _HANDFUL = 200  # words with an exponent for which float() is faster
 _MANY = 0.5  # fraction of words with an exponent from which all are evaluated like these
@@ -169,6 +171,9 @@ def _parse(data: bytes, start: int, end: int, whole: bool) -> tuple[Floats, int]
             values.resize(count + len(found) + int(_GROWTH * rest), refcheck=False)
         values[count : count + len(found)] = found
         count += len(found)
+        # Short texts are parts of a longer one, whose progress its reader reports.
+        if end - start > _LONG:
+            report_bytes(last, len(data))
         if bad >= 0:
             break
     else:
