@@ -49,13 +49,20 @@ def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) 
     return statistics.median(a / b for a, b in pairs)
 
 
-def run_process(arguments: Sequence[str]) -> tuple[float, float]:
-    """Run Python with arguments; return its wall time in seconds and its peak memory in MB."""
+def run_process(arguments: Sequence[str], is_quiet: bool = False) -> tuple[float, float]:
+    """Run Python with arguments; return its wall time in seconds and its peak memory in MB.
+
+    ``is_quiet``: whether its warnings are dropped.
+    """
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started = time.perf_counter()
     process = subprocess.Popen(
-        [sys.executable, *arguments], env=environment, cwd=ROOT, stdout=subprocess.DEVNULL
+        [sys.executable, *arguments],
+        env=environment,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL if is_quiet else None,
     )
     _, status, usage = os.wait4(process.pid, 0)
     took = time.perf_counter() - started

@@ -21,6 +21,7 @@ NAMES = [
     "gltf",
     "nodes",
     "captures",
+    "batch",
     "observing",
     "losses",
     "lint",
