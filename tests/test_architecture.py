@@ -20,7 +20,7 @@ OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.
-EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress", "version"}
 PARTS = {
     "rig": set(),
     "autorig": {"rig"},
@@ -47,6 +47,8 @@ LEAVES = {
     "diagnostics": {"phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
+    "progress": set(),
+    "version": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
     name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
@@ -74,6 +76,7 @@ ALLOWED_IN_APP = {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
     },
     "linting": {"core", "shown_panels", "playback", "view", "linting"},
+    "retargeting": {"core", "files", "retargeting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
 }
@@ -90,8 +93,10 @@ HOMES = {
         "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
+        "rendering/overlay/typeface.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
+    "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
     "pebble": {"batching/engines/processes.py"},

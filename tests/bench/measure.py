@@ -1,4 +1,4 @@
-"""Shared by the benchmarks: interleaved rounds, ratios, processes."""
+"""Measurements for all benchmarks: interleaved rounds, ratios, processes."""
 
 from __future__ import annotations
 
@@ -55,6 +55,7 @@ def run_process(arguments: Sequence[str], is_quiet: bool = False) -> tuple[float
     ``is_quiet``: whether its warnings are dropped.
     """
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
+    environment.setdefault("VIEWER_CACHE", str(Path(_CACHE.name) / "arrays"))
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started = time.perf_counter()
     process = subprocess.Popen(

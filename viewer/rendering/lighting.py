@@ -5,23 +5,25 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
-from viewer.rendering.bounds import Bounds
-from viewer.rendering.casters import Casters
 from viewer.rendering.effects import Effects, Shadow
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.passes.contact_pass import Contact, ContactPass
 from viewer.rendering.passes.ground_pass import ground_axes
-from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
-from viewer.rendering.passes.occlusion_pass import OcclusionPass
-from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
 from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import View, key_direction
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+
+if TYPE_CHECKING:
+    from viewer.rendering.casters import Casters
+    from viewer.rendering.passes.contact_pass import Contact, ContactPass
+    from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+    from viewer.rendering.passes.occlusion_pass import OcclusionPass
+    from viewer.rendering.passes.shadow_pass import ShadowPass
 
 __all__ = ["Lighting"]
 
@@ -42,7 +44,6 @@ class Lighting:
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
         self._size = 0.0  # size of the largest figure, scene units
@@ -52,11 +53,15 @@ class Lighting:
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
+        from viewer.rendering.passes.contact_pass import ContactPass
+
         self._made.append(made := ContactPass(self.context, self.programs))
         return made
 
     @cached_property
     def _ground_pass(self) -> GroundShadowPass:
+        from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+
         self._made.append(made := GroundShadowPass(self.context, self.programs))
         return made
 
@@ -76,7 +81,7 @@ class Lighting:
         options = casters.options
         if options.quality == "draft":
             return
-        of_actors = casters.spheres(self.bounds)
+        of_actors = casters.spheres()
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
@@ -128,6 +133,8 @@ class Lighting:
         return replace(view, effects=Effects(shadow, occlusion))
 
     def _shadow_pass(self, size: tuple[int, int]) -> ShadowPass:
+        from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
+
         side = map_side(size)
         if self._shadow is None or self._shadow.side != side:
             if self._shadow is not None:
@@ -137,6 +144,8 @@ class Lighting:
         return self._shadow
 
     def _occlusion_pass(self, size: tuple[int, int]) -> OcclusionPass:
+        from viewer.rendering.passes.occlusion_pass import OcclusionPass
+
         if self._occlusion is None or self._occlusion.size != size:
             if self._occlusion is not None:
                 self._occlusion.release()

@@ -156,7 +156,7 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
 def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Request]:
     """Return a function as a job, and the request with its identity."""
     may_replace = request.force or request.resume
-    check_results("function", request.table, request.overview, may_replace)
+    check_results("function", request.table, request.overview, may_replace, request.output)
     return FunctionJob(job), replace(request, identity=_identity(job))
 
 

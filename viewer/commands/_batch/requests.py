@@ -72,7 +72,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         overview=getattr(arguments, "overview", ""),
     )
     may_replace = arguments.force or arguments.resume
-    check_results(name, request.table, request.overview, may_replace)
+    check_results(name, request.table, request.overview, may_replace, output)
     job: Job = CommandJob(name, command, tuple(fixed), tuple(request.shared))
     if name == "diff":
         job = submission_job(job, command.reference, arguments.expect)

@@ -48,11 +48,12 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
         )
 
 
-def check_results(job: str, table: str, overview: str, may_replace: bool) -> None:
+def check_results(job: str, table: str, overview: str, may_replace: bool, output: str = "") -> None:
     """Check the names of the files, before the batch starts.
 
     ``table``, ``overview``: the files; empty for none.
     ``may_replace``: whether they may exist.
+    ``output``: folder that the batch creates if it is missing.
     Raises ViewerError if a suffix is wrong, or a file exists or has no folder.
     """
     if table and Path(table).suffix.lower() != ".csv":
@@ -68,7 +69,9 @@ def check_results(job: str, table: str, overview: str, may_replace: bool) -> Non
     for path in filter(None, (table, overview)):
         if not may_replace and os.path.lexists(path):
             raise OutputError(f"{printable(path, 300)}: already exists (--force replaces it)")
-        if not Path(path).absolute().parent.is_dir():
+        parent = Path(path).absolute().parent
+        is_made = bool(output) and parent.is_relative_to(Path(output).absolute())
+        if not (parent.is_dir() or is_made):
             folder = printable(Path(path).parent, 300)
             raise OutputError(f"{printable(path, 300)}: the folder {folder} does not exist")
 
@@ -80,6 +83,11 @@ def save_results(job: str, table: str, overview: str, results: Sequence[Result])
     Raises OutputError if one cannot be written.
     """
     lines = []
+    for path in filter(None, (table, overview)):
+        try:
+            Path(path).absolute().parent.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise OutputError(f"{printable(path, 300)}: {problem.strerror}") from None
     if table:
         n_rows = save_table(table, job, results)
         lines.append(f"{printable(table, 300)}: table of {counted(n_rows, 'item')}")

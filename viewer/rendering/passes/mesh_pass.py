@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 
+from viewer.rendering.gpu.back_faces import Region
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
@@ -14,13 +15,15 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.blended_order import SortedTriangles
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+
+if TYPE_CHECKING:
+    from viewer.rendering.passes.blended_order import SortedTriangles
 
 __all__ = ["SKIN_COLOR", "MeshPass", "has_tints", "set_surface", "shading_of", "uses_materials"]
 
@@ -99,7 +102,19 @@ class MeshPass:
         indices = self._indices(mesh, placement, view, options, blended)
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
-        draw_runs(array, indices, options, blended=blended, is_mirrored=is_mirrored)
+        backs = None if blended else self._back_faces(mesh, placement, view, options)
+        draw_runs(
+            array, indices, options, blended=blended, is_mirrored=is_mirrored, back_faces=backs
+        )
+
+    def _back_faces(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> tuple[Region, ...] | None:
+        """Return where back faces can be seen; None for everywhere, as with hidden parts."""
+        if mesh.hidden_parts or options.hidden_parts or options.reduced:
+            return None
+        model_view = view.matrix @ placement
+        return mesh.back_faces.regions(model_view, view.projection, self.context.viewport)
 
     def _indices(
         self,
@@ -113,6 +128,8 @@ class MeshPass:
         indices = mesh.index_set(options)
         if not (blended and indices.is_blended):
             return indices
+        from viewer.rendering.passes.blended_order import SortedTriangles
+
         found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
         found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
         return found

@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.back_faces import BackFaces
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
@@ -33,7 +34,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
-from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["PosedMesh", "skinning_options_key"]
 
@@ -61,6 +61,8 @@ class PosedMesh:
         A row for every split vertex: position (relative to ``center``) and unit normal.
     center : (3,)
         Origin of the positions in figure space; part of the model matrix.
+    back_faces : BackFaces
+        Where back faces of the surface can be seen.
     scalars : ScalarBuffer
         Values of a scalar quantity, computed when one is shown.
     hidden_parts : frozenset of int
@@ -82,8 +84,9 @@ class PosedMesh:
         self._n_joints = skin.n_joints if skin else 0
         with self._owner.guard():
             self._palette = self._owner.keep(matrix_texture(context, self._n_joints))
+            self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self._rigid: moderngl.Texture | None = None
-        self._rest = self._owner.keep(RestBuffers(context, mesh, way))
+        self.back_faces = BackFaces(mesh)
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
@@ -115,6 +118,8 @@ class PosedMesh:
         if attached and pose is not None:
             self.upload(pose, how)
         self._run(self.mesh.skin(how), how, bool(attached))
+        shape = shaped(self.mesh.figure, pose.shape_weights) if attached and pose else None
+        self.back_faces.update(shape or self.mesh.figure, pose if attached else None, how)
         self._key = key
         self.n_updates += 1
 
@@ -167,6 +172,8 @@ class PosedMesh:
         if method.uses_matrices:
             write_matrices(self._palette, palette)
         if method.uses_quaternions:
+            from viewer.rig.skinning.dqs import split_palette
+
             if self._rigid is None:
                 self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center

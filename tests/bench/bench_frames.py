@@ -1,0 +1,123 @@
+"""Frames of a figure that moves, read into memory, against the minimal program that draws them.
+
+Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``least_frame.py`` is the
+minimal program. Processor time of the process, all its threads: a software driver draws with it,
+and other programs on the machine do not change it. Uses the pig if its files exist, else the
+bundled figure.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import numpy as np
+from least_frame import LeastFrame
+from measure import median_ratio, report
+
+import viewer
+from viewer.rendering.offscreen import Offscreen, default_camera
+from viewer.rendering.options import DisplayOptions
+from viewer.rig.kinematics import forward_kinematics, world_matrices
+from viewer.rig.pose import local_matrices
+from viewer.rig.scene import Scene, scene_box
+from viewer.rig.skeleton import FIRST_ROTATION
+
+PIG = Path(__file__).resolve().parents[3] / "shared" / "data" / "pig" / "core_txt_files"
+SIZE = 1280, 720
+PLAIN = DisplayOptions(grid=False, samples=1)
+CASES = (("4 samples, grid", DisplayOptions(), 4, 1.8), ("1 sample, no grid", PLAIN, 1, 1.6))
+FRAMES = 5  # per round
+
+
+def main(rounds: int = 25) -> None:
+    """Print the ratios, and the parts of a pose."""
+    scene = viewer.load(str(PIG)) if PIG.is_dir() else viewer.load()
+    figure = scene.actors[0].figure
+    mesh = figure.require_mesh()
+    print(f"{figure.name}: {mesh.n_vertices} vertices, {figure.require_skeleton().n_joints} joints")
+    for name, options, samples, goal in CASES:
+        with Offscreen() as offscreen, Offscreen() as other:
+            work = frames(scene, offscreen, other, options, samples)
+            times = processor_times(work, rounds)
+        report(f"a frame into memory, {name}", times, (*times,), goal)
+    kinematics(scene, rounds)
+
+
+def frames(
+    scene: Scene, offscreen: Offscreen, other: Offscreen, options: DisplayOptions, samples: int
+) -> dict[str, Callable[[], object]]:
+    """Return functions that draw ``FRAMES`` frames, ours and the minimal program's."""
+    actor, rng = scene.actors[0], np.random.default_rng(0)
+    figure, pose = actor.figure, actor.pose
+    assert pose is not None
+    camera, box = default_camera(scene, SIZE), scene_box(scene)
+    rows = figure.require_skeleton().dof_kinds >= FIRST_ROTATION
+    with other.context:
+        least = LeastFrame(other.context, figure, camera, box, SIZE, samples)
+
+    def angles() -> np.ndarray:
+        return rng.normal(0.0, 0.02, (figure.require_skeleton().n_joints, 3))
+
+    def ours() -> None:
+        with offscreen.context:
+            target = offscreen.target(SIZE, samples)
+            for _ in range(FRAMES):
+                pose.dofs[rows] = angles().ravel()
+                offscreen.renderer.draw(scene, camera, options, target, box)
+                target.resolve()
+                target.read()
+
+    def minimal() -> None:
+        with other.context:
+            for _ in range(FRAMES):
+                least.frame(angles())
+
+    return {"viewer": ours, "minimal program": minimal}
+
+
+def processor_times(
+    work: Mapping[str, Callable[[], object]], rounds: int
+) -> dict[str, list[float]]:
+    """Run each function once per round, in turn; return milliseconds per frame by name."""
+    times: dict[str, list[float]] = {name: [] for name in work}
+    for number in range(rounds + 1):
+        for name, run in work.items():
+            started = time.process_time()
+            run()
+            if number:  # the first round warms caches
+                times[name].append(1e3 * (time.process_time() - started) / FRAMES)
+    return times
+
+
+def kinematics(scene: Scene, rounds: int) -> None:
+    """Print the time of a pose's matrices."""
+    actor, rng = scene.actors[0], np.random.default_rng(1)
+    skeleton, pose = actor.figure.require_skeleton(), actor.pose
+    assert pose is not None
+    local = local_matrices(skeleton, pose)
+
+    def repeated(run: Callable[[], object]) -> Callable[[], None]:
+        def several() -> None:
+            for _ in range(FRAMES):
+                pose.dofs += 1e-6 * rng.normal()
+                run()
+
+        return several
+
+    times = processor_times(
+        {
+            "DOFs to world matrices": repeated(lambda: world_matrices(skeleton, pose)),
+            "local to world matrices": repeated(
+                lambda: forward_kinematics(skeleton.parents, local)
+            ),
+        },
+        4 * rounds,
+    )
+    report(f"forward kinematics, {skeleton.n_joints} joints", times, (*times,))
+    assert median_ratio(times, *times) > 0.0
+
+
+if __name__ == "__main__":
+    main()
