@@ -13,7 +13,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # Compiled modules, as an installed program has them; the first round fills it.
-_CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
+CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
 
 
 def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
@@ -54,8 +54,8 @@ def run_process(arguments: Sequence[str], is_quiet: bool = False) -> tuple[float
 
     ``is_quiet``: whether its warnings are dropped.
     """
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
-    environment.setdefault("VIEWER_CACHE", str(Path(_CACHE.name) / "arrays"))
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": CACHE.name}
+    environment.setdefault("VIEWER_CACHE", str(Path(CACHE.name) / "arrays"))
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started = time.perf_counter()
     process = subprocess.Popen(
