@@ -72,15 +72,21 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
 def _local_cluster(limits: Limits, folder: str) -> Any:
     from distributed import LocalCluster
 
-    return LocalCluster(
-        n_workers=limits.workers,
-        threads_per_worker=1,
-        processes=True,
-        memory_limit=None,
-        dashboard_address=None,
-        local_directory=folder,
-        silence_logs=logging.CRITICAL,
-    )
+    try:
+        return LocalCluster(
+            n_workers=limits.workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=None,
+            dashboard_address=None,
+            local_directory=folder,
+            silence_logs=logging.CRITICAL,
+        )
+    except RuntimeError as problem:
+        raise ViewerError(
+            f"--cluster local: the workers do not start ({printable(problem, 200)}); a script that "
+            'calls viewer.batch needs the line if __name__ == "__main__": before its own work'
+        ) from None
 
 
 def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
@@ -89,7 +95,7 @@ def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
-            "job of shards (viewer help batch)"
+            "job of shards (viewer help batches)"
         )
     cluster = slurm_cluster(name, limits)
     cluster.scale(n=limits.workers)
