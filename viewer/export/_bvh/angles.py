@@ -45,6 +45,12 @@ def unrolled(angles: Floats, order: str) -> Floats:
     """
     if len(angles) < 2:
         return angles.copy()
+    if angles.ndim > 2:
+        # One joint at a time, so that the arrays of many frames fit into the processor's cache.
+        joints = np.empty_like(angles)
+        for joint in range(angles.shape[1]):
+            joints[:, joint] = unrolled(angles[:, joint], order)
+        return joints
     angles = _unlocked(angles, order)
     other = angles * [1.0, -1.0, 1.0] + np.pi
     # Switching costs the same from either form, so the number of switches accumulates.

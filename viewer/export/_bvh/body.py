@@ -25,7 +25,7 @@ from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
 
-_BLOCK = 4096  # frames at a time, so that the matrices of all frames never exist at once
+_BLOCK = 128  # frames at a time, so that their matrices fit into the processor's cache
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 

@@ -150,6 +150,8 @@ def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
     if len(rows) == 1:
         return rows[np.zeros(len(before), dtype=np.int32)]
     start = rows[before]
+    if not fraction.any():
+        return start
     weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
     return start + weight * (rows[after] - start)
 
