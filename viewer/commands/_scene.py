@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import clean_up_of
+from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
@@ -82,8 +83,12 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
     )
 
 
-def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that control how captures and BVH are read."""
+def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
+    """Add the options that control how captures and BVH are read.
+
+    ``parser``: parser of a command.
+    ``gaps``: how the command handles gaps, see ``add_gap_arguments``.
+    """
     group = parser.add_argument_group("captures and BVH")
     _add_driving_arguments(group)
     group.add_argument(
@@ -106,9 +111,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show a BVH next to the figures instead of driving one",
     )
-    group.add_argument(
-        "--interpolate-gaps", action="store_true", help="interpolate gaps in captures"
-    )
+    add_gap_arguments(group, gaps)
 
 
 def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:

@@ -284,15 +284,18 @@ class Renderer:
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that a failure leaves the previous scene intact.
 
+        Whatever was uploaded before a failure is freed.
+
         Raises
         ------
         RenderError
             If there is not enough graphics memory.
         """
-        prepare_meshes(self.buffers, scene.actors, DisplayOptions())
-        for actor in scene.actors:
-            if actor.figure.skeleton is not None:
-                self.buffers.skeleton(actor)
+        with self.buffers.guard():
+            prepare_meshes(self.buffers, scene.actors, DisplayOptions())
+            for actor in scene.actors:
+                if actor.figure.skeleton is not None:
+                    self.buffers.skeleton(actor)
 
     def _update(
         self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]
