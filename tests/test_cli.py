@@ -239,7 +239,7 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
 def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     pipe = tmp_path / "pipe.png"
     os.mkfifo(pipe)
-    # It waits for a reader of the pipe, or is just about to.
+    # It waits for a reader of the pipe, or is about to.
     program = (
         "import os, sys, threading, viewer.media.saving as save, viewer.cli\n"
         "write = save._write_through\n"

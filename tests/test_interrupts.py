@@ -305,7 +305,7 @@ def test_run_works_in_another_thread(tmp_path, capsys):
 
 @pytest.fixture
 def ctrl_c():
-    """Return a function that interrupts these tests, which are started as any program is."""
+    """Return a function that interrupts these tests, which are started as ordinary programs."""
     kept = signal.signal(INT, signal.default_int_handler)
     yield lambda: signal.raise_signal(INT)
     signal.signal(INT, kept)

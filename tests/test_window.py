@@ -90,7 +90,7 @@ def window(display, figure, tmp_path):
 
 @pytest.fixture(scope="module")
 def places(figure):
-    """Where widgets are, from a headless app of the window's size and layout."""
+    """Positions of widgets, from a headless app of the window's size and layout."""
     driver = Driver(*figure, size=SIZE)
     rects, view = dict(driver.state.item_rects), driver.state.view_rect
     driver.close()
@@ -256,7 +256,7 @@ def test_layout_is_remembered_between_runs(window, places):
 
 @pytest.fixture(scope="module")
 def surface(figure):
-    """Where the tab of the Weights panel is, and places in the window on the figure's surface."""
+    """Position of the Weights tab, and positions in the window on the figure's surface."""
     driver = Driver(*figure, size=SIZE, samples=1)
     tab = imgui.internal.find_window_by_name("Weights").dc.dock_tab_item_rect
     driver.key("f")

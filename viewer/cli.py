@@ -95,7 +95,7 @@ def _dispatch(arguments: list[str]) -> int:
         name = arguments.pop(0)
     elif arguments:
         check_command(arguments[0])
-    parser = command_parser(name)
+    parser = command_parser(name, arguments)
     # Everything after "--" is a file, even if it looks like an option.
     end = arguments.index("--") if "--" in arguments else len(arguments)
     before_end = protect_numbers(arguments[:end])
@@ -103,7 +103,13 @@ def _dispatch(arguments: list[str]) -> int:
     parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
-    return import_module(f"viewer.commands.{name}").run(parsed)
+    command = import_module(f"viewer.commands.{name}")
+    if getattr(parsed, "no_cache", False):
+        from viewer.media.array_cache import without_cache
+
+        with without_cache():
+            return command.run(parsed)
+    return command.run(parsed)
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

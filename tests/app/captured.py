@@ -22,7 +22,7 @@ def timing(present, rate=10.0, first=0):
 
 
 def walk(present, n_joints, name="take", rate=10.0, first=0):
-    """A motion in which the figure is at x = its row, turned about y by a tenth of it."""
+    """A motion in which the figure is at x = its row, rotated about y by a tenth of that."""
     when = timing(present, rate, first)
     rows = np.arange(int(when.present.sum()), dtype=float)
     rotations = np.zeros((len(rows), n_joints, 4))
@@ -35,7 +35,7 @@ def walk(present, n_joints, name="take", rate=10.0, first=0):
 
 
 def people(rig, *presences, rate=10.0):
-    """A scene of the tiny figure as one person for each list of frames, all of one capture."""
+    """A capture of several people, each the tiny figure, present in the given frames."""
     figure = viewer.load(*rig).actors[0].figure
     count = figure.skeleton.n_joints
     return Scene(
@@ -47,7 +47,7 @@ def people(rig, *presences, rate=10.0):
 
 
 def dots(confidences, n_frames=3, rate=10.0):
-    """An actor of four captured points; frame 1 has the confidences given, others are certain."""
+    """An actor of four captured points; frame 1 has these confidences, others are certain."""
     layout = PointLayout(
         "face4", NAMES, np.array([[0, 1], [0, 2], [0, 3]]), np.array([0, 1, -1, 0])
     )

@@ -75,7 +75,7 @@ def curves(drive, rig, tmp_path):
 
 @pytest.fixture
 def box(drive_body):
-    """A test driver on an app that shows the box, with all of its panels in reach."""
+    """A test driver on an app that shows the box, with all panels open."""
     return drive_body()
 
 

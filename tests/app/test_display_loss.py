@@ -41,7 +41,7 @@ sys.exit(run(sys.argv[3:]))
 """
 
 
-# The same at start-up: the server has gone when a step begins.
+# The same at start-up: the server has ended when a step begins.
 START = """
 import os, signal, sys
 from viewer.app.display import import_glfw

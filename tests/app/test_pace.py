@@ -1,4 +1,4 @@
-"""When the window draws which pass, and how shadows fade."""
+"""Passes that the window draws in each frame, and fading shadows."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_slow_drivers_fade_shadows_out_while_things_move_and_in_again(rate):
             strengths.append(step.strength)
             qualities.append(step.options.quality)
     assert "draft" in qualities and qualities[-1] == "final" and strengths[-1] == 1.0
-    # No jump: a fifth of a second from all to nothing, and two frames at least.
+    # No jump: fades out over a fifth of a second, and over at least two frames.
     assert np.abs(np.diff(strengths)).max() <= (1 / 12 if rate == 60 else 0.5) + 1e-9
 
 

@@ -9,9 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from app.retargeting.driven import driven_scene
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
+from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
 from viewer.app.layout import Layout
 from viewer.app.linting.actions import check_rig
@@ -22,7 +24,7 @@ from viewer.app.weights.actions import pin_vertex
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
-MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after blurring away letters and hinting
+MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after a blur that removes letters and hinting
 
 
 def _nothing(hand):
@@ -50,8 +52,10 @@ def _message(hand):
 
 
 def _dialog(hand):
-    hand.key("o", "ctrl")
-    hand.state.of(Files).dialog.folder = Path("/figures")
+    dialog = FileDialog(hand.state.paths[0].parent)
+    # Before the field of the path has the focus, which keeps its text.
+    dialog.folder = Path("/figures")
+    hand.state.of(Files).dialog = dialog
 
 
 def _lint(hand):
@@ -158,6 +162,19 @@ def test_body_panels_match_golden_images(drive_body, name):
     hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
+
+
+@pytest.mark.golden("app_joint_match")
+def test_joint_match_panel_matches_its_golden_image(drive):
+    hand = drive(scene=driven_scene(), size=BODY_SIZE, samples=4, pixels_per_point=1.0)
+    hand.state.of(ShownPanels).closed.add("stats")
+
+    def prepare(hand):
+        hand.show_panel("Joint match")
+        hand.step(3)
+        hand.move("joint left_hip")
+
+    _compare(_shown(hand, prepare), "joint_match")
 
 
 def _compare(pixels, name):

@@ -1,4 +1,4 @@
-"""The cache key of the view: every visible change changes it, and nothing else does."""
+"""The cache key of the view: it changes with every visible change, and only then."""
 
 from __future__ import annotations
 

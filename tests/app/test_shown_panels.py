@@ -1,4 +1,4 @@
-"""Which panels are open: most until they are closed, those on demand only when asked for."""
+"""Open panels: most until they are closed, others only on request."""
 
 from __future__ import annotations
 

@@ -6,9 +6,10 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.typed_keys import TypedKeys
+from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click
 
 A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
+LEFT_CTRL = 341
 PRESS, RELEASE, REPEAT = 1, 0, 2
 CTRL = 2
 
@@ -65,6 +66,32 @@ def test_shortcut_between_two_frames_acts_without_text_input(hand, type_at_once)
     type_at_once("w")
     hand.step(3)
     assert hand.state.options.wireframe != was_on
+
+
+def test_shortcut_acts_if_its_modifier_is_released_before_the_next_frame(hand, type_at_once):
+    hand.click("Filter")
+    type_at_once("arm")
+    hand.step(2)
+    hand.io.add_key_event(imgui.Key.mod_ctrl, True)
+    hand.step()
+    hand.io.add_key_event(imgui.Key.a, True)
+    end_frame_before(imgui.get_current_context().input_events_queue, LEFT_CTRL, RELEASE)
+    hand.io.add_key_event(imgui.Key.mod_ctrl, False)
+    hand.io.add_key_event(imgui.Key.a, False)
+    hand.step(4)
+    type_at_once("root")
+    hand.step(2)
+    assert joint_tree(hand.state).filter == "root"
+
+
+def test_tab_reacts_if_the_mouse_reaches_it_just_before_the_click(hand):
+    tab = imgui.internal.find_window_by_name("Skinning").dc.dock_tab_item_rect
+    hand.io.add_mouse_pos_event(tab.min.x + 10, (tab.min.y + tab.max.y) / 2)
+    end_frame_before_click(imgui.get_current_context().input_events_queue, PRESS)
+    for is_down in (True, False):
+        hand.io.add_mouse_button_event(0, is_down)
+    hand.step(5)
+    assert "engine" in hand.state.item_rects
 
 
 @pytest.mark.parametrize(

@@ -180,7 +180,7 @@ def test_nearest_method_follows_the_seed():
     posed = deform(figure, pose)[0]
     target = mesh_of(posed * stretch + shift, figure.mesh.triangles)
     rigged = transfer(figure, pose, target, TransferSettings(method="nearest"))
-    # Boxes undo the stretch: vertices find themselves, and unposing gives the template.
+    # Boxes undo the stretch: vertices match themselves, and inverse skinning returns the template.
     assert_allclose(rigged.figure.mesh.positions, figure.mesh.positions, atol=1e-10)
     assert rigged.figure.skin.weights.tolist() == figure.skin.weights.tolist()
     assert_allclose(np.diag(rigged.placement), [4.0, 2.0, 3.0, 1.0])

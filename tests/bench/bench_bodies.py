@@ -1,4 +1,4 @@
-"""A frame of a posed body: pose correctives both ways and not at all, dual quaternions, PIG."""
+"""Frames of posed bodies: pose correctives by both methods and without, dual quaternions, PIG."""
 
 from __future__ import annotations
 

@@ -57,7 +57,7 @@ def write(folder: Path) -> list[bytes]:
 
 
 def motions(folder: Path) -> list[object]:
-    """Read a capture and keep all that it holds."""
+    """Read a capture and keep all of its data."""
     return list(easymocap.read(Source.open(folder)).parts())
 
 
@@ -70,7 +70,7 @@ def actors(folder: Path, model: object) -> Builder:
 
 
 def parsed(data: list[bytes]) -> None:
-    """Parse and forget, as the reference."""
+    """Parse and discard: the reference."""
     for text in data:
         json.loads(text)
 

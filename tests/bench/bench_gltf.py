@@ -1,7 +1,8 @@
-"""Reading and drawing large GLB files, against reading their bytes and parsing their JSON."""
+"""Reading and drawing large GLB files, against reading their bytes, JSON and images."""
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 import tempfile
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 from measure import interleaved, median_ratio, report
+from PIL import Image
 
 from viewer.formats import Source
 from viewer.formats._gltf.node_file import read_nodes
@@ -20,6 +22,7 @@ from viewer.rig.scene import Scene
 
 N_ANIMATIONS, N_JOINTS, N_KEYS, N_SIDE = 60, 70, 70, 120
 N_FACE, N_TARGETS = 160, 50
+N_IMAGES, IMAGE_SIDE = 3, 1024
 SIZE = (320, 240)
 PATHS = (("translation", 3), ("rotation", 4), ("scale", 3))
 
@@ -34,16 +37,19 @@ class Glb:
 
     def accessor(self, array: np.ndarray, code: int, **members: object) -> int:
         """Append an array and return the index of its accessor."""
-        data = array.tobytes()
-        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(data)}
-        self.root["bufferViews"].append(view)
-        self.chunks.append(data)
-        self.size += len(data)
-        kinds = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
-        place = {"bufferView": len(self.root["bufferViews"]) - 1, "componentType": code}
+        kinds = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
+        place = {"bufferView": self.view(array.tobytes()), "componentType": code}
         kind = {"count": len(array), "type": kinds[array.shape[1]]}
         self.root["accessors"].append({**place, **kind, **members})
         return len(self.root["accessors"]) - 1
+
+    def view(self, data: bytes) -> int:
+        """Append bytes and return the index of their buffer view."""
+        view = {"buffer": 0, "byteOffset": self.size, "byteLength": len(data)}
+        self.root["bufferViews"].append(view)
+        self.chunks.append(data + bytes(-len(data) % 4))
+        self.size += len(self.chunks[-1])
+        return len(self.root["bufferViews"]) - 1
 
     def data(self) -> bytes:
         """Return the file."""
@@ -55,13 +61,15 @@ class Glb:
         return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-def character(has_own_times: bool) -> bytes:
+def character(has_own_times: bool, has_images: bool = False) -> bytes:
     """Return a skinned grid with 60 animations of 70 joints.
 
     Parameters
     ----------
     has_own_times : bool
         Whether each channel has an accessor of its own for its times, as some exporters write.
+    has_images : bool
+        Whether its material has a base colour, roughness and normals as images.
     """
     rng = np.random.default_rng(0)
     glb = Glb()
@@ -69,17 +77,26 @@ def character(has_own_times: bool) -> bytes:
     positions = np.stack([x, y, 0 * x], axis=1).astype("<f4")
     corner = (np.arange(N_SIDE - 1)[:, None] * N_SIDE + np.arange(N_SIDE - 1)).ravel()
     square = corner[:, None] + [0, N_SIDE, 1, 1, N_SIDE, N_SIDE + 1]
+    # Neighbours follow the same joint: triangles that span the picture would measure the driver.
+    joints = np.zeros((len(x), 4), dtype="u1")
+    joints[:, 0] = x * N_JOINTS // N_SIDE
     weights = np.zeros((len(x), 4), dtype="<f4")
     weights[:, 0] = 1.0
     normals = np.tile(np.array([0.0, 0.0, 1.0], dtype="<f4"), (len(x), 1))
     attributes = {
         "POSITION": glb.accessor(positions, 5126),
         "NORMAL": glb.accessor(normals, 5126),
-        "JOINTS_0": glb.accessor(rng.integers(N_JOINTS, size=(len(x), 4)).astype("u1"), 5121),
+        "JOINTS_0": glb.accessor(joints, 5121),
         "WEIGHTS_0": glb.accessor(weights, 5126),
     }
     indices = glb.accessor(square.astype("<u4").reshape(-1, 1), 5125)
-    glb.root["meshes"] = [{"primitives": [{"attributes": attributes, "indices": indices}]}]
+    primitive: dict[str, object] = {"attributes": attributes, "indices": indices}
+    if has_images:
+        uvs = np.stack([x, y], axis=1).astype("<f4") / N_SIDE
+        attributes["TEXCOORD_0"] = glb.accessor(uvs, 5126)
+        add_images(glb, rng)
+        primitive["material"] = 0
+    glb.root["meshes"] = [{"primitives": [primitive]}]
     chain = [{"children": [joint + 1]} for joint in range(1, N_JOINTS)]
     glb.root["nodes"] = [{"mesh": 0, "skin": 0}, *chain, {}]
     glb.root["skins"] = [{"joints": list(range(1, N_JOINTS + 1))}]
@@ -103,11 +120,32 @@ def animation(glb: Glb, rng: np.random.Generator, has_own_times: bool) -> dict[s
     return {"name": "walk", "channels": channels, "samplers": samplers}
 
 
+def add_images(glb: Glb, rng: np.random.Generator) -> None:
+    """Add a material with PNG images of smooth noise, which compress as painted ones do."""
+    views = []
+    for _ in range(N_IMAGES):
+        noise = Image.fromarray(rng.integers(256, size=(64, 64, 3), dtype=np.uint8))
+        stream = io.BytesIO()
+        noise.resize((IMAGE_SIDE, IMAGE_SIDE), Image.Resampling.BICUBIC).save(stream, "PNG")
+        views.append({"bufferView": glb.view(stream.getvalue()), "mimeType": "image/png"})
+    glb.root["images"] = views
+    glb.root["textures"] = [{"source": index} for index in range(N_IMAGES)]
+    lit = {"baseColorTexture": {"index": 0}, "metallicRoughnessTexture": {"index": 1}}
+    glb.root["materials"] = [{"pbrMetallicRoughness": lit, "normalTexture": {"index": 2}}]
+
+
 def parsed(path: Path) -> object:
-    """Read the bytes of a binary file and parse its JSON."""
+    """Read the bytes of a binary file, parse its JSON, and decode its images one by one."""
     data = path.read_bytes()
     size = struct.unpack_from("<I", data, 12)[0]
-    return json.loads(data[20 : 20 + size])
+    root, binary = json.loads(data[20 : 20 + size]), memoryview(data)[28 + size :]
+    pixels = []
+    for image in root.get("images", []):
+        view = root["bufferViews"][image["bufferView"]]
+        start = view["byteOffset"]
+        stream = io.BytesIO(binary[start : start + view["byteLength"]])
+        pixels.append(np.asarray(Image.open(stream).convert("RGBA")))
+    return root, pixels
 
 
 def face() -> bytes:
@@ -152,6 +190,7 @@ def main(rounds: int = 9) -> None:
     files = {
         "shared times": character(False),
         "times for each channel": character(True),
+        f"{N_IMAGES} images": character(False, has_images=True),
         f"{N_TARGETS} morph targets": face(),
     }
     with tempfile.TemporaryDirectory() as folder:
@@ -162,8 +201,8 @@ def main(rounds: int = 9) -> None:
 
 
 def compare(path: Path, title: str, rounds: int) -> None:
-    """Print how long a file takes to be read, posed and drawn, relative to its bytes and JSON."""
-    base, opened = "bytes and json.loads", load(path)
+    """Print the time to read, pose and draw a file, relative to its bytes and JSON."""
+    base, opened = "bytes, json.loads and images", load(path)
     options = DisplayOptions(quality="draft")
 
     def picture(scene: Scene) -> None:

@@ -187,7 +187,7 @@ def processor(figure: Figure, rounds: int) -> None:
 
 
 def fewest(figure: Figure, rounds: int) -> None:
-    """Print whole frames as instances against one by one, played and of a camera that moves."""
+    """Print whole frames as instances against one by one, while playing and for a moving camera."""
     normal = instance_pass.FEWEST
     for count in (2, 4, 8, 16, 32):
         with Offscreen() as together, Offscreen() as single:

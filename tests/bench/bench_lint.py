@@ -47,7 +47,7 @@ def motion(path: Path) -> Path:
 
 
 def main(rounds: int = 7) -> None:
-    """Print the time of checking relative to reading, and each check's share."""
+    """Print the time of checking relative to reading, and the fraction of each check."""
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
         files = [bundled_body(), motion(Path(folder) / "walk.npz")]
         scene = viewer.load(*files)
@@ -75,7 +75,7 @@ def shares(scene: Scene, rounds: int = 5) -> dict[str, float]:
 
 
 def steps_of(scene: Scene) -> list[tuple[str, float]]:
-    """Return when each step of a check began, in seconds, and when the last one ended."""
+    """Return the start time of each step of a check, and the end of the last one, in seconds."""
     steps: list[tuple[str, float]] = []
 
     def note(_done: int, _total: int, what: str) -> None:

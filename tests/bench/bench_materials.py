@@ -47,7 +47,7 @@ def sheet(n_materials: int, images: list[np.ndarray], mode: str = "opaque") -> F
 def main(rounds: int = 15) -> None:
     """Print the ratios."""
     noise = np.random.default_rng(0).integers(0, 256, (MANY, 256, 256, 4), dtype=np.uint8)
-    noise.flags.writeable = False  # otherwise each texture has a copy of its own
+    noise.flags.writeable = False  # otherwise each texture has its own copy
     images = [*noise]
     with Offscreen() as offscreen, offscreen.context:
         figures = {

@@ -20,12 +20,12 @@ MEMORY_GOAL = 3.0
 
 
 def pig_arrays() -> dict[str, np.ndarray]:
-    """Return arrays of the size of the PIG model, under its keys."""
+    """Return arrays with the keys and sizes of the PIG model."""
     figure = synthetic()
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None and skeleton is not None and skin is not None
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
-    # A joint that a vertex lists twice is listed once in this format.
+    # This format lists a joint once that a vertex lists twice.
     entries = np.stack([skin.joints, owners], axis=1)
     unique, inverse = np.unique(entries, axis=0, return_inverse=True)
     weights = np.round(np.bincount(inverse.ravel(), skin.weights), 3)
@@ -41,7 +41,7 @@ def pig_arrays() -> dict[str, np.ndarray]:
 
 
 def write_text(folder: Path, arrays: dict[str, np.ndarray]) -> bytes:
-    """Write the tables as the model's authors do; return all of their bytes."""
+    """Write the tables as the model's authors do; return their total size in bytes."""
     for name, array in arrays.items():
         is_whole = array.dtype.kind == "i"
         rows = array.reshape(len(array), -1).tolist()

@@ -53,7 +53,7 @@ def keyed() -> Clip:
 
 
 def main(rounds: int = 150) -> None:
-    """Print the share of each kind of motion in its drawn frame, and what 500 frames leave."""
+    """Print the fraction of each motion in its drawn frame, and the growth in 500 frames."""
     for clip in (sampled(), keyed()):
         with Offscreen() as offscreen, offscreen.context:
             frame, prepare = pieces(offscreen, Actor(synthetic(), clip=clip))
@@ -90,7 +90,7 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
 
 
 class Clock:
-    """Seconds of a clip, one frame of a 60 Hz screen after the other, round and round."""
+    """Times in a looping clip, one per frame of a 60 Hz screen."""
 
     def __init__(self, clip: Motion) -> None:
         self.clip, self.ticks = clip, 0
@@ -124,7 +124,7 @@ def growth(frame: Callable[[], object]) -> tuple[float, float]:
 
 
 def resident() -> float:
-    """Return the memory of this process in bytes; its peak where the system tells no more."""
+    """Return the memory of this process in bytes, or its peak if the system states nothing else."""
     pages = Path("/proc/self/statm")
     if pages.exists():
         return int(pages.read_text().split()[1]) * resource.getpagesize()

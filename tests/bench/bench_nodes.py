@@ -1,4 +1,4 @@
-"""Making a figure of a long chain of nodes, against one of a chain half as long."""
+"""Making a figure of a long chain of nodes, against a chain half as long."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def skin_text(megabytes: float) -> str:
 
 
 def main(rounds: int = 3) -> None:
-    """Print the ratios and megabytes a second."""
+    """Print the ratios and megabytes per second."""
     text = skin_text(MEGABYTES)
     size = len(text)
     row = " ".join(f"{v:.6f}" for v in np.random.default_rng(1).normal(size=1000)) + "\n"
@@ -74,7 +74,7 @@ def fromstring(text: str) -> object:
 
 
 def tokens(path: Path) -> object:
-    """Split the file into words and turn each into a number, as the usual reader does."""
+    """Split the file into words and convert each to a number, as simple readers do."""
     return [float(word) for word in path.read_text().split() if word[0] in "-0123456789"]
 
 

@@ -21,7 +21,7 @@ SIZE, ROUNDS = (1280, 720), 30
 
 
 def frames(offscreen: Offscreen, scene: Scene, options: DisplayOptions) -> Callable[[], object]:
-    """Return a function that re-poses the scene, draws it, and waits for the image."""
+    """Return a function that changes the pose, draws the scene, and waits for the image."""
     camera, box = default_camera(scene, SIZE), scene_box(scene)
     rng = np.random.default_rng(0)
 

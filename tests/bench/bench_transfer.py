@@ -1,10 +1,10 @@
 """Weights transferred by the default method, against those of the nearest vertex.
 
-Parts, all or those named: ``aligned``, the weights alone, template and target lying on each other;
-``whole``, the whole way, which looks for the alignment itself, against the seed's whole way;
-``inverted``, the same with the template at rest however the target stands; ``stretched``, targets
-with another scale along each axis, as they are and with ``--scale axes``; ``scans``, meshes as
-scanners leave them; ``time``, where the time goes.
+Parts, by default all of them: ``aligned``, only the weights, with aligned template and target;
+``whole``, the complete pipeline including the alignment, for both methods; ``inverted``, the same
+with the template at rest, whatever the pose of the target; ``stretched``, targets with a different
+scale along each axis, without options and with ``--scale axes``; ``scans``, meshes as scanners
+leave them; ``time``, the time of each step.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from viewer.autorig.weights.weight_transfer import (
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
 
-# Of weights alone: a template in another pose, which the whole way finds, is no test of these.
+# A template in another pose, which the complete pipeline finds, is no test of the weights alone.
 UNFITTED = {"aligned": {"bent by 4 degrees"}}
 CLEAR = 0.1  # difference of the two largest weights, from which a dominant joint is clear
 SHARE, SAME = 0.5, 0.97  # goals: mean L1 against the other method's; same dominant joint

@@ -17,7 +17,7 @@ GOAL = 0.1  # milliseconds for all channels at one time
 
 
 def clip(shares: bool, mode: str = "linear") -> TransformClip:
-    """Return 210 channels of 100 keys, which share their times or all have other ones."""
+    """Return 210 channels of 100 keys, with common or different times."""
     rng = np.random.default_rng(0)
     channels = []
     for joint in range(N_JOINTS):

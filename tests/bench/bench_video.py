@@ -1,4 +1,4 @@
-"""Recording a video against drawing its frames alone and encoding them alone.
+"""Recording a video against only drawing and only encoding its frames.
 
 Drawing alone is the recorder with a sink that drops the frames; encoding alone is the video sink
 with frames that are there already. 1280 x 720, 4 samples a pixel, H.264 at the usual quality.

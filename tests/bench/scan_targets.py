@@ -1,8 +1,8 @@
 """Meshes as scanners and modellers leave them, made from the bundled figures: no rig, true weights.
 
-Other people than the bundled body (its shape directions), in A- and T-pose, with noise, another
-tessellation, holes, clothes and hair as open shells, a missing foot, in centimetres with z up;
-and an animal with other proportions than the fox. Run as a program it writes them as .obj, with
+People unlike the bundled body, made with its blend shapes, in A- and T-pose, with noise, another
+tessellation, holes, clothes and hair as open shells, a missing foot, or in centimetres with z up;
+and an animal with other proportions than the fox. Run as a program, it writes them as .obj, and
 a walk for each template as .bvh:
 
     python tests/bench/scan_targets.py FOLDER
@@ -77,7 +77,7 @@ def scans() -> list[Scan]:
 
 
 def person(body: viewer.Figure, shape: dict[str, float], arms: float) -> made.Target:
-    """Return a person different from the template, the arms lowered by an angle in radians."""
+    """Return a person unlike the template, with the arms lowered by an angle in radians."""
     pose = viewer.rest_pose(body.skeleton)
     pose.shape_weights = np.array([shape.get(name, 0.0) for name in body.blend_shapes.names])
     names = list(body.skeleton.names)
@@ -91,7 +91,7 @@ def person(body: viewer.Figure, shape: dict[str, float], arms: float) -> made.Ta
 
 
 def other_animal(fox: viewer.Figure) -> made.Target:
-    """Return a heavier animal: higher legs, shorter, wider, a larger head, standing otherwise."""
+    """Return a heavier animal: longer legs, shorter, wider, a larger head, in another stance."""
     pose = made.bent_pose(fox, np.random.default_rng(11), np.radians(6.0))
     whole = made.posed("fox", fox, pose)
     names = fox.skeleton.names
@@ -106,7 +106,7 @@ def other_animal(fox: viewer.Figure) -> made.Target:
 
 
 def meshed(target: made.Target, share: float) -> made.Target:
-    """Return another tessellation, with edges of that share of the target's."""
+    """Return another tessellation, with edges scaled by a factor."""
     fine = made.subdivided(made.subdivided(target))
     length = made.edge_length(target.positions, target.triangles)
     return made.clustered(fine, share * length)
@@ -126,7 +126,7 @@ def z_up(scan: Scan) -> Scan:
 
 
 def holed(scan: Scan) -> Scan:
-    """Return the scan without what scanners miss: armpits, crotch, soles, the crown."""
+    """Return the scan without the areas that scanners miss: armpits, crotch, soles, the crown."""
     names = made.body().skeleton.names
     joints = viewer.joint_matrices(made.body(), scan.pose)[:, :3, 3]
     at = dict(zip(names, joints, strict=True))
@@ -221,7 +221,7 @@ def walk(figure: viewer.Figure, what: str) -> SampledClip:
     quaternions = turns_to_quaternions(turns)
     rest = viewer.rest_pose(figure.skeleton)
     if what == "body":
-        # The arms come down first, about z; then they swing.
+        # The arms are first lowered, about z; then they swing.
         down = np.zeros((figure.skeleton.n_joints, 3))
         names = list(figure.skeleton.names)
         down[names.index("left_shoulder"), 2] = -1.2
@@ -256,7 +256,7 @@ def body_turns(figure: viewer.Figure) -> np.ndarray:
 
 
 def fox_turns(figure: viewer.Figure) -> np.ndarray:
-    """Return rotation vectors (N, J, 3): a trot, legs across from each other together."""
+    """Return rotation vectors (N, J, 3): a trot, in which diagonal legs move together."""
     names = list(figure.skeleton.names)
     phase = 2.0 * np.pi * np.arange(FRAMES) / FRAMES
     turns = np.zeros((FRAMES, len(names), 3))

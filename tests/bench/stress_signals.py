@@ -2,11 +2,11 @@
 
     python tests/bench/stress_signals.py [--tries N] [--seed S] [WORK:SIGNAL ...]
 
-Every try runs a command over an old output file, and sends it a signal after a random time, from
-when it begins to run the viewer until after its usual end. Allowed are exit code 0 with a new file,
-and 130 (Ctrl-C) or 143 (SIGTERM) with the old file and one line of words. What else happens is
-printed, with what the program said, and makes the exit code 1. Another copy of the viewer is tried
-if PYTHONPATH names it.
+Each try runs a command that would replace an old output file, and signals it at a random time
+between the start of the viewer and slightly after its usual end. Allowed are exit code 0 with a new
+file, and 130 (Ctrl-C) or 143 (SIGTERM) with the old file and one line of text. All other outcomes
+are printed with the program's output, and the exit code is then 1. PYTHONPATH selects another copy
+of the viewer.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ sys.exit(main())
 
 
 class Trial:
-    """A command that is started again and again in a folder of its own."""
+    """A command that is started repeatedly in its own folder."""
 
     def __init__(self, work: str, kind: str, folder: Path, mesh: Path) -> None:
         arguments, name = WORKS[work]
@@ -62,7 +62,7 @@ class Trial:
             self.arguments += ["-o", name, "--force"]
 
     def start(self) -> subprocess.Popen[bytes]:
-        """Start the command, and return when it begins to run the viewer."""
+        """Start the command; return the time at which it begins to run the viewer."""
         for path in self.folder.iterdir():
             path.unlink()
         if self.output is not None:
@@ -88,7 +88,7 @@ class Trial:
         return self.ending(process.returncode, said), time.monotonic() - sent
 
     def ending(self, code: int, said: bytes) -> str:
-        """Return the exit code, and what is not as it should be."""
+        """Return the exit code and all deviations from the expected outcome."""
         faults = [] if code in (0, self.code) else ["exit code"]
         notes = b"".join(line for line in said.splitlines(True) if line.startswith(b"warning: "))
         if said.replace(notes, b"") != (b"" if code == 0 else self.words):
@@ -102,7 +102,7 @@ class Trial:
 
 
 def tried(work: str, kind: str, tries: int, mesh: Path) -> bool:
-    """Interrupt one command many times; return whether it always ended well."""
+    """Interrupt one command many times; return whether all outcomes were allowed."""
     with tempfile.TemporaryDirectory() as name:
         trial = Trial(work, kind, Path(name), mesh)
         started = time.monotonic()
@@ -122,7 +122,7 @@ def tried(work: str, kind: str, tries: int, mesh: Path) -> bool:
 
 
 def main() -> int:
-    """Run the trials named, or the usual ones."""
+    """Run the named trials, or the usual ones."""
     parser = argparse.ArgumentParser(description="Interrupt commands at random moments.")
     parser.add_argument("trials", nargs="*", metavar="WORK:SIGNAL", default=USUAL)
     parser.add_argument("--tries", type=int, default=100)

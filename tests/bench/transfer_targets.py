@@ -54,7 +54,7 @@ def fox() -> viewer.Figure:
 
 
 def targets(figure: viewer.Figure, what: str) -> list[Target]:
-    """Return all targets of a figure; the body's have clothes and lowered arms besides."""
+    """Return all targets of a figure; for the body also with clothes and with lowered arms."""
     rng = np.random.default_rng(20)
     plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
     bent = posed(what, figure, bent_pose(figure, rng, 0.25))
@@ -77,7 +77,7 @@ def targets(figure: viewer.Figure, what: str) -> list[Target]:
 
 
 def without_pose(figure: viewer.Figure, what: str) -> list[Target]:
-    """Return re-posed targets for a template that is left at rest; they lie in no place known."""
+    """Return posed targets for a template at rest; their positions are unknown."""
     rng = np.random.default_rng(21)
     rest = viewer.rest_pose(figure.skeleton)
     at_rest = posed(what, figure, rest)
@@ -93,7 +93,7 @@ def without_pose(figure: viewer.Figure, what: str) -> list[Target]:
 
 
 def stretched(figure: viewer.Figure, what: str) -> list[Target]:
-    """Return targets that have another scale along each axis, which no pose or limb explains."""
+    """Return targets with a different scale along each axis, which no pose or limb can explain."""
     rng = np.random.default_rng(22)
     plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
     made = []
@@ -119,7 +119,7 @@ def template_figure(target: Target) -> viewer.Figure:
     figure = target.figure
     if len(target.template) == figure.mesh.n_vertices:
         return figure
-    # A decimated template keeps some of the figure's vertices, here found by their place at rest.
+    # A decimated template keeps some of the figure's vertices, here found by their rest positions.
     rest = viewer.deform(figure, target.pose, viewer.Skinning(correctives=False))[0]
     kept = cKDTree(rest).query(target.template)[1]
     positions = figure.mesh.positions[kept]
@@ -150,7 +150,7 @@ def _named(target: Target, name: str) -> Target:
 
 
 def bent_pose(figure, rng, angle: float) -> viewer.Pose:
-    """Turn every joint but the root about random axes, by a normal angle."""
+    """Rotate all joints except the root about random axes, by normally distributed angles."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = rng.normal(scale=angle / np.sqrt(3), size=(len(pose.rotations), 3))
     turns[0] = 0.0
@@ -170,7 +170,7 @@ def _arms_down(figure, angle: float = 1.35) -> viewer.Pose:
 
 
 def turn_joints(pose: viewer.Pose, vectors: np.ndarray) -> None:
-    """Give each joint a rotation by its rotation vector, in place."""
+    """Rotate each joint by its rotation vector, in place."""
     angles = np.linalg.norm(vectors, axis=1, keepdims=True)
     axes = vectors / np.where(angles > 0, angles, 1.0)
     pose.rotations[:] = np.concatenate([np.sin(angles / 2) * axes, np.cos(angles / 2)], axis=1)
@@ -225,7 +225,7 @@ def subdivided(target: Target) -> Target:
 
 
 def clustered(target: Target, cell: float) -> Target:
-    """Keep one vertex of each cell of a grid: the one nearest to the mean of the cell's."""
+    """Keep one vertex per grid cell: the one nearest to the mean of the cell's vertices."""
     cells = np.floor(target.positions / cell).astype(np.int64)
     _, label = np.unique(cells, axis=0, return_inverse=True)
     label = label.ravel()
@@ -250,14 +250,14 @@ def clustered(target: Target, cell: float) -> Target:
 
 
 def _remeshed(target: Target, rng) -> Target:
-    """Subdivide twice, keep about as many vertices as before, elsewhere; then perturb."""
+    """Subdivide twice, keep about as many vertices as before in other positions; then perturb."""
     fine = subdivided(subdivided(target))
     coarse = clustered(fine, 1.1 * edge_length(target.positions, target.triangles))
     return replace(_perturbed(coarse, rng), name="remeshed")
 
 
 def _coarse_template(target: Target) -> Target:
-    """Take a decimated template for the figure itself, whose weights are its own."""
+    """Use a decimated template with its own weights in place of the figure."""
     coarse = clustered(target, 2.0 * edge_length(target.positions, target.triangles))
     return replace(
         target,
@@ -269,7 +269,7 @@ def _coarse_template(target: Target) -> Target:
 
 
 def _placed(target: Target) -> Target:
-    """Turn, enlarge to centimetres and shift target and template."""
+    """Rotate, scale to centimetres and translate target and template."""
     cosine, sine = np.cos(TURN), np.sin(TURN)
     matrix = np.eye(4)
     matrix[:3, :3] = 95.0 * np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
@@ -288,14 +288,14 @@ def _placed(target: Target) -> Target:
 
 
 def _otherwise_bent(target: Target, figure, rng, remesh: bool = True) -> Target:
-    """Bend the target a little, but not the template: an imperfect fit of the pose."""
+    """Bend the target slightly, but not the template: an imperfect fit of the pose."""
     bent = posed("", figure, bent_pose(figure, rng, np.radians(4.0)))
     bent = _remeshed(bent, rng) if remesh else bent
     return replace(bent, name="bent by 4 degrees", template=target.template, pose=target.pose)
 
 
 def shell(target: Target, offset: float, joints: list[str] | None) -> Target:
-    """Offset the surface along its normals, of some joints' parts alone if they are given."""
+    """Offset the surface along its normals, only in the parts of given joints if there are any."""
     normals = vertex_normals(target.positions, target.triangles)
     links = edges(target.triangles)
     both = np.concatenate([links, links[:, ::-1]])

@@ -52,7 +52,7 @@ def lines(capsys):
 
 
 def about_z(joint, angle):
-    """Return the option that turns a joint of the box, below the root, about z."""
+    """Return the option that rotates a joint of the box, below the root, about z."""
     return ["--pose", pose_190(6, **{f"n{3 + 3 * joint + 2}": angle})]
 
 
@@ -73,7 +73,7 @@ def test_inside_out_box_is_measured_the_same(describe, tmp_path):
 
 
 def test_pose_does_not_change_the_rest_body(describe, box):
-    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # moved, rotated, twice as large
+    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # translated, rotated, twice as large
     assert describe(box, "--pose", pose)["rest"]["height"] == pytest.approx(3)
 
 
@@ -185,7 +185,7 @@ def test_normalising_is_measured_in_millimetres(describe, lines, tmp_path):
     box = str(write_box(tmp_path / "box", skinning_weights=weights))
     # Vertex 7 is sqrt(14) m from the origin, its weights add up to 0.995; vertex 6 moves less.
     moved = 0.005 * math.sqrt(14)
-    # Dual quaternions have a length of 1 whatever the weights: they normalise as well.
+    # Dual quaternions have a length of 1 for any weights: they are normalised too.
     expected = {"normalised weights": moved, "DQS against LBS": moved}
     assert describe(box)["effects"] == pytest.approx(expected)
     told = lines(box)
@@ -198,7 +198,7 @@ def test_dual_quaternions_are_measured(describe, tmp_path):
     weights = "\n".join([*(f"0 {vertex} 1" for vertex in range(7)), "0 7 0.5", "1 7 0.5"])
     box = str(write_box(tmp_path / "box", skinning_weights=weights))
     effects = describe(box, *about_z(1, QUARTER_TURN))["effects"]
-    # Half of a quarter turn: LBS draws vertex 7 in to cos 45 of its distance, DQS keeps it.
+    # Half of 90 degrees: LBS reduces the distance of vertex 7 to cos 45 of it, DQS keeps it.
     assert effects == pytest.approx({"DQS against LBS": (1 - math.sqrt(0.5)) * ACROSS})
 
 
@@ -226,7 +226,7 @@ def test_bundled_body_measures_as_an_adult(describe):
 
 
 def test_rounding_is_not_an_effect(describe, tmp_path):
-    # All turns as one piece, by an angle whose sine is no round number.
+    # The box rotates as one piece, by an angle whose sine is not a round number.
     box = str(write_box(tmp_path / "box", skinning_weights="\n".join(f"0 {v} 1" for v in range(8))))
     for angle in (0.1, 0.7, 2.0, 3.0):
         assert describe(box, "--pose", pose_190(6, n3=angle, n4=0.3))["effects"] == {}

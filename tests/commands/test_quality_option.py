@@ -1,4 +1,4 @@
-"""``--quality`` of drawn pictures: the default, and what is refused."""
+"""``--quality`` of drawn pictures: the default, and refused combinations."""
 
 from __future__ import annotations
 

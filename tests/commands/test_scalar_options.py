@@ -64,7 +64,7 @@ def test_summary_line_describes_the_values(render, body):
 
 @pytest.mark.parametrize("arguments", [["--scalar", "weight"], ["--shading", "scalar"]])
 def test_view_without_a_joint_shows_the_one_with_the_most_influence(render, rig, arguments):
-    # The lowest and the highest square have one joint each, the one between has both alike.
+    # The lowest and the highest square have one joint each, the one between has both equally.
     skin = rig[1].read_text().replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75")
     rig[1].write_text(skin)
     files = [str(path) for path in rig]

@@ -1,4 +1,4 @@
-"""Options of surfaces: which shading is drawn, and which values are refused."""
+"""Options of surfaces: the shading that is drawn, and refused values."""
 
 from __future__ import annotations
 

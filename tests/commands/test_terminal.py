@@ -1,12 +1,14 @@
 """Progress, tables and colours at a terminal and in a pipe."""
 
 import io
+import re
 
 import pytest
 
 from viewer.commands import _progress
 from viewer.commands._printing import print_line, table_lines
-from viewer.commands._progress import Progress
+from viewer.commands._progress import Progress, shown_progress
+from viewer.progress import report
 
 
 class Terminal(io.StringIO):
@@ -36,6 +38,18 @@ def test_progress_shows_title_and_count_and_is_erased(terminal, monkeypatch):
     assert "reading [b]walk[/b]" in text and " 300/1200" in text
     assert "comparing" in text and "1200/1200" in text
     assert text.endswith("\x1b[2K")  # the line is erased
+
+
+def test_reported_work_is_shown_with_its_unit_and_without_a_known_total(terminal, monkeypatch):
+    monkeypatch.setattr("sys.stderr", terminal)
+    with shown_progress("converting"):
+        report(0, 430, "MB", "reading big.skin")
+        report(120, 430, "MB")
+        report(7, 0, "MB", "writing big.obj")
+    text = re.sub(r"\x1b\[[0-9;]*m", "", terminal.getvalue())
+    assert "reading big.skin" in text and "120/430 MB" in text
+    assert "writing big.obj" in text and "7/? MB" in text
+    assert text.endswith("\x1b[2K")
 
 
 def test_progress_is_silent_in_pipes_and_for_short_jobs(terminal, monkeypatch):

@@ -1,4 +1,4 @@
-"""Write ``smplx_expected.npz``: what the package smplx makes of the synthetic models.
+"""Write ``smplx_expected.npz``: results of the package smplx for the synthetic models.
 
 How to run, in an environment of its own, from anywhere::
 
@@ -73,7 +73,7 @@ def wave(seed: float, count: int, size: float) -> np.ndarray:
 
 
 def turns(seed: float, count: int, size: float = 0.5) -> np.ndarray:
-    """Return a pose vector; the fourth to seventh joint turn by nothing, pi, 1e-9 and 4.2."""
+    """Return a pose vector; the fourth to seventh joint rotate by 0, pi, 1e-9 and 4.2."""
     pose = wave(seed, count, size).reshape(-1, 3)
     if len(pose) > 6:
         pose[3] = 0.0
@@ -178,7 +178,7 @@ def smplx_result(
     if hand is not None:
         options |= {name: bool(inputs[name]) for name in ("use_pca", "flat_hand_mean")}
         options["num_pca_comps"] = len(inputs.get(hand, np.zeros(6))) if inputs["use_pca"] else 6
-    if kind == "smplx":  # these two read files only
+    if kind == "smplx":  # these two only read files
         np.savez(folder / "SMPLX_NEUTRAL.npz", **model)
         body = smplx.SMPLX(str(folder / "SMPLX_NEUTRAL.npz"), ext="npz", **options)
     elif kind == "flame":

@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
-TENTH = 1e-5  # metres, 0.01 mm: tolerance given in the issue
+TENTH = 1e-5  # metres: 0.01 mm
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 

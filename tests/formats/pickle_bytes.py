@@ -106,7 +106,7 @@ def empty_array(module: str = "numpy.core.multiarray") -> bytes:
 def array_of(
     sides: tuple[int, ...], data: bytes, code: str = "f8", order: str = "<", fortran: int = 0
 ) -> bytes:
-    """An array as Python 2 writes it, whether or not shape and bytes fit."""
+    """An array as Python 2 writes it; shape and bytes may disagree."""
     size = {"S": 1, "U": 4}.get(code[0], 0) * int(code[1:] or 0) or -1
     state = (whole(1), shape(*sides), element_type(code, order, size), whole(fortran))
     return empty_array() + several(*state, payload(data)) + b"b"

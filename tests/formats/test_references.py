@@ -27,7 +27,7 @@ PLY = (
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a model's folder, with a secret image next to it, and links that lead there."""
+    """Return a model's folder, with a secret image next to it, and links to that image."""
     model = tmp_path / "model"
     (tmp_path / "secret").mkdir()
     (model / "sub").mkdir(parents=True)

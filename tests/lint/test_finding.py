@@ -29,7 +29,7 @@ def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints() -> None:
 
 def test_stray_vertices_do_not_affect_the_size() -> None:
     assert Subject(Actor(cube([500.0, 500.0, 500.0]))).size() == pytest.approx(4 * np.sqrt(3))
-    # One at a little distance counts: it may be intended.
+    # A vertex at a small distance counts: it may be intended.
     assert Subject(Actor(cube([20.0, 0.0, 0.0]))).size() == pytest.approx(np.sqrt(400 + 16 + 16))
 
 

@@ -167,7 +167,7 @@ def test_a_short_rest_above_the_ground_is_no_floating() -> None:
     assert found(np.where((_K >= 40) & (_K < 47), 0.05, 0.0), 0.0) == []
 
 
-def test_a_body_that_floats_and_turns_has_no_ground() -> None:
+def test_a_body_that_floats_and_rotates_has_no_ground() -> None:
     rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
     (note,) = found(rises, 0.0)
     assert told([note.diagnostic]) == [("C013.no-height", {})]

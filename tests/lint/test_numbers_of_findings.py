@@ -147,7 +147,7 @@ def test_seams_are_not_borders() -> None:
 
 
 def test_low_confidence_is_counted_over_the_frames_that_see_a_keypoint() -> None:
-    """Low in 3 of the 10 frames that see it; in 3 of 60, which is 5 %; and in 1 of 2."""
+    """Low in 3 of the 10 frames in which it is seen; in 3 of 60, which is 5 %; and in 1 of 2."""
 
     def change(points: np.ndarray) -> None:
         points[10:, 0, 3] = 0.0

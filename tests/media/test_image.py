@@ -1,4 +1,4 @@
-"""Images decoded together: contents, errors in their place, and a common limit of pixels."""
+"""Images decoded together: contents, errors in order, and a common limit of pixels."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
 """PNG files contain exactly the given pixels when read by Pillow."""
 
 import io
+import sys
 
 import numpy as np
 import pytest
@@ -32,5 +33,13 @@ def test_opaque_png_has_no_alpha(size: tuple[int, int]) -> None:
 
 def test_png_of_a_view_into_a_larger_array_is_correct() -> None:
     pixels = noise(20, 40, seed=2)[::-1, 3:33]
+    with Image.open(io.BytesIO(encode_png(pixels))) as picture:
+        np.testing.assert_array_equal(np.array(picture), pixels)
+
+
+def test_png_without_isal_holds_every_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "isal", None)
+    monkeypatch.setitem(sys.modules, "isal.isal_zlib", None)
+    pixels = noise(20, 30, seed=3)
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         np.testing.assert_array_equal(np.array(picture), pixels)

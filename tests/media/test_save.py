@@ -58,7 +58,7 @@ def test_save_applies_the_umask_to_a_new_file(tmp_path, mask, mode):
     before = os.umask(mask)
     try:
         save_bytes(tmp_path / "a.skel", b"new")
-        assert os.umask(mask) == mask  # and leaves the mask itself alone
+        assert os.umask(mask) == mask  # and leaves the mask itself unchanged
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "a.skel").stat().st_mode) == mode

@@ -205,7 +205,7 @@ def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, 
     for frame in range(8):
         pixels = still.copy()
         pixels[20:50, 10 * frame : 10 * frame + 6] = (200, 30, 20, 255)
-        if not transparent:  # so many colours that the palette is full
+        if not transparent:  # enough colours to fill the palette
             noise = np.random.default_rng(frame).integers(0, 255, (4, 20, 3))
             pixels[30:34, 40:60, :3] = noise
         frames.append(pixels)

@@ -114,7 +114,7 @@ def test_perspective_matrix_has_its_textbook_entries():
 
 
 def test_perspective_projects_a_known_point_correctly():
-    """3 ahead and 1.5 up at 45 degrees half angle is half way up; 1 right of it a third."""
+    """3 ahead and 1.5 up at a half angle of 45 degrees is halfway up; 1 to the right is a third."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     np.testing.assert_allclose(project(camera, [1.0, 1.5, 1.0])[0, :2], [1 / 3, 0.5], atol=1e-9)
     np.testing.assert_allclose(

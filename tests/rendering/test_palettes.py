@@ -127,6 +127,6 @@ def test_colour_conversions():
     np.testing.assert_allclose(decode_srgb(encode_srgb(values)), values, atol=1e-4)
     assert decode_srgb(np.array(0.5)) == pytest.approx(0.21404114)
     assert encode_srgb(np.array([-1.0, 2.0])).tolist() == [0.0, pytest.approx(1.0)]
-    # White, and red as Ottosson 2020 gives it.
+    # White, and red with the values of Ottosson 2020.
     np.testing.assert_allclose(oklab(np.ones(3)), [1, 0, 0], atol=1e-3)
     np.testing.assert_allclose(oklab(np.array([1.0, 0, 0])), [0.628, 0.2249, 0.1258], atol=1e-3)

@@ -1,4 +1,4 @@
-"""Auxiliary joints are in no list, label or count; what they move is their ancestor's."""
+"""Auxiliary joints are in no list, label or count; their vertices count as the ancestor's."""
 
 from dataclasses import replace
 

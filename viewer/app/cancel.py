@@ -38,6 +38,7 @@ def cancel(state: AppState) -> None:
     elif manual.topic:
         manual.topic = ""
     elif files.loader is not None:
+        files.loader.cancel()
         files.loader = None
         state.say_status("Opening cancelled")
     elif state.job is not None and state.job.can_cancel:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 
-import imgui_bundle
 from imgui_bundle import imgui
 
-__all__ = ["apply_theme", "change_scale", "set_theme"]
+from viewer.rendering.overlay.typeface import interface_font, system_fonts
+
+__all__ = ["add_system_fonts", "apply_theme", "change_scale", "lacks_letters", "set_theme"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
 # Colours by use: dark theme, light theme.
 _COLORS = {
     "panel": ((0.125, 0.135, 0.15, 1.0), (0.945, 0.95, 0.955, 1.0)),
-    "popup": ((0.11, 0.12, 0.135, 0.98), (0.985, 0.985, 0.99, 0.98)),
+    "popup": ((0.11, 0.12, 0.135, 1.0), (0.985, 0.985, 0.99, 1.0)),
     "title": ((0.09, 0.10, 0.11, 1.0), (0.87, 0.88, 0.895, 1.0)),
     "tab": ((0.11, 0.12, 0.135, 1.0), (0.88, 0.89, 0.905, 1.0)),
     "frame": ((0.20, 0.22, 0.25, 1.0), (0.855, 0.865, 0.88, 1.0)),
@@ -64,8 +65,8 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     theme : str
         ``"dark"`` or ``"light"``.
     """
-    font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
-    if font.is_file():
+    font = interface_font()
+    if font is not None:
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
     # A click on a number that can be dragged begins to type it.
     imgui.get_io().config_drag_click_to_input_text = True
@@ -82,6 +83,24 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     style.grab_min_size = 8.0
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale
+
+
+def lacks_letters(texts: Iterable[str]) -> bool:
+    """Return whether the current font lacks a letter of some texts."""
+    font = imgui.get_io().fonts.fonts[0]
+    letters = {letter for text in texts if not text.isascii() for letter in text}
+    return not all(font.is_glyph_in_font(ord(letter)) for letter in letters)
+
+
+def add_system_fonts() -> None:
+    """Complete the font with those of the system, for Chinese, Arabic and other scripts.
+
+    The files are large, so this is done after the first pictures of a window.
+    """
+    for path in system_fonts():
+        config = imgui.ImFontConfig()
+        config.merge_mode = True
+        imgui.get_io().fonts.add_font_from_file_ttf(str(path), _FONT_POINTS, config)
 
 
 def change_scale(old: float, new: float) -> None:

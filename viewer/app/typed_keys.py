@@ -1,20 +1,30 @@
-"""Filter for keys that only type a character, which bypass ImGui's queue during text input.
+"""Input between two frames: keys that only type a character, shortcuts, and clicks.
 
 ImGui spreads the press and release of a key over two frames, so that no press is lost, and delays
 all later input. On a slow machine, typed text would appear at one or two characters per frame.
 Characters arrive as separate events, so a text field needs no key events for letters and digits.
 Keys with an effect, such as Enter, Backspace and Ctrl+A, and the mouse stay in the queue, so that a
 press and release within one frame still works.
+
+ImGui sees modifiers at the end of a frame's events. If the modifier of a shortcut is released in
+the frame in which its key was pressed, as happens on a slow machine, the shortcut would be lost.
 """
 
 from __future__ import annotations
 
-__all__ = ["TypedKeys"]
+from typing import Any
+
+from imgui_bundle import imgui
+
+__all__ = ["TypedKeys", "end_frame_before", "end_frame_before_click"]
 
 _PRINTABLE = range(32, 163)  # GLFW's keys from Space to World 2
 _KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
 _RELEASE, _PRESS = 0, 1
 _CTRL, _ALT, _SUPER = 0x2, 0x4, 0x8
+_MODIFIERS = range(340, 348)  # GLFW's keys from left Shift to right Super
+# No keyboard has this key. ImGui ends a frame's events at the second event of the same key.
+_SEPARATOR = imgui.Key.gamepad_back
 
 
 class TypedKeys:
@@ -44,3 +54,40 @@ class TypedKeys:
         if action == _PRESS:
             self._left_out.add(key)
         return False
+
+
+def end_frame_before(queue: Any, key: int, action: int) -> None:
+    """Let the events before a modifier's release have a frame of their own.
+
+    Parameters
+    ----------
+    queue : sequence
+        ImGui's queue of input events, to which the release has not been added yet.
+    key, action : int
+        Arguments of GLFW's key callback.
+    """
+    if action == _RELEASE and key in _MODIFIERS:
+        end_frame(queue)
+
+
+def end_frame_before_click(queue: Any, action: int) -> None:
+    """Let the motion before a press of a mouse button have a frame of its own.
+
+    Tabs and other widgets that may overlap react only if they were hovered in an earlier frame.
+
+    Parameters
+    ----------
+    queue : sequence
+        ImGui's queue of input events, to which the press has not been added yet.
+    action : int
+        Argument of GLFW's mouse button callback.
+    """
+    if action == _PRESS:
+        end_frame(queue)
+
+
+def end_frame(queue: Any) -> None:
+    """Let ImGui process the events of its queue, if there are any, before later ones."""
+    if len(queue):
+        for is_down in (True, False):
+            imgui.get_io().add_key_event(_SEPARATOR, is_down)

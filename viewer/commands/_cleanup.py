@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import re
+from typing import TYPE_CHECKING
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.loading.cleaning import CleanUp
+from viewer.loading.cleaning_settings import CleanUp
 from viewer.phrases import printable
-from viewer.rig.cleanup.one_euro import OneEuro
-from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+
+if TYPE_CHECKING:
+    from viewer.rig.cleanup.one_euro import OneEuro
+    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
 
 __all__ = ["add_cleanup_arguments", "clean_up_of"]
 
-_ONE_SECOND = 0  # value of --fill-gaps without a number
 _LONGEST_WINDOW = 9999
 _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "order")}
 
@@ -32,19 +34,10 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         help="IDs of tracks that belong to one person, who keeps ID A; may be repeated",
     )
     group.add_argument(
-        "--fill-gaps",
-        nargs="?",
-        type=_longest,
-        const=_ONE_SECOND,
-        metavar="N",
-        help="interpolate gaps of up to N frames (default: one second); longer ones remain, see "
-        "--gaps of viewer convert",
-    )
-    group.add_argument(
         "--smooth",
         nargs="?",
         type=_filter,
-        const=SavitzkyGolay(),
+        const="savgol",
         metavar="FILTER",
         help="smooth rotations and translations: savgol (default), savgol:window=7,order=2 (an odd "
         "number of frames, the degree), one-euro or one-euro:cutoff=3,beta=2 (Hz; Hz per rad/s and "
@@ -111,16 +104,6 @@ def _people(text: str) -> tuple[int, ...]:
     return people
 
 
-def _longest(text: str) -> int:
-    """Return the length of the longest gap in frames."""
-    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
-        raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or no value and the files before the option, found "
-            f"{printable(text, 60)}"
-        )
-    return int(text)
-
-
 def _filter(text: str) -> OneEuro | SavitzkyGolay:
     """Return a filter by name, with parameters after a colon."""
     name, _, rest = text.partition(":")
@@ -142,6 +125,8 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
 
 
 def _one_euro(values: dict[str, float]) -> OneEuro:
+    from viewer.rig.cleanup.one_euro import OneEuro
+
     found = OneEuro(**values)
     if min(found.cutoff, found.speed_cutoff) <= 0.0:
         raise argparse.ArgumentTypeError("one-euro: expected cutoffs above 0 Hz, found 0")
@@ -149,6 +134,8 @@ def _one_euro(values: dict[str, float]) -> OneEuro:
 
 
 def _savgol(values: dict[str, float]) -> SavitzkyGolay:
+    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+
     window, order = values.get("window", 0.0), values.get("order", 2.0)
     is_odd = window % 2 == 1 and 3 <= window <= _LONGEST_WINDOW
     if "window" in values and not is_odd:

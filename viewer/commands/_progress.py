@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import time
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from viewer.phrases import printable
+from viewer.progress import receiving
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -23,6 +26,7 @@ class Progress:
 
     def __init__(self, title: str, total: int) -> None:
         self.title, self.total = title, total
+        self._unit = ""
         self._due = time.monotonic() + _FIRST
         self._bar: Bar | None = None
 
@@ -35,10 +39,20 @@ class Progress:
         title = printable(self.title, 60)
         if self._bar is None:
             self._bar = _bar()
-            self._bar.add_task(title, total=self.total, completed=done)
             self._bar.start()
-        task = self._bar.task_ids[0]
-        self._bar.update(task, description=title, total=self.total, completed=done, refresh=True)
+        # A bar cannot lose a known total, so new work gets a new one.
+        for task in self._bar.tasks:
+            if (task.description, task.total) != (title, self.total or None):
+                self._bar.remove_task(task.id)
+        if not self._bar.tasks:
+            self._bar.add_task(title, total=self.total or None, completed=done, unit=self._unit)
+        self._bar.update(self._bar.task_ids[0], completed=done, refresh=True)
+
+    def receive(self, done: int, total: int, unit: str, what: str) -> None:
+        """Update the bar to reported progress; see ``viewer.progress``."""
+        self.title = what or self.title
+        self.total, self._unit = total, unit
+        self.show(done)
 
     def __enter__(self) -> Progress:
         return self
@@ -46,6 +60,13 @@ class Progress:
     def __exit__(self, *_: object) -> None:
         if self._bar is not None:
             self._bar.stop()
+
+
+@contextlib.contextmanager
+def shown_progress(title: str) -> Iterator[None]:
+    """Show the progress that the work in the block reports."""
+    with Progress(title, 0) as progress, receiving(progress.receive):
+        yield
 
 
 def _bar() -> Bar:
@@ -57,6 +78,7 @@ def _bar() -> Bar:
         progress.TextColumn("{task.description}", markup=False),
         progress.BarColumn(),
         progress.MofNCompleteColumn(),
+        progress.TextColumn("{task.fields[unit]}", markup=False),
         progress.TimeRemainingColumn(),
         console=Console(stderr=True),
         transient=True,

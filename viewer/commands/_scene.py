@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
 import re
 import sys
 from collections.abc import Iterable, Sequence
@@ -11,30 +10,30 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import clean_up_of
+from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
-from viewer.commands._progress import Progress
+from viewer.commands._progress import shown_progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, ViewerError
-from viewer.formats import SUFFIXES
+from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
-from viewer.loading.cleaning import CleanUp, clean_up
-from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
-from viewer.near_names import did_you_mean
-from viewer.phrases import printable
+from viewer.loading.cleaning_settings import CleanUp
+from viewer.models import resolve
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
 from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.retargeting.joint_map import JointMap
 
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
 
 _DEFAULT = "the bundled figure"
 _MOST_MODELS = 12  # names in a message
-_SLOW_BYTES = 60e6  # bytes; takes about a second to read
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
@@ -77,10 +76,19 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         metavar="SIZE",
         help="refuse larger files, with k, M or G (default: 2G)",
     )
+    group.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="parse all numbers anew, without the arrays that earlier runs kept (see doctor)",
+    )
 
 
-def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that control how captures and BVH are read."""
+def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
+    """Add the options that control how captures and BVH are read.
+
+    ``parser``: parser of a command.
+    ``gaps``: how the command handles gaps, see ``add_gap_arguments``.
+    """
     group = parser.add_argument_group("captures and BVH")
     _add_driving_arguments(group)
     group.add_argument(
@@ -103,9 +111,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show a BVH next to the figures instead of driving one",
     )
-    group.add_argument(
-        "--interpolate-gaps", action="store_true", help="interpolate gaps in captures"
-    )
+    add_gap_arguments(group, gaps)
 
 
 def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
@@ -132,6 +138,13 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         help="rest pose of a skeleton that drives a figure: frame N, the file's zero pose, or "
         "auto: the zero pose if it is a standing pose, otherwise a frame in a T- or A-pose, "
         "otherwise estimated from the motion (default: auto)",
+    )
+    group.add_argument(
+        "--joint-map",
+        metavar="FILE",
+        help="joints of the driven figure and the joints that drive them, one pair per line, as in "
+        "LeftUpLeg = lThigh; others are matched by name (convert --save-joint-map writes such a "
+        "file)",
     )
 
 
@@ -184,6 +197,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
 
     Raises ViewerError if there are both a video and a folder of images.
     """
+    from viewer.models import family_model
+
     if arguments.video is not None and arguments.images is not None:
         raise ViewerError("--video and --images: expected one of them, found both")
     model = None if arguments.model is None else resolve(arguments.model)
@@ -195,6 +210,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         space=arguments.space or "",
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
+        joint_map=_joint_map(arguments),
         find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
@@ -210,15 +226,28 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
     )
 
 
+def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
+    """Return the requested match of joints; raises FormatError if its file cannot be read."""
+    if arguments.joint_map is None:
+        return None
+    from viewer.formats._text.joint_map import read_joint_map
+
+    return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
+
+
 def size_limit(arguments: argparse.Namespace) -> int:
     """Return the file size limit in bytes."""
-    return _parse_bytes(arguments.max_size)
+    return parse_bytes(arguments.max_size)
 
 
-def _parse_bytes(text: str) -> int:
+def parse_bytes(text: str, option: str = "--max-size") -> int:
+    """Return the number of bytes that an option gives, such as ``2G``.
+
+    Raises ViewerError if the text is no such number.
+    """
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
-        raise ViewerError(f'--max-size: expected a number with k, M or G, found "{text}"')
+        raise ViewerError(f'{option}: expected a number with k, M or G, found "{text}"')
     return int(found[1]) * _UNITS.get(found[2].lower(), 1)
 
 
@@ -245,6 +274,8 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
 
 def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
     """Clean up captured motions in place, and print the changes unless they are the output."""
+    from viewer.loading.cleaning import clean_up
+
     stream = sys.stdout if output is None else summary_stream(output)
     for note in clean_up(scene, changes):
         print(note, file=stream)
@@ -252,6 +283,8 @@ def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
 
 def finish(builder: Builder, scene: Scene) -> None:
     """Read a capture to its end, with a progress bar in a terminal, and print warnings."""
+    from viewer.commands._progress import Progress
+
     notes: list[Diagnostic] = []
     with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
         while not builder.is_done:
@@ -266,13 +299,16 @@ def finish(builder: Builder, scene: Scene) -> None:
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     """Load enough for a first image, without posing the scene, and print warnings."""
     if arguments.model_path is not None:
+        from viewer.models import save_model_folder
+
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
-    _announce(files)
     settings = motion_settings(arguments)
     try:
-        contents = read_files(files or bundled_files(), _parse_bytes(arguments.max_size), settings)
-        scene, builders = begin(contents, settings)
+        with shown_progress("reading"):
+            limit = parse_bytes(arguments.max_size)
+            contents = read_files(files or bundled_files(), limit, settings)
+            scene, builders = begin(contents, settings)
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
         raise _with_models(problem, named) from None
@@ -282,6 +318,9 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
 
 def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     """Add the names of available models to an error about an unknown name."""
+    from viewer.models import known_models, load_model_folder
+    from viewer.near_names import did_you_mean
+
     folder = load_model_folder()
     missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
     if not missing or folder is None or len(problem.path.parts) != 1:
@@ -293,18 +332,8 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     return FormatError(Diagnostic(key, problem.path, values=values))
 
 
-def _announce(files: Sequence[str | Path]) -> None:
-    """In a terminal, print a message about files that take longer than a second to read."""
-    if not sys.stderr.isatty():
-        return
-    for file in files:
-        with contextlib.suppress(OSError, ValueError):  # reported by the reader
-            size = Path(file).stat().st_size
-            if size > _SLOW_BYTES:
-                print(f"reading {printable(file)} ({size / 1e6:.0f} MB) …", file=sys.stderr)
-
-
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line per warning to the error stream."""
+    """Print one line per warning to the error stream, unless the run is recorded."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        if not note_found(warning):
+            print(f"warning: {warning}", file=sys.stderr)

@@ -15,6 +15,7 @@ from viewer.commands._pose import (
     add_skinning_arguments,
     skinning_of,
 )
+from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
@@ -33,8 +34,10 @@ from viewer.commands._writing.motion_export import (
     write_motions,
     writes_keys,
 )
+from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
 from viewer.export._motion_paths import motion_paths
@@ -66,10 +69,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
+    add_joint_map_argument(group)
     add_motion_arguments(parser)
     add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
-    add_capture_arguments(parser)
+    add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
     add_pose_arguments(parser)
     add_skinning_arguments(parser)
@@ -90,7 +94,10 @@ def run(arguments: argparse.Namespace) -> int:
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    notes = [*write(arguments, scene, output, skinning), *baked]
+    with saving_joint_map(arguments, scene), shown_progress("converting"):
+        notes = [*write(arguments, scene, output, skinning), *baked]
+    for note in notes:
+        note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

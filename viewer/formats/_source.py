@@ -15,6 +15,7 @@ from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
 from viewer.formats._text.numbers import word_begins
+from viewer.progress import report_bytes
 from viewer.rig.arrays import Ints
 
 __all__ = ["MAX_SIZE", "Source", "read_bytes"]
@@ -101,7 +102,10 @@ class Source:
     def data(self) -> bytes:
         """The whole file, without a UTF-8 byte order mark and a final Ctrl-Z; read once."""
         if self._data is None:
+            name = f"reading {self.path.name}"
+            report_bytes(0, 0, name)
             self._data = _without_marks(read_bytes(self.path, self.max_size))
+            report_bytes(0, len(self._data), name)
         return self._data
 
     def option(self, name: str) -> str:

@@ -10,20 +10,19 @@ from typing import TYPE_CHECKING
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
-from viewer.loading.additions import apply_pose
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.covering import with_texture
 from viewer.loading.placing import place_side_by_side, placed_views, stand_up
 from viewer.loading.settings import MotionSettings
+from viewer.loading.unused_options import unused_options
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import first_person_parts
-from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.posing.pose_record import PoseRecord
 
 __all__ = ["assemble", "begin"]
 
@@ -95,6 +94,7 @@ def begin(
         _switch_on_springs(cast, world_up)
     place_side_by_side(cast)
     cast.views += placed_views(cast)
+    _note_unused_options(contents, cast, settings or MotionSettings())
     found = (*contents.diagnostics, *cast.diagnostics)
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
@@ -137,7 +137,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.drives and _has_bare_motion(cast):
         from viewer.loading.figure_motions import drive_by_figures
 
-        if drive_by_figures(cast, wanted):
+        if drive_by_figures(cast, wanted, settings.joint_map):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate
@@ -149,6 +149,16 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         start = time_span(cast.actors)[0]
         for actor in cast.actors:
             pose_actor(actor, start)
+
+
+def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
+    """Record the options that had no effect."""
+    if contents.used_options is None:
+        return
+    used = contents.used_options | cast.used_options
+    if any(actor.drive is not None for actor in cast.actors):
+        used.add("joint-map")
+    cast.diagnostics += unused_options(settings, used)
 
 
 def _has_bare_motion(cast: Cast) -> bool:
@@ -203,6 +213,8 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 
 def _give_morphs(contents: Contents, cast: Cast) -> None:
     """Give all blend shape targets to the first mesh with their vertex count."""
+    if not contents.morphs:
+        return
     actors = cast.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 
@@ -228,6 +240,8 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
     """Apply a pose to the first actor that it matches."""
+    from viewer.loading.additions import apply_pose
+
     problem: FormatError | None = None
     for actor in actors:
         if actor.pose is not None:
@@ -240,6 +254,8 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     """Apply a texture to the first actor that can show it and has none."""
+    from viewer.loading.covering import with_texture
+
     open_for_it = [
         actor
         for actor in actors

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.carrying import carried_clip
+from viewer.loading.carrying import carrying_drive
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -24,6 +24,9 @@ from viewer.rig.motion.parameter_clip import parameter_clip
 from viewer.rig.motion.sampled_clip import SampledClip, joined
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
 
 __all__ = ["Builder", "joined_points", "joined_timing"]
@@ -71,6 +74,9 @@ class Builder:
         Figure with other joints that the bodies move instead of the model.
     swings : bool
         Whether the spring joints of later people are simulated.
+    joint_map : JointMap or None
+        Joints of the target and the joints of the model that drive them; None to match them by
+        name.
     """
 
     capture: Capture
@@ -86,7 +92,9 @@ class Builder:
     path: Path | None = None
     target: Figure | None = None
     swings: bool = False
+    joint_map: JointMap | None = None
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
+    _has_parameters: bool = False
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -130,9 +138,10 @@ class Builder:
         notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
+        self._has_parameters |= bool(part.parameters)
         shown = part.parameters if self.model.parameters is not None else {}
         for person, parameters in sorted(shown.items(), key=_order):
-            self._add_clip(person, parameter_clip(parameters, self.model), new)
+            notes += self._add_driven(person, parameter_clip(parameters, self.model), new)
         points = {person: both for person, both in part.points.items() if person not in shown}
         for person, (layout, clip) in sorted(points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
@@ -147,7 +156,11 @@ class Builder:
         return new, [*reversed(fresh.values())]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """At the end, return a message if bodies have the mean shape because none was given."""
+        """At the end, return messages about bodies without a shape, and a model without bodies."""
+        if self.is_done and self.target is not None and not self._bodies:
+            key = "F007.model-of-parameters" if self._has_parameters else "F007.model-of-points"
+            values = {"member": self.capture.model}
+            return [Diagnostic(key, self.path, values=values)]
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
@@ -161,25 +174,41 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)
-        if self.target is not None:
-            clip, more = carried_clip(self.model, clip, self.up, self.target)
-            notes += more
-        self._add_clip(person, clip, new)
+        notes += self._add_driven(person, clip, new)
         return [replace(note, path=self.path) for note in notes]
 
-    def _add_clip(self, person: int, clip: SampledClip, new: list[Actor]) -> None:
-        """Append a clip to that of a person, or add an actor."""
+    def _add_driven(self, person: int, clip: SampledClip, new: list[Actor]) -> list[Diagnostic]:
+        """Append a clip of the model, or the motion of the target that it drives."""
+        if self.target is None:
+            self._add_clip(person, clip, new)
+            return []
+        drive = self._drive(clip)
+        found, notes = driven_clip(drive, self.target)
+        self._add_clip(person, found, new, drive)
+        return [replace(note, path=self.path) for note in notes]
+
+    def _drive(self, clip: SampledClip) -> Drive:
+        return carrying_drive(self.model, clip, self.up, self.joint_map)
+
+    def _add_clip(
+        self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
+    ) -> None:
+        """Append a clip to that of a person, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
             if self.target is None:
                 actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
+            actor.drive = drive
             self._bodies[person] = actor
             new.append(actor)
         else:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
-            timing = joined_timing(actor.clip.timing, clip.timing, actor.clip.n_rows)
-            actor.clip = joined([actor.clip, clip], timing)
+            actor.clip = _extended(actor.clip, clip)
+            if drive is not None and actor.drive is not None:
+                motion = actor.drive.motion
+                motion = replace(motion, clip=_extended(motion.clip, drive.motion.clip))
+                actor.drive = replace(actor.drive, motion=motion)
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]
@@ -242,17 +271,20 @@ class Builder:
         then.
         """
         notes: list[Diagnostic] = []
-        clips: list[tuple[Actor, SampledClip]] = []
+        clips: list[tuple[Actor, SampledClip, Drive]] = []
         for actor in self._bodies.values():
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
-            clip, said = carried_clip(self.model, actor.clip, self.up, target)
-            clips.append((actor, clip))
+            drive = self._drive(actor.clip)
+            clip, said = driven_clip(drive, target)
+            clips.append((actor, clip, drive))
             notes += said
         self.target = target
-        for actor, clip in clips:
+        for actor, clip, drive in clips:
             actor.figure, actor.clip, actor.color = target, clip, None
+            actor.drive = drive
             actor.pose = figure_pose(target)
             pose_actor(actor, 0.0)
+        notes += self._shape_notes()
         fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
         self._notes.update(str(note) for note in fresh.values())
         return [*reversed(fresh.values())]
@@ -268,6 +300,11 @@ def _order(item: tuple[int, object]) -> tuple[bool, int]:
     """Return a sort key of people: by number, untracked ones last."""
     person = item[0]
     return not is_tracked(person), abs(person)
+
+
+def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
+    """Return one clip of the rows of two with the same timeline."""
+    return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
 
 
 def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
+from viewer.loading.cleaning_settings import CleanUp
 from viewer.loading.merging import merge_people
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
@@ -19,7 +20,7 @@ from viewer.rig.cleanup.gap_filling import interpolate_gaps
 from viewer.rig.cleanup.one_euro import OneEuro
 from viewer.rig.cleanup.resampling import resampled
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
-from viewer.rig.cleanup.smoothing import smoothed
+from viewer.rig.cleanup.smoothing import run_lengths, smoothed
 from viewer.rig.cleanup.trimming import trimmed
 from viewer.rig.inspection.resting_height import resting_height
 from viewer.rig.motion.evaluation import pose_actor
@@ -35,46 +36,6 @@ __all__ = ["CleanUp", "clean_up"]
 Smoothing = OneEuro | SavitzkyGolay
 
 _ROUNDING = 1e-9  # scene or figure units
-
-
-@dataclass(frozen=True, slots=True)
-class CleanUp:
-    """Requested changes of captured motions, in the order in which they are made.
-
-    Attributes
-    ----------
-    merged : tuple of tuple of int
-        Numbers of people whose tracks belong to one person, who keeps the first number.
-    interpolates : bool
-        Whether gaps are interpolated.
-    longest_gap : int or None
-        Longest gap to interpolate, frames; None for one second.
-    smoothing : OneEuro, SavitzkyGolay or None
-        The filter.
-    locks_feet : bool
-        Whether feet that stand are held in place.
-    grounds : bool
-        Whether people are moved up or down until their feet rest at height 0.
-    frames : (int or None, int or None) or None
-        First frame to keep and the frame after the last one, with the numbers of the file; None for
-        the motion's own ends.
-    rate : float or None
-        New frames per second.
-    """
-
-    merged: tuple[tuple[int, ...], ...] = ()
-    interpolates: bool = False
-    longest_gap: int | None = None
-    smoothing: Smoothing | None = None
-    locks_feet: bool = False
-    grounds: bool = False
-    frames: tuple[int | None, int | None] | None = None
-    rate: float | None = None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing is requested."""
-        return self == CleanUp()
 
 
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
@@ -111,6 +72,9 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
             continue
         actor.clip, said = _cleaned(scene, actor, clip, wanted)
         notes += said
+        if actor.drive is not None:
+            again = partial(_cleaned_again, scene, actor, wanted)
+            actor.drive = replace(actor.drive, finish=again)
     time = _start(scene.actors) if scene.time is None else scene.time
     for actor in scene.actors:
         pose_actor(actor, time)
@@ -122,8 +86,14 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
 def _cleaned_in(in_space: Callable[[str], Scene], wanted: CleanUp, space: str) -> Scene:
     """Return a scene in another space, cleaned up in the same way."""
     scene = in_space(space)
-    clean_up(scene, wanted)
+    scene.diagnostics = (*scene.diagnostics, *clean_up(scene, wanted))
     return scene
+
+
+def _cleaned_again(scene: Scene, actor: Actor, wanted: CleanUp, clip: SampledClip) -> SampledClip:
+    """Return a motion that was retargeted again, cleaned up in the same way."""
+    found = _cleaned(scene, replace(actor, clip=clip), clip, wanted)[0]
+    return found if isinstance(found, SampledClip) else clip
 
 
 def _start(actors: Iterable[Actor]) -> float:
@@ -157,7 +127,7 @@ def _cleaned(
 
 def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured, Diagnostic]:
     found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
-    values = {"filter": _filter_phrase(chosen, clip.timing.frame_rate)}
+    values = {"filter": _filter_phrase(chosen, clip)}
     return found, _note("X006.smoothed", actor, values, clip, found)
 
 
@@ -215,19 +185,9 @@ def _trimmed(
     actor: Actor, clip: Captured, frames: tuple[int | None, int | None]
 ) -> tuple[Captured, Diagnostic]:
     timing = clip.timing
-    first = 0 if frames[0] is None else frames[0] - timing.first_frame
-    stop = timing.n_frames if frames[1] is None else frames[1] - timing.first_frame
-    if not 0 <= first < stop <= timing.n_frames:
-        low, high = timing.first_frame, timing.first_frame + timing.n_frames
-        asked = ":".join("" if end is None else str(end) for end in frames)
-        raise RigError(
-            f"frames to keep: expected a range within {low}:{high} (frames {low} to {high - 1}), "
-            f"found {asked}"
-        )
-    found = trimmed(clip, first, stop)
-    number = found.timing.first_frame
-    values = {"first": number, "last": number + stop - first - 1, "n": stop - first}
-    values["all"] = timing.n_frames
+    found = trimmed(clip, *frames)
+    number, count = found.timing.first_frame, found.timing.n_frames
+    values = {"first": number, "last": number + count - 1, "n": count, "all": timing.n_frames}
     return found, Diagnostic("X006.trimmed", values={"figure": actor.name, **values})
 
 
@@ -256,10 +216,17 @@ def _interpolated(
     return clip, notes
 
 
-def _filter_phrase(chosen: Smoothing, rate: float) -> Phrase:
+def _filter_phrase(chosen: OneEuro | SavitzkyGolay, clip: Captured) -> Phrase:
+    """Return the filter with the windows that were used, which are shorter in short runs."""
     if isinstance(chosen, OneEuro):
         return Phrase("one-euro", cutoff=chosen.cutoff, beta=chosen.beta)
-    return Phrase("savgol", n=chosen.frames(rate), order=chosen.order)
+    rate = clip.timing.frame_rate
+    used = [chosen.used_frames(count, rate) for count in run_lengths(clip)]
+    windows = sorted(set(filter(None, used)))
+    values = {"order": chosen.order, "n": windows[-1] if windows else chosen.frames(rate)}
+    shortest = windows[0] if len(windows) > 1 else 0
+    left = Phrase("savgol-short", n=used.count(0)) if 0 in used else ""
+    return Phrase("savgol", **values, shortest=shortest, left=left)
 
 
 def _note(

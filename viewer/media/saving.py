@@ -5,23 +5,22 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import shutil
 import stat
-import tempfile
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
 from viewer.media.unfinished import note_unfinished
 from viewer.phrases import printable
+from viewer.progress import report_bytes
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
@@ -32,6 +31,7 @@ __all__ = [
     "keeping_written",
     "save_arrays",
     "save_bytes",
+    "save_parts",
     "save_text",
 ]
 
@@ -100,6 +100,8 @@ def save_text(path: str | Path, text: str) -> None:
 
 def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
+    import zipfile
+
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
@@ -129,23 +131,34 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     OutputError
         If it cannot be written; the message gives the path and the system's reason.
     """
+    save_parts(path, [data])
+
+
+def save_parts(path: str | Path, parts: Iterable[bytes]) -> None:
+    """Write a file part by part, so that its content need not exist at once; see ``save_bytes``.
+
+    Errors of the iterable leave the file unchanged.
+    """
     hold()  # a signal that arrives after the rename must not turn success into failure
     poll()
     path = Path(path)
     kept = _written.get()
+    if kept is not None or is_stdout(path):
+        parts = [b"".join(parts)]
     if kept is not None:
-        kept[path] = data
+        (kept[path],) = parts
     if is_stdout(path):
-        write_stdout(path, data)
+        write_stdout(path, *parts)
         return
     try:
         mode = _mode(path)
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "is a folder")
         if not stat.S_ISREG(mode):
-            _write_through(path, data)  # not resolved: /dev/stdout may lead to a nameless pipe
+            _write_through(path, parts)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
-            _replace(path.resolve(), data, stat.S_IMODE(mode))
+            _replace(path.resolve(), parts, stat.S_IMODE(mode))
+            note_output(path)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
@@ -186,6 +199,8 @@ class Replacement:
 
     def begin(self) -> Path:
         """Create the temporary file, with the target's suffix, and return its path."""
+        import tempfile
+
         target = self._target
         try:
             handle, name = tempfile.mkstemp(
@@ -212,6 +227,7 @@ class Replacement:
             self.discard()
             raise self.error(problem) from None
         self.temporary = None
+        note_output(self.path)
         return size
 
     def discard(self) -> None:
@@ -285,6 +301,9 @@ def _keep_copy(path: Path, copies: _Copies) -> None:
 
 
 def _copy(target: Path) -> Path:
+    import shutil
+    import tempfile
+
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     os.close(handle)
     try:
@@ -306,20 +325,22 @@ def _mode(target: Path) -> int:
         return stat.S_IFREG | (0o666 & ~mask)
 
 
-def _write_through(target: Path, data: bytes) -> None:
+def _write_through(target: Path, parts: Iterable[bytes]) -> None:
     # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
     # forever, so signals must be able to interrupt it.
     with raising(), target.open("wb") as stream:
-        stream.write(data)
+        _write_parts(stream, parts, target.name)
 
 
-def _replace(target: Path, data: bytes, permissions: int) -> None:
+def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
+    import tempfile
+
     _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            _write_parts(stream, parts, target.name)
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
@@ -329,6 +350,15 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
         with contextlib.suppress(OSError):
             Path(name).unlink()
         raise
+
+
+def _write_parts(stream: BinaryIO, parts: Iterable[bytes], name: str) -> None:
+    written = 0
+    for part in parts:
+        poll()
+        stream.write(part)
+        written += len(part)
+        report_bytes(written, 0, f"writing {name}")
 
 
 def _require_folder(target: Path) -> None:

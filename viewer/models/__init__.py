@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
-from viewer.formats import save_bytes
 from viewer.interrupts import deferred
 from viewer.phrases import printable
 
@@ -57,6 +56,8 @@ def _settings_file() -> Path:
 
 def load_model_folder() -> Path | None:
     """Return the remembered folder; None if there is none or the setting cannot be read."""
+    import json
+
     try:
         folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
@@ -74,6 +75,10 @@ def save_model_folder(folder: str | Path) -> Path:
     OutputError
         If the setting cannot be saved.
     """
+    import json
+
+    from viewer.formats import save_bytes
+
     # The methods of Path raise for names that are too long and for unknown users.
     path = Path(os.path.expanduser(folder))  # noqa: PTH111
     if not str(folder) or not os.path.isdir(path):  # noqa: PTH112
@@ -102,8 +107,13 @@ def known_models(folder: Path) -> dict[str, Path]:
     dict
         ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
     """
+    return _named(_files(folder))
+
+
+def _named(files: Iterable[Path]) -> dict[str, Path]:
+    """Return the models among files by name, see ``known_models``."""
     found: dict[str, Path] = {}
-    for path in _files(folder):
+    for path in files:
         name = _name_of(path)
         is_better = name in found and (_is_npz(path) and not _is_npz(found[name]))
         if name is not None and (name not in found or is_better):
@@ -161,11 +171,11 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     """
     if folder is None:
         return None
-    wanted = name.lower()
-    for path in _files(folder):
+    wanted, files = name.lower(), _files(folder)
+    for path in files:
         if path.name.lower() == wanted:
             return path
-    models = known_models(folder)
+    models = _named(files)
     of_kind = [path for key, path in models.items() if key.partition(":")[0] == wanted]
     return (
         models.get(wanted)

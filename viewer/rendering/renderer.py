@@ -15,7 +15,6 @@ from viewer.rendering.camera_views import (
     frusta_of,
     reach_of,
 )
-from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs
@@ -152,14 +151,15 @@ class Renderer:
         strength : float
             Strength of shadows and occlusion, 0 to 1.
         """
+        from viewer.rendering.casters import Casters
+
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
         view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
-        casters = Casters(
-            self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
-        )
+        parts = self.programs, self.mesh_pass, self.late, self.buffers
+        casters = Casters(*parts, meshes, scene.actors, options)
         self.lighting.begin(casters, camera.up, box)
         count = n_passes(options)
         for index in range(count) if passes is None else passes:

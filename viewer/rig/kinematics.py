@@ -33,22 +33,23 @@ Indices = NDArray[np.intp]
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor to which it
-    points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n) passes (Hillis
-    and Steele 1986).
+    Pointer doubling for one pose: every pass multiplies each joint's matrix by that of the ancestor
+    to which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
+    passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by joint, which
+    takes a single product for each.
 
     Parameters
     ----------
     parents : (J,)
         Index of each joint's parent, smaller than its own; -1 for a root.
-    local : (J, 4, 4)
-        Joint-to-parent matrices.
+    local : (J, 4, 4) or (J, F, n, n)
+        Joint-to-parent matrices; of many poses, these can also be rotations alone.
     root : (4, 4), optional
         Placement of the whole figure in the world; identity if omitted.
 
     Returns
     -------
-    (J, 4, 4)
+    (J, 4, 4) or (J, F, n, n)
         Joint-to-world matrices, lengths in the unit of ``local``.
 
     >>> local = np.stack([np.eye(4)] * 2)
@@ -57,6 +58,12 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     3.0
     """
     world = local.copy()
+    if local.ndim > 3:
+        # Of many poses, a joint's matrices fill the caches: one pass, without copies.
+        for joint, parent in enumerate(parents.tolist()):
+            if parent >= 0:
+                np.matmul(world[parent], local[joint], out=world[joint])
+        return world if root is None else root @ world
     parents = np.asarray(parents, dtype=np.int32)
     is_kept = len(parents) <= _MOST_JOINTS
     for above, below in _kept_passes(parents.tobytes()) if is_kept else _passes(parents):

@@ -12,14 +12,11 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
-from viewer.rig.skinning import deform
-from viewer.rig.units import METRES
 
 __all__ = [
     "Actor",
@@ -43,6 +40,7 @@ if TYPE_CHECKING:
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.sampled_clip import SampledClip
     from viewer.rig.motion.transform_clip import TransformClip
+    from viewer.rig.retargeting.drive import Drive
 
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
@@ -98,6 +96,8 @@ class Actor:
         Parts of the mesh that are not drawn, by index.
     springs : Swinging or None
         Simulation of its spring joints while its clip plays; None leaves them to the clip.
+    drive : Drive or None
+        The motion of another skeleton from which its clip was retargeted; None for other clips.
     """
 
     figure: Figure
@@ -116,6 +116,7 @@ class Actor:
     origin: Path | None = None
     hidden_parts: frozenset[int] = frozenset()
     springs: Swinging | None = None
+    drive: Drive | None = None
 
     @property
     def title(self) -> str:
@@ -125,6 +126,8 @@ class Actor:
     @property
     def name(self) -> str:
         """Label in menus and files: the title, and the person or figure in the recording."""
+        from viewer.rig.captures.person import person_name
+
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
@@ -296,6 +299,8 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     (N, 3)
         Scene space.
     """
+    from viewer.rig.skinning import deform
+
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
@@ -331,6 +336,8 @@ def scene_unit(scene: Scene) -> str:
     str
         Key of ``viewer.rig.units.METRES``; empty if no unit is known.
     """
+    from viewer.rig.units import METRES
+
     actor = next((actor for actor in scene.actors if actor.figure.unit in METRES), None)
     if actor is None:
         return ""
@@ -341,5 +348,7 @@ def scene_unit(scene: Scene) -> str:
 
 def _unit_of(metres: float) -> str:
     """Return the unit of this length; empty if there is none."""
+    from viewer.rig.units import METRES
+
     known = (unit for unit, size in METRES.items() if math.isclose(size, metres, rel_tol=1e-6))
     return next(known, "")

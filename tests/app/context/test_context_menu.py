@@ -1,4 +1,4 @@
-"""Menus at a right click: what they offer depends on what is there, and undo covers it."""
+"""Context menus: entries for what was clicked, each of which can be undone."""
 
 from __future__ import annotations
 

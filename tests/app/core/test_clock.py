@@ -61,7 +61,7 @@ def test_clock_starts_at_the_time_of_the_scene():
     ("mode", "speed", "seconds", "shown", "playing"),
     [
         ("loop", 1.0, 1.5, 2.5, True),
-        ("loop", 1.0, 4.5, 1.5, True),  # range 1 to 5: 4.5 s on is half a second past the start
+        ("loop", 1.0, 4.5, 1.5, True),  # range 1 to 5: after 4.5 s, half a second past the start
         ("loop", 2.0, 4.5, 2.0, True),
         ("loop", -1.0, 0.5, 4.5, True),
         ("once", 1.0, 3.0, 4.0, True),
@@ -174,7 +174,7 @@ def test_every_frame_of_the_active_actor_can_be_reached():
     assert playback.time == pytest.approx(1 / 30)
     playback.follow(other)
     assert playback.frame_rate == 50.0
-    assert playback.time == pytest.approx(1 / 30)  # another choice moves nothing
+    assert playback.time == pytest.approx(1 / 30)  # choosing another range does not move the time
     playback.seek(0.0)
     times = []
     for _ in range(3):
@@ -204,7 +204,7 @@ def test_actors_are_posed_once_until_time_clips_or_gaps_change():
     playback.show(scene)
     assert playback.pose() and not playback.pose()
     playback.seek(1.0)
-    assert playback.posed_for.time == 0.0  # edits still belong to the poses of before
+    assert playback.posed_for.time == 0.0  # edits still belong to the previous poses
     assert playback.pose() and playback.posed_for.time == 1.0 and not playback.pose()
     playback.interpolate_gaps = True
     assert playback.pose() and not playback.pose()

@@ -34,7 +34,7 @@ def test_an_edited_array_element_is_a_step(watched, name):
     history, scene, options = watched
     array = getattr(scene.actors[0].pose, name)
     old = array.copy()
-    # The smallest change there is.
+    # The smallest possible change.
     array.flat[-1] = np.nextafter(array.flat[-1], 9.0)
     new = array.copy()
     assert history.observe(scene, options, busy=False)

@@ -111,7 +111,7 @@ def test_moving_the_camera_ends_the_fit(wide, move):
     assert is_fitted(wide)
     wide.key("tab")
     wide.step(3)
-    assert is_fitted(wide)  # F has taken it up again
+    assert is_fitted(wide)  # F has fitted it again
 
 
 def test_following_ends_the_fit(wide):
@@ -217,7 +217,7 @@ def test_fit_keeps_a_camera_moved_while_a_capture_loads(streaming):
     streaming.step(40)
     assert streaming.state.camera.distance == camera.distance
     assert (streaming.state.camera.target == camera.target).all()
-    assert streaming.state.box[1, 0] > 98.0  # the ground reaches as far all the same
+    assert streaming.state.box[1, 0] > 98.0  # the ground still extends as far
 
 
 @pytest.mark.parametrize("edit", ["key", "offset and key", "undo"])

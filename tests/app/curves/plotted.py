@@ -41,7 +41,7 @@ def _center(hand, label):
 
 
 def _scale(hand):
-    """Pixels per second and per degree, from where two keys are drawn."""
+    """Pixels per second and per degree, measured between two drawn keys."""
     (x0, y0), (x1, y1) = _center(hand, "key arm.x 0"), _center(hand, "key arm.x 1")
     times, values = _arm(hand).times, np.degrees(_arm(hand).values)
     return (x1 - x0) / (times[1] - times[0]), (y1 - y0) / (values[1] - values[0])

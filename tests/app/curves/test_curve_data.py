@@ -1,4 +1,4 @@
-"""What the Curves panel plots of a motion: names, numbering, and values exactly on frames."""
+"""Curves of a motion as plotted: names, numbering, and exact values on frames."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def test_curves_pass_through_frames_and_angles_are_unwrapped():
     assert_allclose(times, 5.0 + np.arange(15) / 10, atol=1e-12)
     assert_allclose(values, angles, atol=1e-12)
     assert_array_equal(sampled_points(clip, 7, 0, 99)[1], values)
-    # Whole turns about z, which is not the middle axis, do not jump back.
+    # Full rotations about z, which is not the middle axis, do not jump back.
     turns = np.zeros((40, 1, 4))
     turns[:, 0, 2], turns[:, 0, 3] = np.sin(np.arange(40) / 4), np.cos(np.arange(40) / 4)
     long = SampledClip("z", Timing(10.0, np.arange(40)), turns)

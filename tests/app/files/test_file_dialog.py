@@ -118,6 +118,19 @@ def test_dialog_opens_a_typed_file(dialog, rig):
     assert dialog.state.actor.figure.mesh is None
 
 
+def test_path_can_be_typed_as_soon_as_the_dialog_is_open(dialog, tmp_path):
+    dialog.type(str(tmp_path / "inner"))
+    dialog.key("enter")
+    dialog.step(2)
+    assert _listed(dialog) == ["inside.skel", "inside.skin"]
+
+
+def test_escape_closes_the_dialog_unless_a_path_was_typed(dialog):
+    dialog.key("escape")
+    dialog.step(2)
+    assert dialog.state.of(Files).dialog is None
+
+
 def test_dialog_keeps_its_folder_if_another_cannot_be_read(tmp_path, monkeypatch):
     dialog = FileDialog(tmp_path)
 

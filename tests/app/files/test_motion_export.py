@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import threading
 
 import numpy as np
 import pytest
 from app.captured import dots, people, walk
 
+from viewer.app.files import motion_export
 from viewer.app.files.export_formats import FOLDER
 from viewer.app.files.motion_export import (
     motion_files,
@@ -16,6 +18,8 @@ from viewer.app.files.motion_export import (
     unsuited_formats,
 )
 from viewer.app.files.state import Files
+from viewer.formats import save_bytes
+from viewer.progress import report
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
@@ -65,6 +69,29 @@ def test_menu_asks_for_a_path_and_reports_what_was_written(moving, tmp_path):
     save_motion(moving.state, tmp_path / "slide.bvh")
     moving.finish_job()
     assert any("slide.bvh" in note.text for note in moving.state.messages.notes)
+
+
+def test_cancelled_export_keeps_the_existing_file(moving, tmp_path, monkeypatch):
+    path = tmp_path / "out" / "slide.bvh"
+    path.parent.mkdir()
+    path.write_text("old")
+    reports = []
+
+    def export(animation, path, key, options):
+        save_bytes(path, b"new")
+        moving.state.job.cancel()
+        for number in range(3):
+            reports.append(number)
+            report(number, 3, "frames", "comparing with the original")
+
+    monkeypatch.setattr(motion_export, "export_animation", export)
+    gate = threading.Event()
+    monkeypatch.setattr(motion_export, "animation_for", lambda *_: (gate.wait(10), "y"))
+    save_motion(moving.state, path)
+    gate.set()
+    moving.finish_job()
+    assert reports == [0]
+    assert [(file.name, file.read_text()) for file in path.parent.iterdir()] == [(path.name, "old")]
 
 
 def test_files_that_are_open_are_never_replaced(moving, tmp_path):

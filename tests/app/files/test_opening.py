@@ -13,6 +13,7 @@ from viewer.app.files.recent import load_recent, remember, state_folder
 from viewer.app.files.state import Files
 from viewer.errors import RenderError
 from viewer.loading import load, read_files
+from viewer.progress import report
 
 
 def _open(hand, *paths):
@@ -173,6 +174,33 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
     assert hand.state.of(Files).loader is None
     gate.set()
     loader.wait()
+
+
+def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig, monkeypatch):
+    # The thread waits for both, so a failing test ends it as well.
+    begun, ended = threading.Event(), threading.Event()
+
+    def slow(paths, **_):
+        report(0, 430, "MB", "reading tube.skin")
+        begun.set()
+        try:
+            while not ended.wait(0.01):  # until the report raises
+                report(120, 430, "MB")
+        finally:
+            ended.set()
+
+    monkeypatch.setattr(viewer.app.files.loader, "read_files", slow)
+    hand.app.frame.open(list(rig))
+    loader = hand.state.of(Files).loader
+    assert begun.wait(10)
+    loader._started -= 5.0
+    hand.step(2)
+    assert loader.progress[1:] == (430, "MB")
+    assert "Cancel opening" in hand.state.item_rects
+    hand.key("escape")
+    loader.wait()
+    assert ended.is_set() and loader.scene is None and loader.error == ""
+    assert hand.state.of(Files).loader is None
 
 
 def test_figure_refused_by_the_driver_keeps_the_scene(hand, tmp_path, monkeypatch):

@@ -204,7 +204,7 @@ def test_captured_points_are_marked(lint):
     assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 0.0, 0.0]]
 
 
-def test_camera_turns_to_the_facing_side(lint):
+def test_camera_orbits_to_the_facing_side(lint):
     hand = lint(LIGHT)
     camera = hand.state.camera
     camera.azimuth, camera.inclination = 135.0, 0.0  # from behind, +x and -z

@@ -139,7 +139,7 @@ def _own(hand, texts):
 
 def test_raw_pose_values_are_rotation_vectors(box, texts):
     assert _own(box, texts) == ["file: 0.0000  0.0000  0.0000"] * 3
-    # Quarter turns about x, then z: a third of a turn about the diagonal, 2 pi / 3 / sqrt 3.
+    # 90 degrees about x, then z: 120 degrees about the diagonal, 2 pi / 3 / sqrt 3 per axis.
     box.enter_value("joint_1.x", "90")
     box.enter_value("joint_1.z", "90")
     box.enter_value("joint_2.y", "-30")

@@ -11,7 +11,7 @@ from viewer.rig.scene import Scene
 
 @pytest.fixture
 def points(drive):
-    """A test driver on four points; frame 1 is less sure of them."""
+    """A test driver on four points; in frame 1 they have lower confidences."""
     return drive(scene=Scene([dots([0.9, 0.05, 0.0, 0.5])]), size=(1000, 900), samples=1)
 
 

@@ -42,7 +42,7 @@ def world_of(hand, joint):
     return posed_joint(hand.state.actor, joint).world[joint]
 
 
-def test_view_ring_turns_the_joint_by_the_angle_on_screen(arm):
+def test_view_ring_rotates_the_joint_by_the_angle_on_screen(arm):
     center, before = joint_seen(arm, 0), world_of(arm, 0)[:3, :3]
     to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
     drag_along(arm, around(center, VIEW_RADIUS, 0.3, 1.1))
@@ -89,7 +89,7 @@ def test_click_on_a_ring_selects_the_joint_under_it(arm):
     assert arm.state.selected_joint == 1
     assert_array_equal(arm.dofs(), before)
     assert arm.undo_steps == steps
-    # A drag from there turns the joint that has the ring.
+    # A drag from there rotates the joint that has the ring.
     arm.state.selected_joint = 0
     arm.step(2)
     drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.0, 0.8))
@@ -109,7 +109,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     else:
         arm.press(1)
     assert_array_equal(arm.dofs(), before)
-    # Until the button is released nothing else happens: no orbit, no drag.
+    # Nothing else happens until the button is released: no orbit, no drag.
     azimuth = arm.state.camera.azimuth
     arm.move(places[-1])
     assert_array_equal(arm.dofs(), before)

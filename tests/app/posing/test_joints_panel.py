@@ -115,7 +115,7 @@ def test_double_click_is_one_step(hand):
     hand.double_click(hand.place("arm.x", 0.1))
     steps = hand.undo_steps
     hand.key("z", "ctrl")
-    # The first of the two clicks moved the slider: at most that remains as a step of its own.
+    # The first of the two clicks moved the slider: at most this is an undo step of its own.
     assert steps <= 3 and hand.dof("arm.x") != FILE_POSE["arm.x"]
 
 

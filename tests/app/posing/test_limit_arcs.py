@@ -33,12 +33,12 @@ def test_arc_ends_are_at_the_limits_of_the_bone(dof) -> None:
         pose = actor.pose.copy()
         pose.dofs[dof] = value
         bone = posed_joint(actor, 1, pose).center - joint.center
-        # The arc is about the axis: only the part of the bone perpendicular to it counts.
+        # The arc is about the axis: only the component of the bone perpendicular to it counts.
         across = unit(bone - (bone @ arc.axis) * arc.axis)
         assert_allclose(end - joint.center, across, atol=1e-9)
 
 
-def test_twist_is_shown_by_an_axis_that_turns_with_the_joint() -> None:
+def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint() -> None:
     # The bone lies along x: a rotation about x does not move it.
     actor = Actor(arm_figure(limits=LIMITS))
     joint = posed_joint(actor, 0)

@@ -25,7 +25,7 @@ def test_positions_and_axes_match_hand_calculation() -> None:
     elbow = posed_joint(actor, 1)
     assert_allclose(elbow.center, [0, 1, 0], atol=1e-12)
     assert_allclose(elbow.axes("world"), np.eye(3))
-    # The shoulder's x points up; the elbow's an eighth of a turn to the right of it.
+    # The shoulder's x points up; the elbow's 45 degrees to the right of it.
     assert_allclose(elbow.axes("parent")[:, 0], [0, 1, 0], atol=1e-12)
     assert_allclose(elbow.axes("local")[:, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
 

@@ -47,7 +47,7 @@ def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
 )
 def test_orientation_setting_determines_the_axes(orientation, x_axis) -> None:
     actor = Actor(arm_figure(orders=("xyz", "xyz", "xyz")))
-    actor.pose.dofs[[2, 5]] = np.pi / 2  # shoulder and elbow a quarter about z each
+    actor.pose.dofs[[2, 5]] = np.pi / 2  # shoulder and elbow each by 90 degrees about z
     found = rings(posed_joint(actor, 1), actor.pose, orientation, frame())
     assert_allclose(found[0].axis, x_axis, atol=1e-12)
 
@@ -102,7 +102,7 @@ def test_face_on_ring_rotates_by_the_pointer_angle(angle, parallel) -> None:
     assert not actor.pose.dofs.any()  # the initial pose is not modified
 
 
-def test_rotation_accumulates_beyond_full_turns() -> None:
+def test_rotation_accumulates_beyond_360_degrees() -> None:
     actor, view = Actor(arm_figure(orders=("z", "z", ""))), frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))
     for turn in np.linspace(0, 4.5 * np.pi, 40):

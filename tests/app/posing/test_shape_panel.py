@@ -12,7 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.app.posing.state import Posing
+from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
+from viewer.rig.mesh import Mesh
 from viewer.rig.morph_target import MorphTarget, with_morphs
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints, shaped
@@ -199,6 +201,24 @@ def test_read_outs_show_the_box_dimensions(shape, texts):
     assert (said["Height"], said["Volume"]) == ("2.200 m", "330.0 litres")
 
 
+def test_open_mesh_has_no_volume(shape, texts):
+    figure = shape.state.actor.figure
+    mesh = Mesh(figure.mesh.positions, figure.mesh.normals, figure.mesh.triangles[2:])
+    shape.state.actor.figure = replace(figure, mesh=mesh)
+    texts.clear()
+    shape.step()
+    # The two triangles of one side are missing, whose outline has four edges.
+    assert "none: open mesh (4 boundary edges)" in texts and "Mass" not in texts
+
+
+def test_doubled_vertices_do_not_open_a_mesh(shape):
+    figure = shape.state.actor.figure
+    positions = figure.mesh.positions[figure.mesh.triangles].reshape(-1, 3)
+    triangles = np.arange(len(positions)).reshape(-1, 3)
+    found = measure(Figure("box", Mesh(positions, positions, triangles), unit="m"))
+    assert (found.n_open_edges, found.mass) == (0, pytest.approx(246.25, abs=1e-9))
+
+
 def test_read_outs_measure_the_rest_pose(shape, texts):
     before = _said(shape, texts)
     shape.state.actor.pose.dofs[:] = 0.7
@@ -292,7 +312,7 @@ def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
     for fraction in (0.25, 1.0, 1.3):
         _drag(morphed, 0, fraction)
         assert _weights(morphed)[0] == pytest.approx(min(fraction, 1.0), abs=0.02)
-    assert morphed.undo_steps == 2  # beyond the end nothing changes any more
+    assert morphed.undo_steps == 2  # nothing changes beyond the end
     height = _rest(morphed).mesh.positions[0] - morphed.state.actor.figure.mesh.positions[0]
     assert_allclose(height, [0, 1, 0], atol=1e-6)
 
@@ -321,7 +341,7 @@ def test_reset_returns_to_the_weights_of_the_file(morphed):
 
 
 def _with_ranges(hand):
-    """Give the box two phenotypes: 0.5 is their mean, and one reaches further down."""
+    """Give the box two phenotypes: 0.5 is their mean, and one has a lower minimum."""
     figure = hand.state.actor.figure
     ranged = replace(
         figure.blend_shapes,

@@ -17,7 +17,7 @@ from viewer.rig.scene import Actor, Scene
 
 
 def waving():
-    """A clip that turns the shoulder about z from 0 to 1 in two seconds."""
+    """A clip that rotates the shoulder about z from 0 to 1 in two seconds."""
     linear = (("linear", "linear"),) * 2
     return Clip("wave", (Channel(2, np.array([0.0, 2.0]), np.array([0.0, 1.0]), linear),), 0.0, 2.0)
 

@@ -98,10 +98,10 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
     assert alignment.how == "given" and alignment.error > 0.01
 
 
-def test_ring_turns_the_template_about_its_middle(hand):
+def test_ring_rotates_the_template_about_its_middle(hand):
     hand.click("rig tool rotate")
     before, (center, place) = similarity(hand), middle(hand)
-    # The ring about z, which points at the eye, by a quarter turn.
+    # The ring about z, which points at the eye, by 90 degrees.
     radius = next(
         r for r in range(30, 200, 2) if hovers(hand, place + r * np.array([1, -1]) / 2**0.5)
     )
@@ -116,13 +116,13 @@ def test_ring_turns_the_template_about_its_middle(hand):
 
 
 @pytest.mark.parametrize("kind", ["factors", "own_factors"])
-def test_ring_turns_a_stretched_template_about_its_middle(hand, kind):
+def test_ring_rotates_a_stretched_template_about_its_middle(hand, kind):
     laid = aligned_template(hand.state)
     stretch = np.array([1.3, 1.0, 1.0]) / 1.3 ** (1 / 3)
     straight = replace(similarity(hand), rotation=np.eye(3), **{kind: stretch})
     move_by_hand(hand.state, laid, straight)
     hand.step(2)
-    test_ring_turns_the_template_about_its_middle(hand)
+    test_ring_rotates_the_template_about_its_middle(hand)
     assert_allclose(similarity(hand).own_factors, stretch, atol=0.01)
     assert (similarity(hand).factors == 1.0).all()
 
@@ -285,7 +285,7 @@ def faces_eye(hand, mesh, matrix, triangle):
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     if normals[triangle] @ direction > -0.3:
         return False
-    # The middles of other triangles as near to the line stand for all of their points.
+    # Each triangle near the line is represented by its centre.
     ways = corners.mean(axis=1) - origin
     depths = ways @ direction
     beside = np.linalg.norm(ways - depths[:, None] * direction, axis=1)

@@ -133,7 +133,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
 
 def test_match_counts_close_vertices_with_similar_normals(rigging):
     hand = rigging()
-    # The template a tenth of the target's size beside it: nothing is within 1 %.
+    # The template is offset by a tenth of the target's size: nothing is within 1 %.
     placing = hand.state.of(Rigging).placing.similarity
     away = placing.matrix.copy()
     away[:3, 3] += 10.0
@@ -185,7 +185,7 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     first = hand.state.actor.clip.start
     hand.state.clock.seek(first)
     hand.step(2)
-    # The trial motion begins as the target stands.
+    # The trial motion begins in the target's pose.
     assert_allclose(seen(hand, 0), wanted, atol=1e-8)
     hand.key("z", "ctrl")
     hand.step(2)
@@ -310,7 +310,7 @@ def test_result_plays_the_template_motion_at_the_target_position(rigging):
     hand.step(3)
     figure, pose = rig_scene.bent()
     pose.dofs[:] = 0.0
-    pose.dofs[0], pose.dofs[8] = 1.0, 1.0  # as the template moves, carried by the alignment
+    pose.dofs[0], pose.dofs[8] = 1.0, 1.0  # as the template moves, transformed by the alignment
     wanted = apply_transform(TRUE, deform(figure, pose)[0])
     assert_allclose(seen(hand, 0), wanted, atol=1e-5)
     hand.click("Move like the template")

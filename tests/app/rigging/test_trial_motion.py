@@ -1,4 +1,4 @@
-"""Trial motion: one joint after the other, within limits, back to the pose it began in."""
+"""Trial motion: one joint after the other, within limits, back to the initial pose."""
 
 from __future__ import annotations
 

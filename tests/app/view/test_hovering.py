@@ -1,4 +1,4 @@
-"""Outlines and names of what a click would select, and joints that are easy to hit."""
+"""Outlines and names of objects that a click would select, and joints that are easy to hit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The Display, Camera, Lights and Stats panels: every widget changes what it names."""
+"""The Display, Camera, Lights and Stats panels: every widget changes the option that it names."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def test_typed_camera_values_leave_a_valid_camera(tall, text):
 
 
 @pytest.mark.parametrize("name", VIEWS)
-def test_named_view_button_turns_the_camera(tall, name):
+def test_named_view_button_rotates_the_camera(tall, name):
     tall.state.camera.azimuth, tall.state.camera.inclination = 1.0, 2.0
     tall.click(name.capitalize())
     assert (tall.state.camera.azimuth, tall.state.camera.inclination) == VIEWS[name]

@@ -26,7 +26,7 @@ def wide(drive_body):
 
 
 def _posed(hand, dofs):
-    """Show the panel of a figure that was in this pose from the start."""
+    """Show the panel of a figure that has been in this pose from the start."""
     hand.show_panel("Skinning")
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.history.start(hand.state.scene, hand.state.options)

@@ -193,7 +193,7 @@ def test_every_influence_has_a_line_a_dot_and_a_label(pinned):
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
     assert found.style.on_top
-    # Weakest first: a dark line, a line, a dark dot, a dot; at last the vertex, dark and white.
+    # Weakest first: a dark line, a line, a dark dot, a dot; last the vertex, dark and white.
     shift = np.array([10.0, 0, 0])
     starts, ends = found.segments.starts - shift, found.segments.ends - shift
     weak, strong = explanation.images[1], explanation.images[0]

@@ -178,7 +178,7 @@ def test_greyed_view_says_why(wide, tooltips):
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """What tooltips say."""
+    """Texts of tooltips."""
     said = []
     monkeypatch.setattr(imgui, "set_tooltip", said.append)
     return said

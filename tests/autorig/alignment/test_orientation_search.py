@@ -77,7 +77,7 @@ def test_mesh_with_another_unit_and_up_axis_is_aligned():
 def test_mesh_is_not_rotated_for_a_marginally_better_fit():
     positions, triangles = tube()
     rotated = positions * [-1.0, 1.0, -1.0]
-    between = 0.46 * positions + 0.54 * rotated  # from behind it is a little nearer
+    between = 0.46 * positions + 0.54 * rotated  # from behind it is slightly closer
     template, target = cloud(positions, triangles), cloud(between, triangles)
     found = in_place(template, target, axis_rotations("y"), scaled=False)
     assert (found.similarity.rotation == np.eye(3)).all()

@@ -65,7 +65,7 @@ def test_longer_limb_is_found():
     longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
     found, gaps = fitted(longer, bent(longer), figure)
     assert np.sqrt(np.mean(gaps**2)) < 2e-3
-    # Overall scale and limb scales are ambiguous: only their ratio is determined.
+    # Overall scale and limb scales are ambiguous: only their product is determined.
     along = found.grown[0]
     assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
 

@@ -30,7 +30,7 @@ def test_fit_never_reflects():
 
 
 def test_fixed_scale_is_kept_and_the_rest_fitted():
-    # Two lengths, 1 and 3, of which the fit may only move the middle.
+    # Two lengths, 1 and 3: the fit may only move their centre.
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     found = fit_similarity(points, 3.0 * points, scale=1.0)
     assert found.scale == 1.0

@@ -55,7 +55,7 @@ def test_aligned_part_is_left_alone_despite_an_offset():
 
 
 def test_aligned_shell_is_left_alone_although_a_larger_template_is_nearer():
-    # Evenly 2 % of the size away all round: a larger tube would be nearer nearly everywhere.
+    # 2 % of the size away on all sides: a larger tube would be closer almost everywhere.
     normals = vertex_normals(POSITIONS, TRIANGLES)
     found = aligned(POSITIONS + 0.05 * normals)
     assert found.how == "in place"

@@ -91,7 +91,7 @@ def test_match_takes_the_side_of_a_thin_sheet_that_faces_the_same_way():
     plate = Template(
         np.concatenate([upper, lower]), np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
     )
-    # One island of two triangles: right way up far right, sunk on the left.
+    # One island of two triangles: upright on the far right, sunk on the left.
     target = weld(
         np.array([[-0.5, -0.2, -0.006], [-0.3, -0.2, -0.006], [-0.4, 0.2, -0.006],
                   [0.5, -0.2, 0.01], [0.7, -0.2, 0.01], [0.6, 0.2, 0.01], [0.55, 0.3, 0.01],

@@ -42,7 +42,7 @@ def test_frames_keep_rotations_and_scale_translations():
     )
     found = transfer_clip(clip, SKELETON, 10.0, 2.0)
     assert_array_equal(found.rotations, rotations)
-    # Joints move inside the figure, whose scale of 2 is part of the lengths already.
+    # Joints move inside the figure, whose scale of 2 is already part of the lengths.
     assert_allclose(found.translations, 20.0)
     assert_allclose(found.figure_translations, [[10.0, 0, 0], [20.0, 0, 0]])
     assert_allclose(found.figure_scales, [1.0, 1.5])

@@ -96,7 +96,7 @@ def test_root_limits_are_widened_and_lengths_scaled():
 
 def test_root_without_a_ball_joint_rotates_by_its_quaternion():
     figure = arm()
-    kept = [0, 1, 2, 3, 6, 7, 8]  # the root turns about x alone
+    kept = [0, 1, 2, 3, 6, 7, 8]  # the root rotates about x only
     skeleton = figure.skeleton
     one = replace(
         skeleton,

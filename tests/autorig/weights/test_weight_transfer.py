@@ -88,7 +88,7 @@ def test_transfer_mixes_weights_between_vertices():
 
 
 def test_transfer_ignores_corners_with_zero_barycentric_weight():
-    # Rings between the template's sides: closest points lie on edges, but for a rounding.
+    # Rings between the template's sides: closest points lie on edges, up to rounding.
     positions, triangles = tube()
     x = positions[:, 0].copy()
     half = np.pi / 16
@@ -213,7 +213,7 @@ def test_transfer_refuses_a_distant_target():
     positions, triangles = tube()
     with pytest.raises(RigError) as caught:
         transfer(positions + np.array([0.0, 100.0, 0.0]), triangles)
-    # The target's box is 3 x 1 x 1; the median distance is 100 less a radius or so.
+    # The target's box is 3 x 1 x 1; the median distance is about 100 minus a radius.
     assert str(caught.value).startswith(
         "no vertex of the target meets the template: expected a target aligned with it, "
         "found it at a median distance of 30"

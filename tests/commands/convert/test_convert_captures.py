@@ -142,7 +142,7 @@ def test_untracked_people_have_unique_names(recording, tmp_path, capsys):
     assert lines[-1] == (
         "w-untracked.bvh, w-untracked-2.bvh: not tracked, possibly a different person in each frame"
     )
-    assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # whoever has a track comes first
+    assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # people with a track come first
 
 
 def test_untracked_people_round_trip_untracked(recording, tmp_path):

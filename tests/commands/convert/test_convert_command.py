@@ -146,7 +146,7 @@ def test_dofs_pose_and_place_the_figure(tmp_path):
     rig = write_twist(tmp_path)
     dofs = ["--dof", "low.z=90deg", "--dof", "figure.scale=2", "--dof", "figure.ty=10"]
     found = arrays_of(tmp_path, *rig, *dofs)
-    # (1, y) turned to (-y, 1), doubled, and 10 up.
+    # (1, y) rotated to (-y, 1), doubled, and 10 up.
     expected = [[0, 12, 0], [-2, 12, 0], [-4, 12, 0]]
     assert_allclose(found["vertices"], expected, rtol=0, atol=EXACT)
     assert_allclose(found["joints"], [[0, 10, 0], [-2, 10, 0]], rtol=0, atol=EXACT)
@@ -189,7 +189,7 @@ HALF = math.sqrt(0.5)
 @pytest.mark.parametrize(
     ("options", "radius"),
     [
-        ([], HALF),  # LBS: the middle of a quarter turn
+        ([], HALF),  # LBS: the middle of a rotation by 90 degrees
         (["--method", "lbs"], HALF),
         (["--method", "dqs"], 1),
         (["--method", "mix", "--blend-factor", "0"], HALF),
@@ -199,7 +199,7 @@ HALF = math.sqrt(0.5)
 )
 def test_method_decides_the_radius_of_a_twist(tmp_path, options, radius):
     found = arrays_of(tmp_path, *write_twist(tmp_path), "--dof", "high.y=90deg", *options)
-    # Both ways the middle vertex is turned by 45 degrees about y, towards -z.
+    # Both methods rotate the middle vertex by 45 degrees about y, towards -z.
     expected = [[1, 0, 0], [radius * HALF, 1, -radius * HALF], [0, 2, -1]]
     assert_allclose(found["vertices"], expected, rtol=0, atol=EXACT)
 

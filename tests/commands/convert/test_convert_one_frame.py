@@ -57,7 +57,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert convert(arms, *options, "-o", out) == 0
     bvh = PlainBvh(out)
     assert bvh.n_frames == 1
-    # Rotated by a right angle: x becomes y. The left hand turned out of there.
+    # Rotated by a right angle: x becomes y. The left hand rotated out of there.
     places = bvh.places(0)
     assert_allclose(places["root"], [3, 0, 0], atol=PRINTED)
     assert_allclose(places["left"], [3, 1, 0], atol=PRINTED)

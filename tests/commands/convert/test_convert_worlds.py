@@ -26,7 +26,7 @@ def smpl(tmp_path):
 
 @pytest.fixture
 def hanging(tmp_path):
-    """Bodies upright along y, turned upside down explicitly."""
+    """Bodies upright along y, rotated upside down explicitly."""
     frames = {}
     for frame in range(3):
         record = body(0, seed=0.01 * frame)
@@ -97,7 +97,7 @@ def test_amass_with_another_requested_up_axis_is_upright(hanging, smpl, tmp_path
 
 
 def test_up_axis_is_inferred_from_the_people_if_not_recorded(smpl, tmp_path):
-    # A quarter turn about x stands the model's y up along z.
+    # A rotation by 90 degrees about x maps the model's up axis y to z.
     poses = np.zeros((4, 72))
     poses[:, 0] = np.pi / 2
     np.savez(tmp_path / "m.npz", poses=poses, trans=np.zeros((4, 3)), fps=np.array(25))

@@ -108,7 +108,7 @@ def test_many_comparisons_form_a_table_and_an_unreadable_one_does_not_stop_the_o
 
 def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(tmp_path, capsys):
     reference, other = write(tmp_path / "ref"), write(tmp_path / "other", tip="3.5")
-    # It comes before a.skel, and is the reference's very skeleton.
+    # It comes before a.skel, and is the reference's own skeleton.
     (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
     code, lines, _ = said(capsys, reference, other, "--poses", "0", "--tolerance", "1")
     assert code == 1  # there is one data set without a tolerance
@@ -183,7 +183,7 @@ def test_clips_are_compared_on_a_shared_skeleton(tmp_path, capsys):
         str(tmp_path / "a" / "a.skel"),
     )
     assert code == 0
-    # From 0 to 0.25 over a second: the mean of all frames is half of the most.
+    # From 0 to 0.25 over a second: the mean of all frames is half of the maximum.
     assert "joint positions: at most 0.25 " in lines[1] and ", mean 0.125 " in lines[1]
 
 

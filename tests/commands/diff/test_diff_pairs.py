@@ -119,7 +119,7 @@ def test_a_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
             (),
             (Phrase("lone-skeleton", name="stray"),),
         )
-    assert second[0].clip is mine and second[1].clip is None  # both are left as they are
+    assert second[0].clip is mine and second[1].clip is None  # both remain unchanged
 
 
 def test_clips_are_paired_by_name_then_by_order() -> None:

@@ -137,7 +137,7 @@ def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):
 
 
 def test_influence_limit_error_is_shown_where_there_are_many_influences(draw, box):
-    # Joint 4 turns the corner (1, 2, 3), which alone has more than four influences.
+    # Joint 4 rotates the corner (1, 2, 3), the only one with more than four influences.
     posed = [box, *SIDE, "--pose", pose_190(6, n17=math.pi)]
     changed = []
     for azimuth in (135, 315):

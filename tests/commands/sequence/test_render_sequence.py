@@ -40,7 +40,7 @@ def test_numbered_images_match_the_frames(draw, walk, tmp_path):
     said = draw(walk, "f_{frame:03}.png", "--frames", "0:31:15", "--no-grid", "--follow", "root")
     assert said.out.startswith(f"{tmp_path / 'f_000.png'} to f_030.png: 3 frames, 0.1 s, 64 x 48")
     assert said.err == "" and names(tmp_path, ".png") == ["f_000.png", "f_015.png", "f_030.png"]
-    # The camera goes with the root, so that only the arm and what lies behind seem to move.
+    # The camera follows the root, so that only the arm and the background seem to move.
     first, last = picture(tmp_path / "f_000.png"), picture(tmp_path / "f_030.png")
     assert (first != last).any()
     np.testing.assert_allclose(first[40:], last[40:], atol=60)
@@ -71,7 +71,7 @@ def test_whole_motion_is_in_frame(draw, walk, tmp_path):
     drawn = sum(picture(tmp_path / f"{frame}.png")[..., 3] for frame in range(31)) > 0
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     room = columns[0], 127 - columns[-1], rows[0], 71 - rows[-1]
-    # Nothing is cut off, and on the side that decides there is no more room than 8 %.
+    # Nothing is clipped, and on the tightest side the margin is at most 8 %.
     assert 1 <= min(room) <= 6
 
 

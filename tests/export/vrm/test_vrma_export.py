@@ -48,7 +48,7 @@ def test_a_character_moves_as_before(tmp_path: Path, version: int) -> None:
             assert_allclose(after[bone], facing @ before[bone], rtol=0, atol=1e-6)
 
 
-def test_motions_of_worlds_with_z_up_are_turned(tmp_path: Path) -> None:
+def test_motions_of_worlds_with_z_up_are_rotated(tmp_path: Path) -> None:
     amass, hero, out = (tmp_path / name for name in ("walk.npz", "hero.vrm", "out.vrma"))
     poses = np.zeros((4, 156))
     poses[:, 0], poses[:, 3], poses[:, 50] = np.pi / 2, np.linspace(0.0, 0.6, 4), -1.0

@@ -105,7 +105,7 @@ def mirror_text():
 
 
 def files(actions):
-    """Return the package's files by name; ``seeds`` of targets are their order."""
+    """Return the package's files by name; the seed of a target is its position in the list."""
     found = {"mpfb2/3dobjs/base.obj": base_text().encode()}
     seeds = {}
     for name in [

@@ -273,7 +273,7 @@ def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
 
 
 def test_frames_upright_along_another_axis_are_reported() -> None:
-    # A rest pose along y, turned by 90 degrees about x in every frame: a z-up world.
+    # A rest pose along y, rotated by 90 degrees about x in every frame: a z-up world.
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert motion.figure.up == "y"

@@ -22,7 +22,7 @@ def only(parts, person=0):
     return found[0]
 
 
-# Where the frames are
+# Frame folders
 
 
 @pytest.mark.parametrize("name", ["smpl", "smpl_full", "smplfull", "keypoints3d"])

@@ -125,7 +125,7 @@ def test_names_of_materials_may_contain_blanks(read):
 
 @pytest.mark.parametrize("head", ["# Blender 4.2.0 MTL File: 'a.blend'", "# 3ds Max Wavefront OBJ"])
 def test_maps_of_blender_and_3ds_max_replace_values(read, head):
-    """They write the default of an input beside the image that is connected to it."""
+    """They write the default of an input as well as the image that is connected to it."""
     text = "newmtl a\nKd 0.8 0.8 0.8\nmap_Kd skin.png\nPr 0.5\nmap_Pr skin.png\nKs 0 0 0\n"
     replaced, _ = read(f"{head}\n{text}")
     assert (replaced.base_color, replaced.roughness) == (None, 1.0)

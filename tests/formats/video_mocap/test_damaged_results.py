@@ -54,7 +54,7 @@ def small(tool: str) -> Any:
 
 
 def self_contained(data: bytes) -> None:
-    """Open results in every space, whether or not they are refused."""
+    """Open results in every space; refusals are ignored."""
     source = Source("a.pkl", data)
     try:
         if detect(source) != "video_mocap":

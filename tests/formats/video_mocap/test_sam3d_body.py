@@ -66,7 +66,7 @@ def test_points_are_upright_in_front_of_the_camera(tmp_path: Path) -> None:
     parts = (given[key] for key in ("pred_keypoints_3d", "pred_joint_coords", "pred_vertices"))
     wanted = (np.concatenate([*parts]) + given["pred_cam_t"]) * DOWN
     assert scene.up == "y"
-    visible = np.arange(len(wanted)) != 70  # the origin of the rig is no point of the body
+    visible = np.arange(len(wanted)) != 70  # the origin of the rig is not a point of the body
     assert_allclose(actor.points[visible, :3], wanted[visible], atol=1e-12)
     assert actor.points[:, 3].tolist() == visible.tolist()
     layout = actor.figure.points

@@ -76,7 +76,7 @@ def test_a_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> N
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     assert_allclose(arm[:3, :3], turn @ quarter, atol=1e-6)
-    # The lower arm is above the upper arm now; half the size, so half the way.
+    # The lower arm is now above the upper arm; at half the size, half the distance.
     assert_allclose(below[:3, 3] - arm[:3, 3], turn @ quarter @ [0.15, 0, 0], atol=1e-6)
     assert_allclose(worlds[names.index("c0"), :3, 3], [0.2, 0.5, 0.0], atol=1e-6)
 

@@ -58,7 +58,7 @@ def columns_of(picture, strongest):
 
 
 @pytest.mark.parametrize("style", ["octahedra", "sticks"])
-def test_ridge_turns_with_the_roll(offscreen, style):
+def test_ridge_rotates_with_the_roll(offscreen, style):
     chain = [-1, 0], [[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]
     # Red is the x axis, the first one across the bone.
     assert columns_of(draw(offscreen, scene_of(*chain), 0.5, style), 0) > 0.8
@@ -75,7 +75,7 @@ def test_every_child_has_a_bone_and_the_gap_between_has_none(offscreen, style):
     assert at(picture, 2.0, 0.5, 0.5)[3] == 0
 
 
-def test_end_goes_on_as_the_bone_before_it_and_turns(offscreen):
+def test_end_bone_continues_its_parent_and_rotates(offscreen):
     chain = [-1, 0], [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
     # Two fifths of the bone, but at most 7 % of the figure's size, which is 1.
     straight, turned = scene_of(*chain), scene_of(*chain, (5, -math.pi / 2))

@@ -51,7 +51,7 @@ def posed(ctx):
 
 @pytest.fixture
 def written(monkeypatch):
-    """What was written into buffers and textures, in bytes, in order."""
+    """Sizes of writes into buffers and textures, in bytes, in order."""
     sent: list[tuple[str, int]] = []
     for owner, kind in ((moderngl.Buffer, "buffer"), (moderngl.Texture, "texture")):
 

@@ -25,7 +25,7 @@ from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import has_influence, skin_from_lists
 from viewer.rig.skinning.lbs import blended_matrices
 
-POSITION_TOLERANCE = 1e-5  # relative to the figure's size, as required by issue 2
+POSITION_TOLERANCE = 1e-5  # relative to the figure's size
 NORMAL_TOLERANCE = 1e-5  # relative to a unit normal, times its shortening by blending
 
 

@@ -56,7 +56,7 @@ def test_another_rate_counts_from_zero():
     assert animation.points[:, 0, 0].tolist() == [1.0, 2.0, 3.0]
 
 
-def test_upside_down_world_is_turned_upright():
+def test_upside_down_world_is_rotated_upright():
     animation, up = sample_upright_points(*scene_of("y", placement=rotation_transform(0, np.pi)))
     assert up == "y"
     assert_array_equal(animation.points[2], [[3, -2, -3], [4, -5, -6]])

@@ -66,7 +66,7 @@ def test_contacts_are_low_and_slow_with_hysteresis() -> None:
     step[20:30, 1] = 0.1
     assert contacts(step, THERE, RATE, 1.0, 1).tolist() == [not 20 <= k < 30 for k in range(60)]
     step[:, 1] = 0.0
-    step[20:30, 1] = 0.03  # not low enough to begin, low enough to last
+    step[20:30, 1] = 0.03  # not low enough to start, but low enough to continue
     assert contacts(step, THERE, RATE, 1.0, 1).all()
     step[:, 0] = 1.0 * np.arange(FRAMES) / RATE
     assert not contacts(step, THERE, RATE, 1.0, 1).any()

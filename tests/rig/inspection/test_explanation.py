@@ -40,7 +40,7 @@ def test_every_term_of_linear_blending():
     one = explain(figure, bent(figure), Skinning(), 1)
     assert one.names == ("elbow", "shoulder") and one.joints.tolist() == [1, 0]
     assert one.weights.tolist() == [0.75, 0.25]
-    # The elbow's joint turns (2, 1, 0) about (2, 0, 0) by a right angle, to (1, 0, 0); the
+    # The elbow's joint rotates (2, 1, 0) about (2, 0, 0) by 90 degrees, to (1, 0, 0); the
     # shoulder leaves it where it is.
     expected = ELBOW @ matrix(turn_z(np.pi / 2)) @ np.linalg.inv(ELBOW)
     assert_allclose(one.matrices, [expected, np.eye(4)], atol=1e-15)

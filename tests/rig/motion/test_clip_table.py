@@ -124,7 +124,7 @@ def test_random_clips_with_few_and_many_keys(seed) -> None:
     rng = np.random.default_rng(seed)
     counts = [0, 1, 2, 3, 30, *rng.integers(0, 9, 12).tolist()]
     channels = [random_channel(rng, row, count) for row, count in enumerate(counts)]
-    # Between the keys, before all of them, and up to an hour away; in no order.
+    # Between the keys, before all of them, and up to an hour away; unsorted.
     assert_is_the_plain_curve(channels, rng.uniform(-20, 40, 60))
     assert_is_the_plain_curve(channels, rng.uniform(-3700, 3700, 60))
 

@@ -15,7 +15,7 @@ def test_onion_has_poses_at_even_times_with_rising_opacity():
     scene = Scene([moving_arm(), Actor(moving_arm().figure)])
     still, *poses = onion(scene, 6).actors
     assert still.clip is None and still.opacity == 1.0
-    # Six times in one second; between them nothing is missing but frame 5, which none of them is.
+    # Six times in one second; none of them is frame 5, the only missing one.
     places = [actor.require_pose().figure_translation[0] for actor in poses]
     np.testing.assert_allclose(places, SPEED * np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.0]), atol=1e-12)
     expected = np.linspace(1.0, FAINTEST, 6)

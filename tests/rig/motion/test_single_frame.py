@@ -130,7 +130,7 @@ def test_figures_without_joints_are_refused():
         single_frame(Actor(Figure("stone", mesh=Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]])))))
 
 
-def test_upside_down_figure_is_turned_upright_unless_the_world_is_kept():
+def test_upside_down_figure_is_rotated_upright_unless_the_world_is_kept():
     actor = Actor(arm(), placement=rotation_transform(0, np.pi))
     set_dof(actor, "elbow", 5, np.pi / 2)
     actor.pose.figure_translation[:] = [0.0, 4.0, 0.5]

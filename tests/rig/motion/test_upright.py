@@ -67,7 +67,7 @@ def test_figure_has_the_up_axis_of_the_capture():
     assert found.pose is actor.pose and found.figure.skeleton is actor.figure.skeleton
 
 
-def test_upside_down_body_is_turned_upright_with_shape_and_placement():
+def test_upside_down_body_is_rotated_upright_with_shape_and_placement():
     (actor,) = viewer.load(bundled_body()).actors
     rng = np.random.default_rng(5)
     actor.pose.dofs[:] = rng.uniform(-1, 1, len(actor.pose.dofs))
@@ -84,7 +84,7 @@ def test_upside_down_body_is_turned_upright_with_shape_and_placement():
     assert found.figure is actor.figure
 
 
-def test_every_root_is_turned_upright():
+def test_every_root_is_rotated_upright():
     figure = Figure(
         "two",
         skeleton=ball_skeleton(("a", "b"), np.array([-1, -1]), np.array([[1, 2, 3], [4, 5, 6.0]])),

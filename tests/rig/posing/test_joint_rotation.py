@@ -95,7 +95,7 @@ def test_limits_select_the_allowed_solution() -> None:
     assert_allclose(found.dofs, [-0.3, 2.2, 0.4], atol=1e-9)
 
 
-def test_limits_a_full_turn_away_are_found() -> None:
+def test_limits_360_degrees_away_are_found() -> None:
     skeleton = single("x", (2 * np.pi + 0.1, 2 * np.pi + 1.0))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(0, 0.5))
     assert_allclose(found.dofs, [2 * np.pi + 0.5], atol=1e-12)

@@ -154,7 +154,7 @@ def matrix(quaternion: np.ndarray) -> np.ndarray:
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 
-def test_a_source_with_z_up_is_turned_upright() -> None:
+def test_a_source_with_z_up_is_rotated_upright() -> None:
     source = moving(figure_of(HIK, "mocap", TO_Y.T, "z"))
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
+from pathlib import Path, PurePath
 from urllib.parse import unquote, urlsplit
 
 from viewer.app.core.state import AppState
 from viewer.formats import FORMATS
 from viewer.phrases import printable
 
-__all__ = ["PICTURES", "FileDialog", "folder_of"]
+__all__ = ["PICTURES", "FileDialog", "folder_of", "single_suffix"]
 
 PICTURES = (".png", ".jpg", ".jpeg")
 """File suffixes of texture images."""
@@ -66,6 +66,7 @@ class FileDialog:
         self.entries: list[Path] = []
         self.folders: set[Path] = set()
         self.is_new = True
+        self.is_path_active = False
         self.enter(folder)
 
     def enter(self, folder: Path) -> None:
@@ -110,7 +111,7 @@ class FileDialog:
 
     def target(self) -> Path | None:
         """Return the file to write, with a suffix; None if it has no name."""
-        name = Path(self.name.strip())
+        name = Path(single_suffix(self.name.strip()))
         if not name.name.strip("."):
             return None
         path = self.folder / name
@@ -137,6 +138,18 @@ class FileDialog:
             if not path.name.startswith(".")
             and (path in self.folders or self.shows_all or path.suffix.lower() in self.suffixes)
         ]
+
+
+def single_suffix(name: str) -> str:
+    """Return a file name without a repetition of its suffix, as typing before the suffix adds.
+
+    >>> single_suffix("ada.mp4.mp4"), single_suffix("ada.v2.mp4"), single_suffix(".obj")
+    ('ada.mp4', 'ada.v2.mp4', '.obj')
+    """
+    suffix = PurePath(name).suffix
+    while suffix and PurePath(name[: -len(suffix)]).suffix.lower() == suffix.lower():
+        name = name[: -len(suffix)]
+    return name
 
 
 def plain_path(text: str) -> str:

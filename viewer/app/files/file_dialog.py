@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import name_field, text_field
 from viewer.app.core.widgets import button, note_item
-from viewer.app.files.file_choice import FileDialog
+from viewer.app.files.file_choice import FileDialog, single_suffix
 from viewer.app.files.file_list import draw_file_list, is_confirmed_by_key
 from viewer.app.files.state import Files
 from viewer.phrases import printable
@@ -56,14 +56,9 @@ def draw_file_dialog(state: AppState) -> None:
 
 
 def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
-    imgui.set_next_item_width(-1.0)
-    flags = imgui.InputTextFlags_.enter_returns_true
-    entered, text = text_field("##folder", str(dialog.folder), "Path of a folder or file", flags)
-    note_item(state, "Folder")
-    if entered:
-        path = dialog.typed(text)
-        if path is not None and dialog.purpose == "open":
-            return [path]
+    path = _draw_path(state, dialog)
+    if path is not None:
+        return [path]
     if button(state, "Up"):
         dialog.enter(dialog.folder.parent)
     imgui.same_line()
@@ -75,6 +70,24 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
         imgui.text_wrapped(dialog.problem)
     result = draw_file_list(state, dialog, _foot_height(dialog))
     return result or _draw_buttons(state, dialog)
+
+
+def _draw_path(state: AppState, dialog: FileDialog) -> Path | None:
+    """Draw the field of the path; return the file whose path was entered."""
+    imgui.set_next_item_width(-1.0)
+    if imgui.is_window_appearing() and dialog.purpose != "save":
+        imgui.set_keyboard_focus_here()
+    flags = imgui.InputTextFlags_.enter_returns_true
+    entered, text = text_field("##folder", str(dialog.folder), "Path of a folder or file", flags)
+    note_item(state, "Folder")
+    _close_on_escape(state)
+    dialog.is_path_active = imgui.is_item_active() or entered
+    # Enter confirms the files chosen in the list unless another path was typed.
+    if not entered or text == str(dialog.folder):
+        return None
+    dialog.is_path_active = False
+    path = dialog.typed(text)
+    return path if dialog.purpose == "open" else None
 
 
 def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
@@ -105,12 +118,18 @@ def _draw_name(state: AppState, dialog: FileDialog) -> bool:
         imgui.set_keyboard_focus_here()
     entered, dialog.name = name_field("##name", dialog.name, "Name of the file")
     note_item(state, "Name")
-    # Escape restores an edited name; the dialog is closed only if there is nothing to restore.
+    _close_on_escape(state)
+    if imgui.is_item_deactivated():
+        dialog.name = single_suffix(dialog.name)
+    imgui.same_line()
+    return entered and not dialog.follow_name()
+
+
+def _close_on_escape(state: AppState) -> None:
+    """Close the dialog if Escape was pressed in the last field, which had nothing to restore."""
     is_left = imgui.is_item_deactivated() and not imgui.is_item_deactivated_after_edit()
     if is_left and imgui.is_key_pressed(imgui.Key.escape, False):
         state.of(Files).dialog = None
-    imgui.same_line()
-    return entered and not dialog.follow_name()
 
 
 def _confirmation(dialog: FileDialog) -> tuple[int, str]:

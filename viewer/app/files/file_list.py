@@ -69,10 +69,11 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
 
 def _move(dialog: FileDialog) -> bool:
     """Navigate the list and the folders by keyboard; return whether the highlight moved."""
-    if imgui.get_io().want_text_input:
+    is_typing = imgui.get_io().want_text_input
+    if is_typing and not dialog.is_path_active:
         return False
     keys = imgui.Key
-    if imgui.is_key_pressed(keys.backspace, False):
+    if not is_typing and imgui.is_key_pressed(keys.backspace, False):
         dialog.enter(dialog.folder.parent)
     steps = {keys.down_arrow: 1, keys.up_arrow: -1, keys.page_down: _PAGE, keys.page_up: -_PAGE}
     step = sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
@@ -86,7 +87,8 @@ def is_confirmed_by_key(dialog: FileDialog) -> bool:
     enter = any(
         imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter)
     )
-    if imgui.get_io().want_text_input or not enter or dialog.purpose == "save":
+    is_typing = imgui.get_io().want_text_input and not dialog.is_path_active
+    if is_typing or not enter or dialog.purpose == "save":
         return False
     if dialog.current is not None and dialog.current in dialog.folders:
         dialog.enter(dialog.current)

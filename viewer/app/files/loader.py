@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from viewer.errors import ViewerError
 from viewer.loading import Contents, MotionSettings, begin, read_files
+from viewer.progress import Cancelled, receiving
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -22,7 +23,7 @@ __all__ = ["Loader"]
 class Loader:
     """Thread that reads files.
 
-    Dropping a loader cancels it: its result is discarded.
+    Dropping a loader discards its result.
 
     Parameters
     ----------
@@ -64,11 +65,26 @@ class Loader:
         self.error = ""
         self._attempts, self._wake, self._settings = attempts, wake, settings
         self._opened = tuple(opened)
+        self._is_cancelled = False
+        self._progress = (0, 0, "")
         self._started = time.monotonic()
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
     def _read(self) -> None:
+        try:
+            with receiving(self._receive):
+                self._try_all()
+        except Cancelled:
+            return
+        self._wake()
+
+    def _receive(self, done: int, total: int, unit: str, _: str) -> None:
+        if self._is_cancelled:
+            raise Cancelled
+        self._progress = (done, total, unit)
+
+    def _try_all(self) -> None:
         for paths in self._attempts:
             try:
                 self._read_one(paths)
@@ -78,7 +94,6 @@ class Loader:
                 self.error = str(problem)
             except MemoryError:
                 self.error = f"{paths[-1]}: not enough memory"
-        self._wake()
 
     def _read_one(self, paths: Sequence[Path]) -> None:
         contents = read_files(paths, settings=self._settings)
@@ -101,6 +116,7 @@ class Loader:
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         morphs = [*opened.morphs, *contents.morphs]
         joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
+        joined.used_options = (contents.used_options or set()) | (opened.used_options or set())
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:
@@ -113,6 +129,15 @@ class Loader:
     def is_done(self) -> bool:
         """Whether there is a scene or an error."""
         return not self._thread.is_alive()
+
+    @property
+    def progress(self) -> tuple[int, int, str]:
+        """Completed steps, their total and their unit; the total is 0 if it is unknown."""
+        return self._progress
+
+    def cancel(self) -> None:
+        """End reading at the next part of a file."""
+        self._is_cancelled = True
 
     @property
     def seconds(self) -> float:

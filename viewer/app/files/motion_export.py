@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from viewer.app.core.jobs import ThreadJob
+from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
 from viewer.diagnostics import Diagnostic
@@ -24,12 +24,14 @@ from viewer.export._motion_paths import motion_paths
 from viewer.export._vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
+from viewer.progress import receiving
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
+from viewer.rig.motion.timing import frame_at
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
@@ -150,13 +152,17 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
     more = f" and {len(parts) - 1} more" if path.suffix and len(parts) > 1 else ""
     title = f"Writing {printable(parts[0].path.name, 60)}{more}"
 
-    def write() -> list[str]:
-        if key == "easymocap":
-            return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
-        with all_or_none(files):
-            return [*map(str, [*_write(scene, parts, key, options), *left_out])]
+    def write(report: Report) -> list[str]:
+        def receive(done: int, total: int, unit: str, what: str) -> None:
+            report(done, total, f"{title}: {what}" if what else "")
 
-    state.job = ThreadJob(title, write)
+        with receiving(receive):
+            if key == "easymocap":
+                return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
+            with all_or_none(files):
+                return [*map(str, [*_write(scene, parts, key, options), *left_out])]
+
+    state.job = CountedJob(title, write)
 
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
@@ -228,7 +234,7 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
     if (clock.start, clock.end) == clock.whole or clip is None:
         return None
     rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else clock.frame_rate
-    count = int((clip.end - clip.start) * rate + 1e-6) + 1
-    first = round((clock.start - actor.offset - clip.start) * rate)
-    stop = round((clock.end - actor.offset - clip.start) * rate) + 1
+    count = frame_at(clip.end - clip.start, rate) + 1
+    first = -frame_at(clip.start + actor.offset - clock.start, rate)
+    stop = frame_at(clock.end - actor.offset - clip.start, rate) + 1
     return max(first, 0), min(stop, count)

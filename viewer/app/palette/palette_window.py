@@ -66,7 +66,6 @@ def draw_palette(state: AppState) -> None:
     place = (viewport.get_center().x, viewport.pos.y + _TOP * viewport.size.y)
     imgui.set_next_window_pos(place, imgui.Cond_.always, (0.5, 0.0))
     imgui.set_next_window_size((width, 0.0))
-    imgui.set_next_window_bg_alpha(0.98)
     flags = imgui.WindowFlags_.no_title_bar | imgui.WindowFlags_.no_resize
     flags |= imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_docking
     flags |= imgui.WindowFlags_.no_saved_settings | imgui.WindowFlags_.always_auto_resize

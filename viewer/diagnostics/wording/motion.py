@@ -7,8 +7,10 @@ MESSAGES = {
     "have",
     "F004.no-skeleton": "{figure:text} has no skeleton to animate",
     "F004.mirror": "figure {figure:text} has no skeleton to mirror",
-    "F004.mapping-joint": "the mapping names {joint:quoted}, which {figure:text} does not have",
-    "F004.mapping-joints": "the mapping names {joint:quoted}, of which {figure:text} has {n}",
+    "F004.mapping-joint": "expected a joint of {figure:text}, found {joint:quoted}; {near}",
+    "F004.mapping-joints": "expected one joint of {figure:text}, found {joint:quoted}, the name "
+    "of {n}; {near}",
+    "F004.mapping-again": "expected each joint of {figure:text} once, found {joint:quoted} again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
     "{figure:text}: {idle:list8}",
@@ -71,6 +73,7 @@ MESSAGES = {
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",
     "X006.merged": "{other}: {n:#frame} joined to {kept}",
+    "X006.renumbered": "{part} of {other} assigned to {kept}",
     "X006.overlap": "{other} and {kept} are both present in {n:#frame} ({frames:list}), {distance} "
     "apart: those of {kept} are used",
     "X006.keys": "{figure:text}: its motion has keys instead of captured frames and is unchanged",
@@ -95,9 +98,12 @@ PHRASES = {
     "translation-too-far": "translation: expected at most {most:g}, found {found:g}",
     # Clean-up of captured motions
     "one-euro": "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
-    "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
+    "savgol": "Savitzky-Golay filter, {shortest:+{} to }{n:#frame}, degree {order}{left:+; {}}",
+    "savgol-short": "{n:#run} of too few frames {n:?is|are} unchanged",
     "moved-joints": "joints",
     "moved-points": "points",
+    "part-body": "body",
+    "part-points": "keypoints",
     "raised": "raised",
     "lowered": "lowered",
     "joint-in-frame": "{joint:text}, frame {frame}",

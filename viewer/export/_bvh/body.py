@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from viewer.export._bvh.angles import euler_angles
+from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -99,6 +100,7 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
     shape = (count, skeleton.n_joints, 3)
     angles, positions, places = np.empty(shape), np.empty(shape), np.empty(shape)
     for start in range(0, count, _BLOCK):
+        report(start, count, "frames", "converting")
         block = slice(start, min(start + _BLOCK, count))
         part = frames_between(frames, block)
         places[block] = _places(figure, part, weights, scale) @ space.world.T * space.factor

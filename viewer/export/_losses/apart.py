@@ -13,6 +13,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.bounds import Bounds
 from viewer.export._losses.estimates import Estimator
 from viewer.export._losses.skinned import Body, Poses, Rows, Side, body_rows, poses_of, vertices
+from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
@@ -99,6 +100,7 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     if first.body is not None and second.body is not None:
         search = _Search(first.body, second.body, least)
     for start in range(0, len(rows), _BLOCK):
+        report(start, len(rows), "frames", "comparing with the original")
         part = rows[start : start + _BLOCK]
         one, other = first.poses(part), second.poses(others[start : start + _BLOCK])
         joints = _farther(joints, np.linalg.norm(one.places - other.places, axis=2), part)

@@ -29,6 +29,7 @@ from viewer.formats._easymocap.json_frames import (
 from viewer.formats._easymocap.points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap.shapes import COEFFICIENTS
 from viewer.formats._misfit import remark_on
+from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -100,6 +101,7 @@ class Reading:
         for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
             self._read_frame(frame, part)
             count += 1
+            report(stop, n_frames, "frames")
             is_enough = count == size if size else bool(part.bodies or part.points)
             if is_enough or stop == n_frames:
                 yield self._finished(part, stop)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, word_begins
+from viewer.progress import report_bytes
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["KEYWORDS", "Lines", "NumberRows", "Places", "Rows", "number_rows", "pieces", "rows_of"]
@@ -102,6 +103,7 @@ def pieces(source: Source) -> Iterator[Lines]:
         end = found.end() if found else len(data)
         yield _split(data[start:end] + _PAD, start)
         start = end
+        report_bytes(end, len(data))
 
 
 def _split(data: bytes, base: int) -> Lines:

@@ -23,14 +23,21 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import conjugate, multiply
-from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
+from viewer.rig.retargeting.rest_poses import (
+    RestPose,
+    alignment,
+    is_same_rest,
+    rest_of,
+    up_rotation,
+)
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
 from viewer.rig.skeleton import Skeleton, joint_label
 
@@ -85,7 +92,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 def retarget(
     motion: SkeletonMotion,
     figure: Figure,
-    mapping: Mapping[str, str] | None = None,
+    mapping: Mapping[str, str] | JointMap | None = None,
     source_rest: SourceRest = "zero",
 ) -> tuple[SampledClip, list[Diagnostic]]:
     """Return a motion made for another skeleton as a clip of a figure.
@@ -102,8 +109,9 @@ def retarget(
         Skeleton and clip, up along y or z.
     figure : Figure
         Figure with a skeleton; its unmatched joints stay in their rest pose.
-    mapping : mapping of str to str, optional
-        Maps the motion's joint names to the figure's.
+    mapping : JointMap, or mapping of str to str, optional
+        The figure's joints and the motion's joints that drive them; or the motion's joint names to
+        the figure's.
     source_rest : int, "zero" or "auto"
         The motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with "auto", a motion of
         the figure's own skeleton keeps its own rest pose.
@@ -170,17 +178,10 @@ def _job(
 ) -> _Job:
     """Return the inputs of a retargeting; ``to``: the figure's skeleton and up axis."""
     target, up = to
-    to_target = _up_rotation(motion.figure.up, up)
+    to_target = up_rotation(motion.figure.up, up)
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
     return _Job(motion.clip, source, target, rests, matches, to_target, is_same)
-
-
-def _up_rotation(source: str, target: str) -> Floats:
-    """Return the rotation from one up axis to the other: (3, 3)."""
-    if source == target:
-        return np.eye(3)
-    return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
 
 
 def _source_rotations(job: _Job) -> Floats:

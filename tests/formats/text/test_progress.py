@@ -1,0 +1,70 @@
+"""Reported progress of reading and writing, and cancellation at any report."""
+
+import numpy as np
+import pytest
+
+from viewer.formats import Source, obj, ply
+from viewer.formats._text.decimals import integers
+from viewer.formats._text.number_text import row_texts
+from viewer.media.saving import save_parts
+from viewer.progress import Cancelled, receiving, report
+
+HEAD = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+HEAD += "property float z\nend_header\n"
+
+
+@pytest.fixture(scope="module")
+def large_files(tmp_path_factory):
+    folder, n = tmp_path_factory.mktemp("large"), 170_000
+    (folder / "a.ply").write_text(HEAD.format(n) + "1.25 2.5 10.125\n" * n)
+    (folder / "a.obj").write_text("v 1.25 2.5 10.125\n" * n + "f 1 2 3\n")
+    return folder
+
+
+@pytest.mark.parametrize(("reader", "size"), [(ply, 2), (obj, 3)])
+def test_reading_reports_megabytes_up_to_all(large_files, reader, size):
+    path = large_files / f"a.{reader.__name__.rpartition('.')[2]}"
+    found = []
+    with receiving(lambda *step: found.append(step)):
+        reader.read(Source(path))
+    assert found[0] == (0, 0, "MB", f"reading {path.name}")
+    assert found[-1] == (size, size, "MB", "")
+    done = [step[0] for step in found]
+    assert done == sorted(done) and len(done) > 8
+
+
+@pytest.mark.parametrize("reader", [ply, obj])
+def test_reading_can_be_cancelled_at_any_part(large_files, reader):
+    calls = []
+
+    def receive(*_):
+        calls.append(None)
+        if len(calls) == 6:
+            raise Cancelled
+
+    path = large_files / f"a.{reader.__name__.rpartition('.')[2]}"
+    with receiving(receive), pytest.raises(Cancelled):
+        reader.read(Source(path))
+    assert len(calls) == 6
+
+
+def test_cancelled_writing_keeps_the_old_file_alone(tmp_path):
+    def receive(done, total, unit, what):
+        assert (total, unit, what) == (0, "MB", "writing a.txt")
+        raise Cancelled
+
+    (tmp_path / "a.txt").write_text("old")
+    with receiving(receive), pytest.raises(Cancelled):
+        save_parts(tmp_path / "a.txt", row_texts(np.zeros((9, 9), np.int32), integers))
+    assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("a.txt", "old")]
+
+
+def test_reports_go_to_the_innermost_receiver_only():
+    outer, inner = [], []
+    report(1, 2, "steps")
+    with receiving(lambda *step: outer.append(step)):
+        with receiving(lambda *step: inner.append(step)):
+            report(1, 2, "steps", "working")
+        report(2, 2, "steps")
+    assert inner == [(1, 2, "steps", "working")]
+    assert outer == [(2, 2, "steps", "")]

@@ -1,0 +1,105 @@
+"""One attempt at an item in this process, its output and errors as a result."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+from viewer.batching.items import Item, Result
+from viewer.diagnostics import described
+from viewer.diagnostics.record import Record, recorded
+from viewer.errors import ViewerError
+from viewer.interrupts import watched
+from viewer.phrases import printable
+
+__all__ = ["FunctionJob", "attempt"]
+
+_BAD_INPUT, _UNWRITTEN, _DEFECT = 2, 5, 1  # exit codes
+_LONGEST = 2000  # characters of a message
+
+
+@dataclass(frozen=True)
+class FunctionJob:
+    """A plain function as a job.
+
+    Attributes
+    ----------
+    function : callable
+        Called with an ``Item``; must be importable by its name if items run in other processes. A
+        dict that it returns is the ``values`` of the result, anything else ``values["value"]``.
+    """
+
+    function: Callable[[Item], Any]
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item in this process."""
+        return attempt(item, self.function)
+
+
+def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
+    """Run one item; its failure is a result, and only a signal is raised.
+
+    Parameters
+    ----------
+    item : Item
+        The item.
+    call : callable
+        Called with the item. An int that it returns is the exit code, where 0 and 1 stand for
+        success; a dict is the values of the result.
+
+    Returns
+    -------
+    Result
+        With captured text, recorded diagnostics, values and outputs.
+
+    Raises
+    ------
+    Interrupted
+        If a signal arrives that nobody has postponed.
+    """
+    out, err = io.StringIO(), io.StringIO()
+    start = time.perf_counter()
+    with recorded() as record, contextlib.ExitStack() as stack:
+        stack.enter_context(contextlib.redirect_stdout(out))
+        stack.enter_context(contextlib.redirect_stderr(err))
+        # Also ends what the item has held back: writing holds signals until the block ends.
+        stack.enter_context(watched())
+        result = _outcome(item, call, record)
+    return replace(
+        result,
+        seconds=time.perf_counter() - start,
+        diagnostics=record.diagnostics,
+        outputs=tuple(record.outputs) if result.status == "done" else (),
+        text=out.getvalue() + err.getvalue() + result.text,
+        values=record.values | result.values,
+    )
+
+
+def _outcome(item: Item, call: Callable[[Item], Any], record: Record) -> Result:
+    try:
+        returned = call(item)
+    except ViewerError as problem:
+        if problem.diagnostic is not None:
+            record.diagnostics.append(described(problem.diagnostic))
+        return Result(item, "failed", problem.exit_code, message=printable(problem, _LONGEST))
+    except MemoryError:
+        return Result(item, "memory", _BAD_INPUT, message="not enough memory")
+    except OSError as problem:
+        where = "" if problem.filename is None else f"{problem.filename}: "
+        reason = printable(f"{where}{problem.strerror or problem}", _LONGEST)
+        return Result(item, "failed", _UNWRITTEN, message=reason)
+    except (Exception, SystemExit) as problem:
+        # The one place that catches everything: a batch is run for hours unattended, and a defect
+        # that one file brings to light must not cost the results of all others.
+        reason = printable(f"{type(problem).__name__}: {problem}", _LONGEST)
+        return Result(item, "failed", _DEFECT, message=reason, text="".join(traceback.format_exc()))
+    if isinstance(returned, int) and not isinstance(returned, bool):
+        return Result(item, "done" if returned in (0, 1) else "failed", returned)
+    if isinstance(returned, dict):
+        return Result(item, "done", values=returned)
+    return Result(item, "done", values={} if returned is None else {"value": returned})

@@ -1,0 +1,110 @@
+"""Engines that run the items of a batch: in this process, in local workers, on a cluster.
+
+Each module has ``run(items, job, limits)``, a generator of results in the order in which they
+finish. Engines take items only as they can run them, so that a batch of millions needs no queue.
+They start no more items once ``limits.is_stopping()`` is true, and finish those that run. Closing
+the generator cancels what runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Protocol
+
+from viewer.batching.items import Item, Result
+
+__all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
+
+IN_FLIGHT = 4
+"""Items handed out per worker, including the one that runs."""
+
+
+class Job(Protocol):
+    """What is done with each item: a callable that can be pickled.
+
+    It returns a result for any item, also for bad input; see ``attempts.attempt``.
+    """
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item in this process."""
+        ...
+
+
+def _never() -> bool:
+    return False
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much a batch may use.
+
+    Attributes
+    ----------
+    workers : int
+        Number of worker processes; engines that run in this process ignore it.
+    retries : int
+        How often an item is run again after its worker crashed, hung or ran out of memory.
+    timeout : float or None
+        Seconds after which the worker of an attempt is ended; None for no limit.
+    memory : int or None
+        Bytes that a worker may allocate; None for no limit.
+    cluster : str
+        Cluster as given to ``--cluster``; empty for this machine.
+    is_stopping : callable
+        Returns whether no more items are to be started.
+    """
+
+    workers: int = 1
+    retries: int = 2
+    timeout: float | None = None
+    memory: int | None = None
+    cluster: str = ""
+    is_stopping: Callable[[], bool] = _never
+
+
+class Engine(Protocol):
+    """A module of this folder."""
+
+    def run(self, items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
+        """Run items; yield one result per item that was started, as they finish."""
+        ...
+
+
+@dataclass(frozen=True)
+class EngineKind:
+    """Properties of an engine that are needed before its module is imported.
+
+    Attributes
+    ----------
+    title : str
+        Where items run, for messages.
+    packages : tuple of str
+        Packages of the extra ``batch`` that it needs.
+    is_isolated : bool
+        Whether a time and memory limit can be enforced, and a crash costs no more than its item.
+    """
+
+    title: str
+    packages: tuple[str, ...] = ()
+    is_isolated: bool = True
+
+
+ENGINES = {
+    "sequential": EngineKind("in this process", is_isolated=False),
+    "processes": EngineKind("in worker processes", ("pebble",)),
+    "dask_cluster": EngineKind("on a cluster", ("dask", "distributed")),
+}
+
+
+def load_engine(name: str) -> Engine:
+    """Return an engine.
+
+    Parameters
+    ----------
+    name : str
+        A key of ``ENGINES``.
+    """
+    engine: Engine = import_module(f"viewer.batching.engines.{name}")
+    return engine

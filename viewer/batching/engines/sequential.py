@@ -1,0 +1,18 @@
+"""Items one after another in this process."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from viewer.batching.engines import Job, Limits
+from viewer.batching.items import Item, Result
+
+__all__ = ["run"]
+
+
+def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
+    """Run items in order; time and memory are not limited, as nothing could be ended."""
+    for item in items:
+        if limits.is_stopping():
+            return
+        yield job(item)

@@ -1,0 +1,84 @@
+"""Record of one run: its diagnostics, data and written files, for callers that run commands."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from viewer.diagnostics.describing import described
+from viewer.diagnostics.diagnostic import Diagnostic
+from viewer.phrases import printable
+
+__all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", "recorded"]
+
+
+@dataclass
+class Record:
+    """Data of a run that its printed text does not have.
+
+    Attributes
+    ----------
+    diagnostics : list of dict
+        Warnings and notes as ``described`` returns them; those that are plain text have only
+        ``severity`` and ``message``.
+    values : dict
+        Results as JSON data.
+    outputs : dict of str
+        Written files, in order, as keys.
+    """
+
+    diagnostics: list[dict[str, Any]] = field(default_factory=list)
+    values: dict[str, Any] = field(default_factory=dict)
+    outputs: dict[str, None] = field(default_factory=dict)
+
+
+# Not a context variable: videos are encoded, and so written, by threads of their own.
+_current: Record | None = None
+
+
+@contextlib.contextmanager
+def recorded() -> Iterator[Record]:
+    """Record the run in the block. Runs are recorded one at a time per process."""
+    global _current
+    outer, record = _current, Record()
+    _current = record
+    try:
+        yield record
+    finally:
+        _current = outer
+
+
+def is_recorded() -> bool:
+    """Return whether a run is being recorded."""
+    return _current is not None
+
+
+def note_found(found: Diagnostic | str) -> bool:
+    """Record a warning or note; return whether a run is being recorded."""
+    if _current is None:
+        return False
+    if isinstance(found, Diagnostic):
+        _current.diagnostics.append(described(found))
+    else:
+        text = printable(found, 2000)
+        _current.diagnostics.append({"severity": "warning", "message": text})
+    return True
+
+
+def note_values(values: Mapping[str, Any]) -> None:
+    """Record results, which are JSON data."""
+    if _current is not None:
+        _current.values |= values
+
+
+def note_output(path: Path, instead_of: Path | None = None) -> None:
+    """Record a written file, or a folder instead of the files in its temporary folder."""
+    if _current is None:
+        return
+    if instead_of is not None:
+        others = (one for one in _current.outputs if not Path(one).is_relative_to(instead_of))
+        _current.outputs = dict.fromkeys(others)
+    _current.outputs[str(path)] = None
