@@ -50,6 +50,9 @@ def test_a_chosen_joint_drives_the_figure_at_once_and_undo_restores_it(panel):
     assert partner(hand, "right_elbow") == ("", "")
     assert no_edit(hand.state) == no_panel(hand.state, "drive") == ""
     assert is_automatic(hand.state) == "the match is automatic"
+    hand.state.of(Files).stream = object()
+    assert no_edit(hand.state) == "wait until the capture has been read"
+    hand.state.of(Files).stream = None
     hand.click("Only unmatched")
     hand.click("source of right_elbow")
     hand.step(2)
