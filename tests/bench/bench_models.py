@@ -1,4 +1,4 @@
-"""Reading body models: PIG from text, pickle and .npz; large arrays that are compressed or unused."""
+"""Reading body models: PIG from text, pickle and .npz; large arrays, compressed or unused."""
 
 from __future__ import annotations
 
