@@ -34,12 +34,13 @@ PARTS = {
         *("rendering", "rig", "interrupts", "resources"),
     },
     "lint": {"loading", "formats", "rig"},
-    "batching": {"formats", "media", "interrupts", "streams"},
+    "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts"},
     "interrupts": set(),
     "resources": set(),
     "streams": set(),
+    "version": set(),
 }
 LEAVES = {
     "phrases": set(),

@@ -103,7 +103,13 @@ def _dispatch(arguments: list[str]) -> int:
     parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
-    return import_module(f"viewer.commands.{name}").run(parsed)
+    command = import_module(f"viewer.commands.{name}")
+    if getattr(parsed, "no_cache", False):
+        from viewer.media.array_cache import without_cache
+
+        with without_cache():
+            return command.run(parsed)
+    return command.run(parsed)
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

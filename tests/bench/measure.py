@@ -52,6 +52,7 @@ def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) 
 def run_process(arguments: Sequence[str]) -> tuple[float, float]:
     """Run Python with arguments; return its wall time in seconds and its peak memory in MB."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
+    environment.setdefault("VIEWER_CACHE", str(Path(_CACHE.name) / "arrays"))
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started = time.perf_counter()
     process = subprocess.Popen(

@@ -36,7 +36,7 @@ from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
 from viewer.app.theme import add_system_fonts, apply_theme  # noqa: E402
-from viewer.app.typed_keys import TypedKeys, end_frame_before  # noqa: E402
+from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
@@ -188,6 +188,10 @@ class _Window:
             end_frame_before(self._imgui.input_events_queue, key, action)
             imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
+    def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
+        end_frame_before_click(self._imgui.input_events_queue, action)
+        imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
+
     def _on_change(self, *_: Any) -> None:
         self._is_dirty = True
 
@@ -209,7 +213,9 @@ class _Window:
         apply_theme(appearance.scale)
         self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
         imgui.backends.glfw_init_for_opengl(self._address, True)
-        glfw.set_key_callback(self.handle, self._on_key)  # replaces the callback of ImGui
+        # These replace callbacks of ImGui.
+        glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_mouse_button_callback(self.handle, self._on_button)
         imgui.backends.opengl3_init("#version 330")
 
     def _screen_scale(self) -> float:

@@ -76,6 +76,11 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         metavar="SIZE",
         help="refuse larger files, with k, M or G (default: 2G)",
     )
+    group.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="parse all numbers anew, without the arrays that earlier runs kept (see doctor)",
+    )
 
 
 def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
