@@ -156,7 +156,9 @@ def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSetting
     if contents.used_options is None:
         return
     used = contents.used_options | cast.used_options
-    if any(actor.drive is not None for actor in cast.actors):
+    # The first body of a capture may appear later.
+    is_driving = any(builder.target is not None for builder in cast.builders)
+    if is_driving or any(actor.drive is not None for actor in cast.actors):
         used.add("joint-map")
     cast.diagnostics += unused_options(settings, used)
 

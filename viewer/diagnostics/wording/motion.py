@@ -13,7 +13,7 @@ MESSAGES = {
     "F004.mapping-again": "expected each joint of {figure:text} once, found {joint:quoted} again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
-    "{figure:text}: {idle:list8}",
+    "{figure:text}: {idle:list8}; --joint-map can match them",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
