@@ -22,5 +22,6 @@ def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list
     """
     model = [] if arguments.model is None else [resolve(arguments.model)]
     more = [*model, *map(resolve, arguments.motion)]
+    more += [] if arguments.joint_map is None else [arguments.joint_map]
     named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *more)]
     return named if scene is None else [*named, *scene.files]

@@ -16,7 +16,7 @@ from viewer.commands._progress import Progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
-from viewer.formats import SUFFIXES
+from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning import CleanUp, clean_up
 from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
@@ -28,6 +28,7 @@ from viewer.streams import summary_stream
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.retargeting.joint_map import JointMap
 
 LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
@@ -133,6 +134,13 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         "auto: the zero pose if it is a standing pose, otherwise a frame in a T- or A-pose, "
         "otherwise estimated from the motion (default: auto)",
     )
+    group.add_argument(
+        "--joint-map",
+        metavar="FILE",
+        help="joints of the driven figure and the joints that drive them, one pair per line, as in "
+        "LeftUpLeg = lThigh; others are matched by name (convert --save-joint-map writes such a "
+        "file)",
+    )
 
 
 def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
@@ -195,6 +203,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         space=arguments.space or "",
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
+        joint_map=_joint_map(arguments),
         find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
@@ -208,6 +217,15 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         motions=tuple(Path(resolve(file)) for file in arguments.motion),
         springs=arguments.springs == "on",
     )
+
+
+def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
+    """Return the requested match of joints; raises FormatError if its file cannot be read."""
+    if arguments.joint_map is None:
+        return None
+    from viewer.formats._joint_map import read_joint_map
+
+    return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
 
 
 def size_limit(arguments: argparse.Namespace) -> int:

@@ -33,6 +33,7 @@ from viewer.commands._writing.motion_export import (
     write_motions,
     writes_keys,
 )
+from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
@@ -66,6 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
+    add_joint_map_argument(group)
     add_motion_arguments(parser)
     add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
@@ -90,7 +92,8 @@ def run(arguments: argparse.Namespace) -> int:
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
-    notes = [*write(arguments, scene, output, skinning), *baked]
+    with saving_joint_map(arguments, scene):
+        notes = [*write(arguments, scene, output, skinning), *baked]
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

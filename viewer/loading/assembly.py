@@ -84,6 +84,7 @@ def begin(
         cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
     _give_morphs(contents, cast)
     _move(contents, cast, settings or MotionSettings())
+    _note_unused_map(cast, settings or MotionSettings())
     for path, record in contents.poses:
         cast.diagnostics += _assign_pose(path, record, cast.actors)
     for path, pixels in contents.pictures:
@@ -137,7 +138,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.drives and _has_bare_motion(cast):
         from viewer.loading.figure_motions import drive_by_figures
 
-        if drive_by_figures(cast, wanted):
+        if drive_by_figures(cast, wanted, settings.joint_map):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate
@@ -149,6 +150,13 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         start = time_span(cast.actors)[0]
         for actor in cast.actors:
             pose_actor(actor, start)
+
+
+def _note_unused_map(cast: Cast, settings: MotionSettings) -> None:
+    """Record that the joint map is not used, because no motion drives a figure."""
+    chosen = settings.joint_map
+    if chosen is not None and all(actor.drive is None for actor in cast.actors):
+        cast.note("F007.unused-joint-map", chosen.path)
 
 
 def _has_bare_motion(cast: Cast) -> bool:

@@ -11,7 +11,7 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.carrying import carried_clip
+from viewer.loading.carrying import carrying_drive
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -24,6 +24,9 @@ from viewer.rig.motion.parameter_clip import parameter_clip
 from viewer.rig.motion.sampled_clip import SampledClip, joined
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
 
 __all__ = ["Builder", "joined_points", "joined_timing"]
@@ -71,6 +74,9 @@ class Builder:
         Figure with other joints that the bodies move instead of the model.
     swings : bool
         Whether the spring joints of later people are simulated.
+    joint_map : JointMap or None
+        Joints of the target and the joints of the model that drive them; None to match them by
+        name.
     """
 
     capture: Capture
@@ -86,6 +92,7 @@ class Builder:
     path: Path | None = None
     target: Figure | None = None
     swings: bool = False
+    joint_map: JointMap | None = None
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
@@ -161,25 +168,36 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)
+        drive: Drive | None = None
         if self.target is not None:
-            clip, more = carried_clip(self.model, clip, self.up, self.target)
+            drive = self._drive(clip)
+            clip, more = driven_clip(drive, self.target)
             notes += more
-        self._add_clip(person, clip, new)
+        self._add_clip(person, clip, new, drive)
         return [replace(note, path=self.path) for note in notes]
 
-    def _add_clip(self, person: int, clip: SampledClip, new: list[Actor]) -> None:
-        """Append a clip to that of a person, or add an actor."""
+    def _drive(self, clip: SampledClip) -> Drive:
+        return carrying_drive(self.model, clip, self.up, self.joint_map)
+
+    def _add_clip(
+        self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
+    ) -> None:
+        """Append a clip to that of a person, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
             if self.target is None:
                 actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
+            actor.drive = drive
             self._bodies[person] = actor
             new.append(actor)
         else:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
-            timing = joined_timing(actor.clip.timing, clip.timing, actor.clip.n_rows)
-            actor.clip = joined([actor.clip, clip], timing)
+            actor.clip = _extended(actor.clip, clip)
+            if drive is not None and actor.drive is not None:
+                motion = actor.drive.motion
+                motion = replace(motion, clip=_extended(motion.clip, drive.motion.clip))
+                actor.drive = replace(actor.drive, motion=motion)
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]
@@ -242,15 +260,17 @@ class Builder:
         then.
         """
         notes: list[Diagnostic] = []
-        clips: list[tuple[Actor, SampledClip]] = []
+        clips: list[tuple[Actor, SampledClip, Drive]] = []
         for actor in self._bodies.values():
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
-            clip, said = carried_clip(self.model, actor.clip, self.up, target)
-            clips.append((actor, clip))
+            drive = self._drive(actor.clip)
+            clip, said = driven_clip(drive, target)
+            clips.append((actor, clip, drive))
             notes += said
         self.target = target
-        for actor, clip in clips:
+        for actor, clip, drive in clips:
             actor.figure, actor.clip, actor.color = target, clip, None
+            actor.drive = drive
             actor.pose = figure_pose(target)
             pose_actor(actor, 0.0)
         fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
@@ -268,6 +288,11 @@ def _order(item: tuple[int, object]) -> tuple[bool, int]:
     """Return a sort key of people: by number, untracked ones last."""
     person = item[0]
     return not is_tracked(person), abs(person)
+
+
+def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
+    """Return one clip of the rows of two with the same timeline."""
+    return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
 
 
 def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:

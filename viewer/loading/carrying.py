@@ -3,23 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
-import numpy as np
-
-from viewer.diagnostics import Diagnostic
-from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import multiply
-from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.retarget import retarget
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.joint_map import JointMap
 
-__all__ = ["carried_clip", "has_joints"]
+__all__ = ["carrying_drive", "has_joints"]
 
 _ENOUGH = 0.5  # fraction of the joint names that a body model has
-_Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 
 
 def has_joints(figure: Figure, names: Sequence[str]) -> bool:
@@ -36,10 +29,10 @@ def has_joints(figure: Figure, names: Sequence[str]) -> bool:
     return names[0] in own and sum(name in own for name in names) >= _ENOUGH * len(names)
 
 
-def carried_clip(
-    body: Figure, clip: SampledClip, up: str, target: Figure
-) -> tuple[SampledClip, list[Diagnostic]]:
-    """Return the motion of a body as a motion of another figure, in the world of the body.
+def carrying_drive(
+    body: Figure, clip: SampledClip, up: str, joint_map: JointMap | None = None
+) -> Drive:
+    """Return the motion of a body as one that drives other figures, in the world of the body.
 
     Parameters
     ----------
@@ -48,52 +41,9 @@ def carried_clip(
     clip : SampledClip
         Its motion.
     up : "y" or "z"
-        Up axis of the motion's world, which the result keeps.
-    target : Figure
-        Figure with a skeleton.
-
-    Returns
-    -------
-    clip : SampledClip
-        Motion of ``target``.
-    notes : list of Diagnostic
-        Messages about matched joints and the scale of the path.
-
-    Raises
-    ------
-    RigError
-        If too few joints match.
+        Up axis of the motion's world, which driven figures keep.
+    joint_map : JointMap, optional
+        The requested match of joints.
     """
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up == "z" else "y")
-    found, notes = retarget(SkeletonMotion(moving, clip), target)
-    if up == target.up:
-        return found, notes
-    # The retargeted figure stands along its own up axis: it is rotated back to that of the world.
-    turn = _Z_TO_Y if target.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
-    return _rotated(found, target, turn), notes
-
-
-def _rotated(clip: SampledClip, figure: Figure, turn: Floats) -> SampledClip:
-    """Return a motion rotated about the origin: R' = Q R and T' = Q (rest + T) - rest at roots."""
-    skeleton = figure.require_skeleton()
-    matrix, rotations = quaternion_to_matrix(turn), clip.rotations.copy()
-    roots = np.flatnonzero(skeleton.parents < 0)
-    rotations[:, roots] = multiply(turn, rotations[:, roots])
-    rests = skeleton.rest_translations[roots]
-    shifts = np.zeros_like(clip.rotations[..., :3]) if clip.translations is None else (
-        clip.translations.copy()
-    )  # fmt: skip
-    place = clip.figure_translations
-    moved = rests + shifts[:, roots]
-    if place is None or len(roots) != 1:
-        shifts[:, roots] = moved @ matrix.T - rests
-        place = None if place is None else place @ matrix.T
-    else:
-        shifts[:, roots] = 0.0
-        place = (moved[:, 0] + place) @ matrix.T - rests[0]
-    return replace(
-        clip,
-        rotations=rotations,
-        translations=shifts if shifts.any() else None,
-        figure_translations=place,
-    )
+    return Drive(SkeletonMotion(moving, clip), joint_map=joint_map, keeps_up=True)

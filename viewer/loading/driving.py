@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,11 +14,12 @@ from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
-from viewer.loading.carrying import carried_clip, has_joints
+from viewer.loading.carrying import carrying_drive, has_joints
 from viewer.loading.cast import Cast
 from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
 from viewer.loading.filming import filmed
+from viewer.loading.refusals import map_refusal, model_refusal
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
@@ -31,10 +31,12 @@ from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE
+from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
+    from viewer.rig.retargeting.joint_map import JointMap
 
 __all__ = ["drive", "is_body"]
 
@@ -233,41 +235,48 @@ def _give_body_motion(
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
     if target is not None:
-        cast.add(_carried(path, actor, up[-1], target, cast), up[-1], placed=False)
+        carried = _carried(path, actor, up[-1], target, cast, settings.joint_map)
+        cast.add(carried, up[-1], placed=False)
         return
-    if is_bundled and settings.drives and _drives_character(path, motion.name, actor, up, cast):
+    if is_bundled and _drives_character(path, motion.name, actor, up, cast, settings):
         return
     if is_bundled:
         _note_bundled(cast, path, *lost)
     cast.add(actor, up[-1], placed=False)
 
 
-def _carried(path: Path, actor: Actor, up: str, target: Figure, cast: Cast) -> Actor:
+def _carried(
+    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, joint_map: JointMap | None
+) -> Actor:
     """Return an actor of a figure with other joints that a body moves.
 
     Raises RigError if too few joints match.
     """
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
+    drive = carrying_drive(actor.figure, actor.clip, up, joint_map)
     try:
-        clip, notes = carried_clip(actor.figure, actor.clip, up, target)
+        clip, notes = driven_clip(drive, target)
     except RigError as problem:
-        values = {"problem": problem.cause}
-        raise RigError(Diagnostic("F004.model", path, values=values)) from None
+        raise model_refusal(problem, path) from None
     cast.diagnostics += [replace(note, path=path) for note in notes]
-    return Actor(target, clip=clip, placement=actor.placement, called=actor.called)
+    return Actor(target, clip=clip, placement=actor.placement, called=actor.called, drive=drive)
 
 
-def _drives_character(path: Path, name: str, actor: Actor, up: str, cast: Cast) -> bool:
+def _drives_character(
+    path: Path, name: str, actor: Actor, up: str, cast: Cast, settings: MotionSettings
+) -> bool:
     """Let a motion of the bundled body drive another figure that has its joints, if any."""
-    if not any(other.clip is None and other.figure.is_attached for other in cast.actors):
+    has_any = any(other.clip is None and other.figure.is_attached for other in cast.actors)
+    if not (settings.drives and has_any):
         return False
     from viewer.loading.skeleton_motions import drive_somebody
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
+    from viewer.rig.retargeting.drive import Drive
 
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
     body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
-    motion = SkeletonMotion(body, actor.clip)
-    return drive_somebody(path, motion, cast, actor.placement)[0]
+    drive = Drive(SkeletonMotion(body, actor.clip), joint_map=settings.joint_map)
+    return drive_somebody(path, drive, cast, actor.placement)[0]
 
 
 def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "") -> str:
@@ -311,7 +320,7 @@ def _begin_capture(
     # EasyMocap's usual calibration has z up, which needs no message.
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
-    builder.swings = settings.springs
+    builder.swings, builder.joint_map = settings.springs, settings.joint_map
     _carry(builder, cast, target, drives=is_bundled and settings.drives)
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
@@ -334,17 +343,22 @@ def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) ->
         try:
             cast.diagnostics += builder.carry_to(target)
         except RigError as problem:
-            values = {"problem": problem.cause}
-            raise RigError(Diagnostic("F004.model", builder.path, values=values)) from None
+            raise model_refusal(problem, builder.path) from None
         return
     if not (drives and builder.has_bodies):
         return
+    refusal: RigError | None = None
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and actor.figure.is_attached:
-            with contextlib.suppress(RigError):
+            try:
                 cast.diagnostics += builder.carry_to(actor.figure)
-                cast.take(index)
-                return
+            except RigError as problem:
+                refusal = refusal or problem
+                continue
+            cast.take(index)
+            return
+    if refusal is not None and builder.joint_map is not None:
+        raise map_refusal(refusal, builder.path)
 
 
 def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:

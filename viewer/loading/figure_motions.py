@@ -16,6 +16,8 @@ from viewer.rig.figure_group import FigureGroup
 from viewer.rig.motion.animation_choice import chosen_animation
 from viewer.rig.motion.baking import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.joint_map import JointMap
 
 if TYPE_CHECKING:
     from viewer.formats import Content
@@ -59,7 +61,7 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
     return SkeletonMotion(bare, clip)
 
 
-def drive_by_figures(cast: Cast, wanted: str) -> bool:
+def drive_by_figures(cast: Cast, wanted: str, joint_map: JointMap | None = None) -> bool:
     """Let skeletons with animations, but without a mesh, move figures that have no motion.
 
     A skeleton that moves another figure is not shown itself. Returns whether there is one.
@@ -70,6 +72,13 @@ def drive_by_figures(cast: Cast, wanted: str) -> bool:
         The actors before they play animations.
     wanted : str
         The animation, see ``chosen_animation``.
+    joint_map : JointMap, optional
+        The requested match of joints.
+
+    Raises
+    ------
+    RigError
+        If no figure matches, although a joint map is given.
     """
     found = False
     for actor in [*cast.actors]:
@@ -82,7 +91,8 @@ def drive_by_figures(cast: Cast, wanted: str) -> bool:
             motion = _motion_of(figure, wanted)
         except RigError:
             continue  # reported when the animations are started
-        if drive_somebody(actor.origin or Path(figure.name), motion, cast, np.eye(4))[0]:
+        drive = Drive(motion, joint_map=joint_map)
+        if drive_somebody(actor.origin or Path(figure.name), drive, cast, np.eye(4))[0]:
             cast.take(next(n for n, other in enumerate(cast.actors) if other is actor))
             found = True
     return found

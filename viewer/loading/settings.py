@@ -5,6 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viewer.rig.retargeting.joint_map import JointMap
 
 __all__ = ["MotionSettings"]
 
@@ -62,6 +66,8 @@ class MotionSettings:
         Rest pose of skeletons whose motion drives a figure: the number of a frame, ``"zero"`` for
         the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
         a frame in a T- or A-pose, otherwise an estimate from the anatomy.
+    joint_map : JointMap or None
+        Joints of driven figures and the joints that drive them; None to match them by name.
     """
 
     model: Path | None = None
@@ -83,3 +89,4 @@ class MotionSettings:
     space: str = ""
     average_shape: bool = False
     source_rest: int | str = "auto"
+    joint_map: JointMap | None = None

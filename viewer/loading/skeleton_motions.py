@@ -11,13 +11,16 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.cast import Cast
+from viewer.loading.refusals import map_refusal, model_refusal
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.retargeting.retarget import retarget, scaled_motion
-from viewer.rig.retargeting.source_rest import SourceRest, rest_fault
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.retarget import scaled_motion
+from viewer.rig.retargeting.source_rest import rest_fault
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.units import METRES, is_metres
 
@@ -84,18 +87,18 @@ def give_skeleton_motion(
     placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
     if settings.drives and model is not None:
         try:
-            clip, notes = retarget(motion, model, source_rest=settings.source_rest)
+            drive = Drive(motion, settings.source_rest, settings.joint_map)
+            clip, notes = driven_clip(drive, model)
         except RigError as problem:
-            values = {"problem": problem.cause}
-            raise RigError(Diagnostic("F004.model", path, values=values)) from None
+            raise model_refusal(problem, path) from None
         cast.diagnostics += [replace(note, path=path) for note in notes]
         called = cast.free_title(motion.figure.name)
-        cast.add(
-            Actor(model, clip=clip, placement=placement, called=called), model.up, placed=False
-        )
+        actor = Actor(model, clip=clip, placement=placement, called=called, drive=drive)
+        cast.add(actor, model.up, placed=False)
         return None
     if settings.drives:
-        is_driving, refusal = drive_somebody(path, motion, cast, placement, settings.source_rest)
+        drive = Drive(motion, settings.source_rest, settings.joint_map)
+        is_driving, refusal = drive_somebody(path, drive, cast, placement)
         if is_driving:
             return None
         if refusal:
@@ -129,11 +132,7 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 
 def drive_somebody(
-    path: Path,
-    motion: SkeletonMotion,
-    cast: Cast,
-    placement: Floats,
-    source_rest: SourceRest = "zero",
+    path: Path, drive: Drive, cast: Cast, placement: Floats
 ) -> tuple[bool, str | Diagnostic]:
     """Assign a motion to the first matching figure with a mesh and no clip, if any.
 
@@ -141,14 +140,12 @@ def drive_somebody(
     ----------
     path : Path
         File of the motion, for messages.
-    motion : SkeletonMotion
+    drive : Drive
         Motion of another skeleton.
     cast : Cast
         Its actor gets the clip.
     placement : (4, 4)
         Applied to that actor.
-    source_rest : int, "zero" or "auto"
-        The motion's rest pose, see ``MotionSettings``.
 
     Returns
     -------
@@ -156,20 +153,28 @@ def drive_somebody(
         Whether there is such a figure.
     refusal : str or Diagnostic
         Why the first figure does not match; empty if there is none.
+
+    Raises
+    ------
+    RigError
+        If no figure matches, although a joint map is given.
     """
-    refusal: str | Diagnostic = ""
+    refusal: RigError | None = None
     for actor in cast.actors:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
-            actor.clip, notes = retarget(motion, actor.figure, source_rest=source_rest)
+            clip, notes = driven_clip(drive, actor.figure)
         except RigError as problem:
-            refusal = refusal or problem.cause
+            refusal = refusal or problem
             continue
+        actor.clip, actor.drive = clip, drive
         actor.placement = placement @ actor.placement
         cast.diagnostics += [replace(note, path=path) for note in notes]
         return True, ""
-    return False, refusal
+    if refusal is not None and drive.joint_map is not None:
+        raise map_refusal(refusal, path)
+    return False, "" if refusal is None else refusal.cause
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:

@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.sampled_clip import SampledClip
     from viewer.rig.motion.transform_clip import TransformClip
+    from viewer.rig.retargeting.drive import Drive
 
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
@@ -98,6 +99,8 @@ class Actor:
         Parts of the mesh that are not drawn, by index.
     springs : Swinging or None
         Simulation of its spring joints while its clip plays; None leaves them to the clip.
+    drive : Drive or None
+        The motion of another skeleton from which its clip was retargeted; None for other clips.
     """
 
     figure: Figure
@@ -116,6 +119,7 @@ class Actor:
     origin: Path | None = None
     hidden_parts: frozenset[int] = frozenset()
     springs: Swinging | None = None
+    drive: Drive | None = None
 
     @property
     def title(self) -> str:

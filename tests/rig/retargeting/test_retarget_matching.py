@@ -170,8 +170,21 @@ def test_equal_names_match_whatever_they_mean() -> None:
                 "idle": list(BODY),
             },
         ),
-        ({"tial": "head"}, "F004.mapping-joint", {"joint": "tial", "figure": "snake", "n": 0}),
-        ({"tail": "haed"}, "F004.mapping-joint", {"joint": "haed", "figure": "body", "n": 0}),
+        (
+            {"tial": "head"},
+            "F004.mapping-joint",
+            {"joint": "tial", "figure": "snake", "n": 0, "near": "did you mean tail?"},
+        ),
+        (
+            {"tail": "haed"},
+            "F004.mapping-joint",
+            {"joint": "haed", "figure": "body", "n": 0, "near": "did you mean head?"},
+        ),
+        (
+            {"tail": "head", "base": "head"},
+            "F004.mapping-again",
+            {"joint": "head", "figure": "body"},
+        ),
     ],
 )
 def test_incompatible_figures_are_refused(

@@ -11,6 +11,10 @@ MESSAGES = {
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
     "F007.unused-rig": "--rig {value:text} has no effect: only Anny has several rigs",
     "F007.unused-lod": "--lod {value:text} has no effect: only MHR has levels of detail",
+    "F007.unused-joint-map": "--joint-map has no effect: no motion of another skeleton drives a "
+    "figure",
+    "F002.joint-map": 'expected "figure joint = motion joint", found {found:quoted}',
+    "F002.joint-map-empty": 'expected a line "figure joint = motion joint", found none',
     "F002.no-body-model": "--model: not a body model",
     "F002.no-motion": "--motion: expected a motion or an animation of a skeleton, found none",
     "F004.animation": "no animation is called {name:quoted}; {hint}",

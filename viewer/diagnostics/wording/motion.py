@@ -7,8 +7,10 @@ MESSAGES = {
     "have",
     "F004.no-skeleton": "{figure:text} has no skeleton to animate",
     "F004.mirror": "figure {figure:text} has no skeleton to mirror",
-    "F004.mapping-joint": "the mapping names {joint:quoted}, which {figure:text} does not have",
-    "F004.mapping-joints": "the mapping names {joint:quoted}, of which {figure:text} has {n}",
+    "F004.mapping-joint": "expected a joint of {figure:text}, found {joint:quoted}; {near}",
+    "F004.mapping-joints": "expected one joint of {figure:text}, found {joint:quoted}, the name "
+    "of {n}; {near}",
+    "F004.mapping-again": "expected each joint of {figure:text} once, found {joint:quoted} again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
     "{figure:text}: {idle:list8}",

@@ -10,13 +10,16 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
-from viewer.rig.retargeting.joint_names import joint_meanings, plain_names
+from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs, mapped_partners
+from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place, plain_names
 from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
 
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
+
+_Names = tuple[tuple[str, ...], tuple[str, ...]]  # of the source, and of the target
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,62 +36,105 @@ class Matches:
         Whether both skeletons have the same names and hierarchy.
     notes : tuple of Diagnostic
         Messages about matched joints, joints at rest, and unused joints.
+    origins : tuple of J str
+        How each joint was matched: ``"map"`` by the joint map, ``"hierarchy"`` with the whole
+        hierarchy, ``"humanoid"`` by the human bones that a file states, ``"name"`` by a known name,
+        ``"place"`` by its place among other joints, ``"same name"``; empty for unmatched joints.
     """
 
     partners: Ints
     names: tuple[str, ...]
     is_hierarchy: bool
     notes: tuple[Diagnostic, ...]
+    origins: tuple[str, ...]
 
 
 def match_joints(
     source: Skeleton,
     target: Skeleton,
-    mapping: Mapping[str, str] | None,
+    mapping: Mapping[str, str] | JointMap | None,
     titles: tuple[str, str],
 ) -> Matches:
     """Match joints by mapping, then by the meaning of names, then by equal names.
+
+    A source joint of the mapping is not matched again automatically. A mapping that states the
+    automatic match has the same result as none.
 
     Parameters
     ----------
     source, target : Skeleton
         The skeleton of the motion, and the skeleton to which it is retargeted.
-    mapping : mapping of str to str, optional
-        Joint names of the source to joint names of the target.
+    mapping : JointMap, or mapping of str to str, optional
+        Target joints and their source joints; or joint names of the source to those of the target.
     titles : (str, str)
         Names of the two skeletons in messages.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a missing joint.
+        If too few joints match, or the mapping names a missing joint or lists a joint twice.
     """
     plain = _lower(source.names), _lower(target.names)
-    meanings = tuple(joint_meanings(s) for s in (source, target))
-    is_hierarchy = not mapping and _has_same_hierarchy(source, target, plain)
-    partners = np.full(target.n_joints, -1, dtype=np.int32)
+    meanings = joint_meanings(source), joint_meanings(target)
+    own = _automatic(source, target, plain, meanings)
+    partners, is_mapped = own, np.zeros(target.n_joints, dtype=bool)
+    if mapping:
+        chosen = mapping if isinstance(mapping, JointMap) else map_from_pairs(mapping)
+        partners = mapped_partners(chosen, source, target, titles)
+        is_mapped = partners != UNMAPPED
+        _match_by_names(partners, plain, meanings)
+    is_hierarchy = _has_same_hierarchy(source, target, plain) and np.array_equal(partners, own)
+    is_enough = is_hierarchy or _is_enough(partners, meanings, plain)
+    if not (is_enough or (mapping and (partners >= 0).any())):
+        raise _misfit(source, target, partners, titles)
+    origins = _origins(source, target, partners, meanings)
     if is_hierarchy:
+        origins = ["hierarchy"] * target.n_joints
+    for joint in np.flatnonzero(is_mapped & (partners != own)).tolist():
+        origins[joint] = "map"
+    notes = tuple(_notes(source, target, partners, titles))
+    return Matches(partners, meanings[1], is_hierarchy, notes, tuple(origins))
+
+
+def _automatic(source: Skeleton, target: Skeleton, plain: _Names, meanings: _Names) -> Ints:
+    """Return the source joint of each target joint without a mapping: (J,), -1 for none."""
+    partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
+    if _has_same_hierarchy(source, target, plain):
         partners[:] = [plain[0].index(name) for name in plain[1]]
     else:
-        for key, value in (mapping or {}).items():
-            joint = _find(target, value, titles[1])
-            partners[joint] = _find(source, key, titles[0])
-        for names, allowed in ((meanings, ""), (plain, meanings)):
-            _match_equal(partners, names, allowed)
-    if not (is_hierarchy or mapping or _is_enough(partners, meanings, plain)):
-        raise _misfit(source, target, partners, titles)
-    return Matches(
-        partners, meanings[1], is_hierarchy, tuple(_notes(source, target, partners, titles))
-    )
+        _match_by_names(partners, plain, meanings)
+    return partners
+
+
+def _match_by_names(partners: Ints, plain: _Names, meanings: _Names) -> None:
+    """Match the joints that are not in the mapping, in place; -1 for those without a match."""
+    for names, known in ((meanings, None), (plain, meanings)):
+        _match_equal(partners, names, known)
+    partners[partners == UNMAPPED] = -1
+
+
+def _origins(source: Skeleton, target: Skeleton, partners: Ints, meanings: _Names) -> list[str]:
+    """Return how each joint is matched without a mapping; see ``Matches``."""
+    is_stated = source.humanoid is not None or target.humanoid is not None
+    placed = joints_by_place(source), joints_by_place(target)
+    origins = []
+    for joint, partner in enumerate(partners.tolist()):
+        meaning = meanings[1][joint]
+        if partner < 0 or not meaning or meaning != meanings[0][partner]:
+            origins.append("" if partner < 0 else "same name")
+        elif is_stated:
+            origins.append("humanoid")
+        else:
+            is_placed = partner in placed[0] or joint in placed[1]
+            origins.append("place" if is_placed else "name")
+    return origins
 
 
 def _lower(names: Sequence[str]) -> tuple[str, ...]:
     return tuple(name.lower() for name in plain_names(names))
 
 
-def _has_same_hierarchy(
-    source: Skeleton, target: Skeleton, plain: tuple[tuple[str, ...], ...]
-) -> bool:
+def _has_same_hierarchy(source: Skeleton, target: Skeleton, plain: _Names) -> bool:
     """Return whether all joints have equal names and parents, in any order."""
     trees = []
     for skeleton, names in zip((source, target), plain, strict=True):
@@ -97,21 +143,8 @@ def _has_same_hierarchy(
     return len(trees[0]) == source.n_joints and trees[0] == trees[1]
 
 
-def _find(skeleton: Skeleton, name: str, title: str) -> int:
-    found = [joint for joint, known in enumerate(skeleton.names) if known == name]
-    if len(found) == 1:
-        return found[0]
-    values = {"joint": name, "figure": title, "n": len(found)}
-    key = "F004.mapping-joints" if found else "F004.mapping-joint"
-    raise RigError(Diagnostic(key, values=values))
-
-
-def _match_equal(
-    partners: Ints,
-    names: tuple[tuple[str, ...], ...],
-    meanings: tuple[tuple[str, ...], ...] | str,
-) -> None:
-    """Match joints with equal names whose meaning is unknown in both skeletons."""
+def _match_equal(partners: Ints, names: _Names, meanings: _Names | None) -> None:
+    """Match joints with equal names; with ``meanings``, those whose meaning is unknown in both."""
     used = set(partners.tolist())
     known = {
         name: joint
@@ -119,13 +152,12 @@ def _match_equal(
         if name and joint not in used and not (meanings and meanings[0][joint])
     }
     for joint, name in enumerate(names[1]):
-        if partners[joint] < 0 and name in known and not (meanings and meanings[1][joint]):
+        is_open = partners[joint] == UNMAPPED and not (meanings and meanings[1][joint])
+        if is_open and name in known:
             partners[joint] = known[name]
 
 
-def _is_enough(
-    partners: Ints, meanings: tuple[tuple[str, ...], ...], plain: tuple[tuple[str, ...], ...]
-) -> bool:
+def _is_enough(partners: Ints, meanings: _Names, plain: _Names) -> bool:
     """Return whether the hips and a limb match, or at least half of the joints."""
     matched = {name for joint, name in enumerate(meanings[1]) if partners[joint] >= 0}
     if "pelvis" in matched and any(set(limb.split()) <= matched for limb in _LIMBS):

@@ -18,7 +18,7 @@ from viewer.rig.arrays import Ints
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["canonical_names", "joint_meanings", "plain_names", "sided_words"]
+__all__ = ["canonical_names", "joint_meanings", "joints_by_place", "plain_names", "sided_words"]
 
 _WORDS = {
     "pelvis": "pelvis hips",
@@ -134,6 +134,28 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
     if skeleton.humanoid is not None:
         return _stated(skeleton.humanoid, skeleton.n_joints)
     return canonical_names(skeleton.names, skeleton.parents)
+
+
+def joints_by_place(skeleton: Skeleton) -> set[int]:
+    """Return the joints whose meaning follows from their place, not from their own names.
+
+    These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
+    humanoid has none.
+
+    Parameters
+    ----------
+    skeleton : Skeleton
+        Names and hierarchy.
+    """
+    if skeleton.humanoid is not None or skeleton.n_joints > _MOST:
+        return set()
+    meanings = canonical_names(skeleton.names, skeleton.parents)
+    own = [_role(key) for key in _unambiguous(_keys(skeleton.names))]
+    return {
+        joint
+        for joint, meaning in enumerate(meanings)
+        if meaning and not meaning.startswith(own[joint] or "-")
+    }
 
 
 def _stated(humanoid: Humanoid, n_joints: int) -> tuple[str, ...]:

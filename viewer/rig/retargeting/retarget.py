@@ -29,6 +29,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
@@ -85,7 +86,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 def retarget(
     motion: SkeletonMotion,
     figure: Figure,
-    mapping: Mapping[str, str] | None = None,
+    mapping: Mapping[str, str] | JointMap | None = None,
     source_rest: SourceRest = "zero",
 ) -> tuple[SampledClip, list[Diagnostic]]:
     """Return a motion made for another skeleton as a clip of a figure.
@@ -102,8 +103,9 @@ def retarget(
         Skeleton and clip, up along y or z.
     figure : Figure
         Figure with a skeleton; its unmatched joints stay in their rest pose.
-    mapping : mapping of str to str, optional
-        Maps the motion's joint names to the figure's.
+    mapping : JointMap, or mapping of str to str, optional
+        The figure's joints and the motion's joints that drive them; or the motion's joint names to
+        the figure's.
     source_rest : int, "zero" or "auto"
         The motion's rest pose, see ``viewer.rig.retargeting.source_rest``; with "auto", a motion of
         the figure's own skeleton keeps its own rest pose.

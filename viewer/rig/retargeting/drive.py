@@ -1,0 +1,37 @@
+"""Motions that drive figures, kept so that they can be retargeted again with other joints."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.joint_map import JointMap
+
+__all__ = ["Drive"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drive:
+    """A motion that drives a figure with other joints, and how it is retargeted.
+
+    Attributes
+    ----------
+    motion : SkeletonMotion
+        The motion of the source.
+    source_rest : int, "zero" or "auto"
+        Its rest pose, see ``viewer.rig.retargeting.source_rest``.
+    joint_map : JointMap or None
+        The requested match of joints; None for the automatic one.
+    keeps_up : bool
+        Whether the result keeps the up axis of the motion's world instead of the figure's.
+    finish : callable or None
+        Changes the resulting clip further, as clean-up does.
+    """
+
+    motion: SkeletonMotion
+    source_rest: int | str = "zero"
+    joint_map: JointMap | None = None
+    keeps_up: bool = False
+    finish: Callable[[SampledClip], SampledClip] | None = None

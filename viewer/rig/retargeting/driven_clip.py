@@ -1,0 +1,92 @@
+"""Retargeting of the motion that drives a figure, and the match of their joints."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
+from viewer.rig.retargeting.joint_matches import Matches, match_joints
+from viewer.rig.retargeting.retarget import retarget
+
+__all__ = ["driven_clip", "full_map", "matches_of"]
+
+_Z_TO_Y = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+
+
+def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnostic]]:
+    """Return the motion of a drive as a clip of a figure, before ``Drive.finish``.
+
+    Parameters
+    ----------
+    drive : Drive
+        Motion, and how its joints are matched.
+    figure : Figure
+        Figure with a skeleton.
+
+    Returns
+    -------
+    clip : SampledClip
+        Motion of the figure.
+    notes : list of Diagnostic
+        Messages, as of ``retarget``.
+
+    Raises
+    ------
+    RigError
+        As ``retarget`` does.
+    """
+    found, notes = retarget(drive.motion, figure, drive.joint_map, drive.source_rest)
+    up = drive.motion.figure.up
+    if not drive.keeps_up or up == figure.up:
+        return found, notes
+    # The retargeted figure stands along its own up axis: it is rotated back to that of the world.
+    rotation = _Z_TO_Y if figure.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
+    return _rotated(found, figure, rotation), notes
+
+
+def matches_of(drive: Drive, figure: Figure) -> Matches:
+    """Return the match of a drive's joints with those of a figure; raises as ``match_joints``."""
+    source = drive.motion.figure
+    skeletons = source.require_skeleton(), figure.require_skeleton()
+    return match_joints(*skeletons, drive.joint_map, (source.name, figure.name))
+
+
+def full_map(drive: Drive, figure: Figure) -> JointMap:
+    """Return the match with a figure as a map of all its joints; raises as ``match_joints``."""
+    source, target = drive.motion.figure.require_skeleton(), figure.require_skeleton()
+    return joint_map_of(matches_of(drive, figure).partners, source, target)
+
+
+def _rotated(clip: SampledClip, figure: Figure, rotation: Floats) -> SampledClip:
+    """Return a motion rotated about the origin: R' = Q R and T' = Q (rest + T) - rest at roots."""
+    skeleton = figure.require_skeleton()
+    matrix, rotations = quaternion_to_matrix(rotation), clip.rotations.copy()
+    roots = np.flatnonzero(skeleton.parents < 0)
+    rotations[:, roots] = multiply(rotation, rotations[:, roots])
+    rests = skeleton.rest_translations[roots]
+    shifts = np.zeros_like(clip.rotations[..., :3]) if clip.translations is None else (
+        clip.translations.copy()
+    )  # fmt: skip
+    place = clip.figure_translations
+    moved = rests + shifts[:, roots]
+    if place is None or len(roots) != 1:
+        shifts[:, roots] = moved @ matrix.T - rests
+        place = None if place is None else place @ matrix.T
+    else:
+        shifts[:, roots] = 0.0
+        place = (moved[:, 0] + place) @ matrix.T - rests[0]
+    return replace(
+        clip,
+        rotations=rotations,
+        translations=shifts if shifts.any() else None,
+        figure_translations=place,
+    )

@@ -1,0 +1,126 @@
+"""Joint maps: the source joint of each joint of a target skeleton, as chosen by the user."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
+from viewer.near_names import name_hint
+from viewer.rig.arrays import Ints
+from viewer.rig.skeleton import Skeleton, joint_labels, shown_joints
+
+__all__ = ["UNMAPPED", "JointMap", "joint_map_of", "map_from_pairs", "mapped_partners"]
+
+UNMAPPED = -2
+"""Entry of ``mapped_partners`` for joints that are not in the map."""
+
+
+@dataclass(frozen=True, slots=True)
+class JointMap:
+    """Target joints and the source joints that drive them, by label.
+
+    A target joint occurs once; a source joint may drive several. Target joints that are not listed
+    are matched automatically.
+
+    Attributes
+    ----------
+    pairs : tuple of (str, str)
+        Labels of a target joint and of its source joint, as in ``joint_labels``; the second is
+        empty for a joint that stays at rest.
+    path : Path or None
+        The file, for messages.
+    lines : tuple of int
+        Line of each pair in the file; empty without a file.
+    """
+
+    pairs: tuple[tuple[str, str], ...]
+    path: Path | None = None
+    lines: tuple[int, ...] = ()
+
+
+def map_from_pairs(mapping: Mapping[str, str]) -> JointMap:
+    """Return a joint map from source joints (keys) and the target joints that they drive."""
+    return JointMap(tuple((target, source) for source, target in mapping.items()))
+
+
+def joint_map_of(partners: Ints, source: Skeleton, target: Skeleton) -> JointMap:
+    """Return a map that lists every joint of a match, including those at rest.
+
+    Parameters
+    ----------
+    partners : (J,)
+        Source joint of each target joint, -1 for none.
+    source, target : Skeleton
+        The two skeletons.
+    """
+    sources, targets = joint_labels(source), joint_labels(target)
+    pairs = [
+        (targets[joint], sources[partners[joint]] if partners[joint] >= 0 else "")
+        for joint in shown_joints(target).tolist()
+    ]
+    return JointMap(tuple(pairs))
+
+
+def mapped_partners(
+    joint_map: JointMap, source: Skeleton, target: Skeleton, titles: tuple[str, str]
+) -> Ints:
+    """Return the source joint of each target joint: (J,) int32.
+
+    -1 for joints that the map keeps at rest, -2 for joints that it does not list.
+
+    Parameters
+    ----------
+    joint_map : JointMap
+        The map.
+    source, target : Skeleton
+        The two skeletons.
+    titles : (str, str)
+        Their names in messages.
+
+    Raises
+    ------
+    RigError
+        If a skeleton has no joint, or several, of a name in the map, or a joint is listed twice.
+    """
+    partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
+    joints = _joints_by_label(source), _joints_by_label(target)
+    for row, (mine, theirs) in enumerate(joint_map.pairs):
+        line = joint_map.lines[row] if joint_map.lines else None
+        at = joint_map.path, line
+        joint = _find(joints[1], target, mine, titles[1], at)
+        if partners[joint] != UNMAPPED:
+            values = {"joint": mine, "figure": titles[1]}
+            raise RigError(Diagnostic("F004.mapping-again", *at, values=values))
+        partners[joint] = _find(joints[0], source, theirs, titles[0], at) if theirs else -1
+    return partners
+
+
+def _joints_by_label(skeleton: Skeleton) -> dict[str, int]:
+    labels = joint_labels(skeleton)
+    return {labels[joint]: joint for joint in shown_joints(skeleton).tolist()}
+
+
+def _find(
+    joints: dict[str, int],
+    skeleton: Skeleton,
+    name: str,
+    title: str,
+    at: tuple[Path | None, int | None],
+) -> int:
+    """Return the joint with a label; ``at``: file and line for messages."""
+    if name in joints:
+        return joints[name]
+    same = [label for label, joint in joints.items() if skeleton.names[joint] == name]
+    values = {
+        "joint": name,
+        "figure": title,
+        "n": len(same),
+        "near": name_hint(name, same or joints),
+    }
+    key = "F004.mapping-joints" if same else "F004.mapping-joint"
+    raise RigError(Diagnostic(key, *at, values=values))
