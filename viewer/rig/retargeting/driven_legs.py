@@ -1,0 +1,215 @@
+"""Legs of a driven figure and of the motion that drives it, in every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.foot_lock import legs_of
+from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.leg_ik import Leg
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
+from viewer.rig.motion.evaluation import rest_translations_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.chain_worlds import Chains, chain_worlds, chains_to
+from viewer.rig.retargeting.retarget import Retargeted
+from viewer.rig.retargeting.source_contacts import FootPath
+from viewer.rig.scene import figure_pose
+from viewer.rig.shape import shaped
+from viewer.rig.skeleton import Skeleton
+
+__all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
+
+_SOLE_DOWN = 0.3  # cosine of the largest tilt of a foot that stands on its sole
+_HIGH_ANKLE = 0.1  # in proportion to the body: a higher ankle is that of a foot that points down
+
+
+@dataclass(frozen=True, slots=True)
+class LegPair:
+    """A leg of the figure, and the joints of the source's foot that drives it.
+
+    Attributes
+    ----------
+    leg : Leg
+        Joints of the figure.
+    ankle, toe : int
+        Joints of the source; equal if its foot has no ball.
+    """
+
+    leg: Leg
+    ankle: int
+    toe: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenLegs:
+    """Legs of a driven figure.
+
+    Attributes
+    ----------
+    chains : Chains
+        Joints of the legs, of the feet, and above them.
+    legs : tuple of Leg
+        The legs, as indices into ``chains``.
+    soles : Soles
+        Soles of the feet, as indices into ``chains``.
+    heels : (L, 4)
+        A point of the sole below each ankle, in the ankle's space, homogeneous.
+    level : (L, 3)
+        The direction that points up in a standing foot, in the ankle's space.
+    rests : (2, J, 3)
+        Rest translations and scales of the skeleton.
+    size : float
+        About the height of the body.
+    clearance : float
+        Height of the balls above the soles in the rest pose.
+    """
+
+    chains: Chains
+    legs: tuple[Leg, ...]
+    soles: Soles
+    heels: Floats
+    level: Floats
+    rests: Floats
+    size: float
+    clearance: float
+
+    def worlds(self, clip: SampledClip) -> Floats:
+        """Return the world matrices of the chains: (N, K, 4, 4)."""
+        return chain_worlds(clip, self.chains, *self.rests)
+
+    def heights(self, worlds: Floats, up: Floats) -> Floats:
+        """Return the height of the lowest point of each foot: (N, L)."""
+        scale = float(np.linalg.norm(worlds[0, self.legs[0].ankle, :3, 0]))
+        return self.soles.heights(worlds, np.append(up, 0.0), scale)
+
+    def stands_on_sole(self, worlds: Floats, up: Floats) -> Bools:
+        """Return whether the sole of each foot faces the ground: (N, L)."""
+        ankles = worlds[:, [leg.ankle for leg in self.legs], :3, :3]
+        facing = np.einsum("nlab,lb,a->nl", ankles, self.level, up)
+        return facing > _SOLE_DOWN * np.linalg.norm(ankles @ self.level[..., None], axis=2)[..., 0]
+
+    def feet(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
+        """Return the paths of the balls and the heels of all feet: (N, 3) each."""
+        return [
+            (worlds[:, leg.toe, :3, 3], worlds[:, leg.ankle, :3] @ heel)
+            for leg, heel in zip(self.legs, self.heels, strict=True)
+        ]
+
+
+def spans_of(timing: Timing) -> list[tuple[int, int]]:
+    """Return the ranges of present frames as ranges of rows, for rows in the order of frames."""
+    lengths = np.array([b - a for a, b in runs_of(timing.present)], dtype=np.intp)
+    stops = np.cumsum(lengths)
+    return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
+
+
+def leg_pairs(found: Retargeted, skeleton: Skeleton) -> list[LegPair]:
+    """Return the legs of the figure whose ankles are driven, left before right."""
+    source = found.source.figure.require_skeleton()
+    toes = {leg.ankle: leg.toe for leg in legs_of(source)}
+    pairs = []
+    for leg in legs_of(skeleton):
+        ankle = int(found.matches.partners[leg.ankle])
+        if ankle >= 0:
+            pairs.append(LegPair(leg, ankle, toes.get(ankle, ankle)))
+    return pairs
+
+
+def driven_legs(
+    figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats
+) -> DrivenLegs | None:
+    """Return the legs of a figure; None if they cannot be solved.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton.
+    clip : SampledClip
+        Its motion.
+    legs : list of Leg
+        The legs.
+    up : (3,)
+        The up axis of the figure.
+    """
+    skeleton = figure.require_skeleton()
+    weights = figure_pose(figure).shape_weights
+    if clip.shape_weights is not None:
+        weights = clip.shape_weights[0]
+    body = shaped(figure, weights)
+    soles = soles_of_feet(body, [[leg.toe, leg.ankle] for leg in legs], figure.is_attached)
+    chains = chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
+    constrained = [each.joint for each in skeleton.constraints]
+    if (chains.place[constrained] >= 0).any():
+        return None
+    rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
+    still = SampledClip("", Timing(1.0, np.zeros(1)), skeleton.rest_rotations[None])
+    world = chain_worlds(still, chains, *rests)[0]
+    place = chains.place
+    own = tuple(
+        Leg(*(int(place[joint]) for joint in (leg.hip, leg.knee, leg.ankle, leg.toe)))
+        for leg in legs
+    )
+    moved = replace(soles, joints=place[soles.joints], movers=place[soles.movers])
+    ankles = world[[leg.ankle for leg in own]]
+    floor = extent(body)[0]
+    below = ankles[:, :3, 3] - (ankles[:, :3, 3] @ up - floor)[:, None] * up
+    inverse = np.linalg.inv(ankles)
+    heels = np.einsum("lab,lb->la", inverse, np.append(below, np.ones((len(own), 1)), axis=1))
+    level = np.einsum("lab,b->la", inverse[:, :3, :3], up)
+    toes = world[[leg.toe for leg in own], :3, 3] @ up
+    return DrivenLegs(
+        chains, own, moved, heels, level, rests, _size(world, own), float(toes.mean() - floor)
+    )
+
+
+def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
+    """Return about the height of a body, twice the length of its longest leg."""
+    points = world[:, :3, 3]
+    lengths = [
+        np.linalg.norm(points[leg.knee] - points[leg.hip])
+        + np.linalg.norm(points[leg.ankle] - points[leg.knee])
+        for leg in legs
+    ]
+    return 2.0 * float(max(lengths))
+
+
+def foot_paths(
+    found: Retargeted, clip: SampledClip, pairs: list[LegPair], size: float, up: Floats
+) -> list[FootPath]:
+    """Return the paths of the source's feet, in the axes and the unit of the figure.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    clip : SampledClip
+        Motion of the source, its rows in the order of the frames.
+    pairs : list of LegPair
+        The legs.
+    size : float
+        About the height of the figure.
+    up : (3,)
+        The up axis.
+    """
+    skeleton = found.source.figure.require_skeleton()
+    chains = chains_to(skeleton, [joint for pair in pairs for joint in (pair.ankle, pair.toe)])
+    rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
+    still = SampledClip("", Timing(1.0, np.zeros(1)), skeleton.rest_rotations[None])
+    rest = chain_worlds(still, chains, *rests)[0]
+    world = chain_worlds(clip, chains, *rests)
+    axes, result = found.scale * found.to_target, []
+    for pair in pairs:
+        ankle, toe = (int(chains.place[joint]) for joint in (pair.ankle, pair.toe))
+        upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
+        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
+        # Without a standing rest pose, the ankle itself counts as the heel.
+        drop = height if 0.0 < height < _HIGH_ANKLE * size else 0.0
+        heel = world[:, ankle, :3] @ np.append(-drop / found.scale * upward, 1.0)
+        result.append(FootPath(world[:, toe, :3, 3] @ axes.T, heel @ axes.T))
+    return result
+

@@ -1,0 +1,273 @@
+"""Feet of driven figures, planted where those of the source stand (after Kovar et al. 2002).
+
+Retargeting keeps the directions of limbs, so that feet slide and sink where proportions differ. In
+a contact of the source, the ball or the heel of the figure's foot stays at one place and its sole
+on the ground; before and after, the correction fades. Hips and knees rotate to reach the ankles,
+and the body is lowered where legs are too short.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.frame_rows import in_frame_order
+from viewer.rig.cleanup.leg_solving import EASE, faded, leg_rotations, lowering
+from viewer.rig.figure import Figure
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.driven_legs import (
+    DrivenLegs,
+    driven_legs,
+    foot_paths,
+    leg_pairs,
+    spans_of,
+)
+from viewer.rig.retargeting.retarget import Retargeted
+from viewer.rig.retargeting.source_contacts import (
+    Contact,
+    FootPath,
+    foot_contacts,
+    ground_level,
+    step_height,
+)
+
+__all__ = ["PlantedFeet", "plant_feet"]
+
+_EXTENDED = 0.985  # corrections straighten a leg up to this fraction of its length
+# Heights of the source's feet above a ground at height 0, relative to the body.
+_GROUND = (-0.015, 0.06)
+_SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFeet:
+    """Changes made by planting feet.
+
+    Attributes
+    ----------
+    n_contacts : int
+        Number of times a foot stands.
+    source, before, after : float
+        Distance that feet slide while they stand, in total: in the source, scaled to the figure,
+        and in the figure; figure units.
+    gap_before, gap_after : float
+        Largest height of a standing sole above or below the ground.
+    lowered : float
+        Largest distance by which the body was lowered.
+    """
+
+    n_contacts: int = 0
+    source: float = 0.0
+    before: float = 0.0
+    after: float = 0.0
+    gap_before: float = 0.0
+    gap_after: float = 0.0
+    lowered: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Plan:
+    """Contacts of all feet, and the heights of the ground."""
+
+    contacts: list[list[Contact]]
+    grounds: list[list[float]]  # height of the ground of each contact
+    level: float  # height at which the source's feet stand
+    spans: list[tuple[int, int]]
+    rate: float
+    up: Floats
+
+
+def plant_feet(
+    found: Retargeted, figure: Figure, hangs: bool = False
+) -> tuple[SampledClip, PlantedFeet | None]:
+    """Return the motion of a driven figure with its feet planted.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    hangs : bool
+        Whether the motion's up axis points down.
+
+    Returns
+    -------
+    clip : SampledClip
+        The motion; unchanged if it would not become better.
+    changes : PlantedFeet or None
+        What was changed; None if the figure or the source has no legs of known names.
+    """
+    pairs = leg_pairs(found, figure.require_skeleton())
+    rest_up = np.eye(3)["xyz".index(figure.up)]
+    up = -rest_up if hangs else rest_up
+    clip = cast("SampledClip", in_frame_order(found.clip))
+    body = driven_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
+    if body is None or clip.n_rows == 0:
+        return found.clip, None
+    source = cast("SampledClip", in_frame_order(found.source.clip))
+    feet = foot_paths(found, source, pairs, body.size, rest_up)
+    plan = _plan(feet, body, clip, up)
+    if not any(plan.contacts):
+        return found.clip, PlantedFeet()
+    worlds = body.worlds(clip)
+    planted, lowered = _planted(clip, body, worlds, feet, plan)
+    after = body.worlds(planted)
+    changes = PlantedFeet(
+        sum(map(len, plan.contacts)),
+        _slide([(foot.toe, foot.heel) for foot in feet], plan),
+        _slide(body.feet(worlds), plan),
+        _slide(body.feet(after), plan),
+        _gap(body, worlds, plan),
+        _gap(body, after, plan),
+        lowered,
+    )
+    return planted, changes
+
+
+def _plan(feet: list[FootPath], body: DrivenLegs, clip: SampledClip, up: Floats) -> _Plan:
+    """Return the contacts of the source, and the heights of the ground under the figure."""
+    spans, rate, size = spans_of(clip.timing), clip.timing.frame_rate, body.size
+    contacts = foot_contacts(feet, spans, rate, size, up)
+    level = ground_level(contacts, size)
+    low, high = (limit * size for limit in _GROUND)
+    ground = 0.0 if low <= level <= high else level - body.clearance
+    grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
+    return _Plan(contacts, grounds, level, spans, rate, up)
+
+
+def _planted(
+    clip: SampledClip, body: DrivenLegs, worlds: Floats, feet: list[FootPath], plan: _Plan
+) -> tuple[SampledClip, float]:
+    """Return the corrected motion, and how far the body was lowered."""
+    up = plan.up
+    raised, heights = _vertical(body, worlds, feet, plan)
+    moves = []
+    for number, (points, contacts) in enumerate(zip(body.feet(worlds), plan.contacts, strict=True)):
+        flat = _horizontal(points, contacts, plan)
+        moves.append(flat + heights[:, number, None] * up)
+    lowered = lowering(worlds[..., :3, 3], body.legs, moves, plan.rate, up, _EXTENDED)
+    drop = (raised - lowered)[:, None] * up
+    shifts = [move + raised * up for move in moves]
+    joints = body.chains.joints
+    rotations = clip.rotations.copy()
+    rotations[:, joints] = leg_rotations(
+        rotations[:, joints], worlds, body.chains.parents, body.legs, drop, shifts
+    )
+    moved = _translated(clip, drop, np.flatnonzero(body.chains.parents < 0), joints)
+    return replace(moved, rotations=rotations), float(lowered.max(initial=0.0))
+
+
+def _translated(clip: SampledClip, drop: Floats, roots: Floats, joints: Floats) -> SampledClip:
+    """Return a motion of the whole body moved by offsets (N, 3)."""
+    if clip.figure_translations is not None:
+        return replace(clip, figure_translations=clip.figure_translations + drop)
+    shifts = np.zeros_like(clip.rotations[..., :3])
+    if clip.translations is not None:
+        shifts += clip.translations
+    shifts[:, joints[roots]] += drop[:, None]
+    return replace(clip, translations=shifts)
+
+
+def _horizontal(
+    points: tuple[Floats, Floats], contacts: Sequence[Contact], plan: _Plan
+) -> Floats:
+    """Return horizontal shifts (N, 3) that keep a foot in its place in every contact."""
+    shift = np.zeros_like(points[0])
+    is_held = np.zeros(len(shift), dtype=np.bool_)
+    for contact in contacts:
+        rows = slice(contact.start, contact.stop)
+        steps = np.cumsum(_steps(points, contact, plan.up), axis=0)
+        shift[rows] = steps.mean(axis=0) - steps
+        is_held[rows] = True
+    return _eased(shift, is_held, plan)
+
+
+def _steps(points: tuple[Floats, Floats], contact: Contact, up: Floats) -> Floats:
+    """Return how the standing point of a foot moves horizontally from row to row: (N, 3)."""
+    rows = slice(contact.start, contact.stop)
+    toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
+    moved = np.where(contact.on_toe[:, None], toe, heel)
+    return moved - (moved @ up)[:, None] * up
+
+
+def _eased(values: Floats, is_held: Bools, plan: _Plan) -> Floats:
+    """Return corrections (N, C) that fade outside the rows that are held."""
+    result, ease = np.zeros_like(values), max(1, round(EASE * plan.rate))
+    for start, stop in plan.spans:
+        part = slice(start, stop)
+        there = np.ones(stop - start, dtype=np.bool_)
+        result[part] = faded(values[part], is_held[part], there, ease)
+    return result
+
+
+def _vertical(
+    body: DrivenLegs, worlds: Floats, feet: list[FootPath], plan: _Plan
+) -> tuple[float, Floats]:
+    """Return how far the body is raised, and then each foot: (N, L)."""
+    heights = body.heights(worlds, plan.up)
+    faces = body.stands_on_sole(worlds, plan.up)
+    needed, is_held = np.zeros_like(heights), np.zeros(heights.shape, dtype=np.bool_)
+    for foot, (contacts, grounds) in enumerate(zip(plan.contacts, plan.grounds, strict=True)):
+        for contact, ground in zip(contacts, grounds, strict=True):
+            rows = slice(contact.start, contact.stop)
+            needed[rows, foot] = ground - heights[rows, foot]
+            is_held[rows, foot] = faces[rows, foot]
+    if not is_held.any():
+        return 0.0, np.zeros_like(heights)
+    raised = float(np.median(needed[is_held]))
+    result = np.zeros_like(heights)
+    for foot, contacts in enumerate(plan.contacts):
+        values = np.where(is_held[:, foot], needed[:, foot] - raised, 0.0)[:, None]
+        result[:, foot] = _eased(values, is_held[:, foot], plan)[:, 0]
+        if contacts:
+            floor = _floor(feet[foot], contacts, plan.grounds[foot], body.size, plan)
+            sunk = floor - (heights[:, foot] + raised + result[:, foot])
+            lifts = faces[:, foot] & ~is_held[:, foot]
+            result[:, foot] += np.where(lifts, np.maximum(sunk, 0.0), 0.0)
+    return raised, result
+
+
+def _floor(
+    foot: FootPath, contacts: Sequence[Contact], grounds: Sequence[float], size: float, plan: _Plan
+) -> Floats:
+    """Return the height below which a foot must not sink: (N,).
+
+    This is the lower ground of the contacts before and after. Where the source's own foot is
+    lower, its ground is.
+    """
+    rows = np.arange(len(foot.toe))
+    after = np.searchsorted([contact.start for contact in contacts], rows, side="right")
+    before = np.maximum(after - 1, 0)
+    after = np.minimum(after, len(contacts) - 1)
+    levels = np.array(grounds)
+    stands = np.array([contact.height for contact in contacts])
+    lowest = np.minimum(levels[before], levels[after])
+    low = np.minimum(foot.toe @ plan.up, foot.heel @ plan.up)
+    sunk = np.minimum(stands[before], stands[after]) - low - _SUNK * size
+    return lowest - np.maximum(sunk, 0.0)
+
+
+def _slide(feet: Sequence[tuple[Floats, Floats]], plan: _Plan) -> float:
+    """Return the distance that feet slide while they stand, in total."""
+    total = 0.0
+    for points, contacts in zip(feet, plan.contacts, strict=True):
+        for contact in contacts:
+            total += float(np.linalg.norm(_steps(points, contact, plan.up), axis=1).sum())
+    return total
+
+
+def _gap(body: DrivenLegs, worlds: Floats, plan: _Plan) -> float:
+    """Return the largest distance of a standing sole from the ground."""
+    heights, faces = body.heights(worlds, plan.up), body.stands_on_sole(worlds, plan.up)
+    largest = 0.0
+    for foot, (contacts, grounds) in enumerate(zip(plan.contacts, plan.grounds, strict=True)):
+        for contact, ground in zip(contacts, grounds, strict=True):
+            rows = slice(contact.start, contact.stop)
+            gaps = np.abs(heights[rows, foot] - ground)[faces[rows, foot]]
+            largest = max(largest, float(gaps.max(initial=0.0)))
+    return largest
