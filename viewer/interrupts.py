@@ -15,6 +15,9 @@ while pure Python or numpy code runs::
 
 A signal after the last ``poll`` is too late: the work is done, and the result is success. A second
 signal, a second or more after the first, ends a program that does not respond.
+
+Work that consists of many items asks the user twice: within ``postponed``, the first signal only
+sets a flag, so that the items that run are finished, and the second one raises as described.
 """
 
 from __future__ import annotations
@@ -36,7 +39,17 @@ if TYPE_CHECKING:
     from types import FrameType
     from typing import Any
 
-__all__ = ["Interrupted", "deferred", "hold", "poll", "raising", "watch_program", "watched"]
+__all__ = [
+    "Interrupted",
+    "Postponed",
+    "deferred",
+    "hold",
+    "poll",
+    "postponed",
+    "raising",
+    "watch_program",
+    "watched",
+]
 
 _MESSAGES = {"SIGINT": "interrupted", "SIGTERM": "terminated", "SIGHUP": "hung up"}
 _SIGNALS = {
@@ -226,6 +239,56 @@ def raising() -> Iterator[None]:
     """Let signals raise in the block even after ``hold``, for long or blocking work."""
     with _held(_mine(), False):
         yield
+
+
+class Postponed:
+    """The signals received in a ``postponed`` block.
+
+    ``number``: that of the first signal; 0 if there was none.
+    """
+
+    def __init__(self) -> None:
+        self.number = 0
+        self._since = 0.0
+        self._others: dict[int, Any] = {}
+
+    def start(self) -> None:
+        """Replace the handlers of all signals that are not ignored."""
+        for number in _SIGNALS:
+            other = signal.getsignal(number)
+            if other not in (signal.SIG_IGN, None):
+                self._others[number] = other
+                signal.signal(number, self._on_signal)
+
+    def stop(self) -> None:
+        """Restore the previous handlers."""
+        for number, other in self._others.items():
+            signal.signal(number, other)
+        self._others = {}
+
+    def _on_signal(self, number: int, frame: FrameType | None) -> None:
+        if not self.number:
+            self.number, self._since = number, time.monotonic()
+        elif time.monotonic() > self._since + _SAME:
+            self.stop()
+            signal.raise_signal(number)
+
+
+@contextmanager
+def postponed() -> Iterator[Postponed]:
+    """Record the first signal in the block; one that follows a second or more later acts as before.
+
+    Outside the main thread, no signal is received.
+    """
+    signals = Postponed()
+    is_main = threading.current_thread() is threading.main_thread()
+    try:
+        if is_main:
+            signals.start()
+        yield signals
+    finally:
+        if is_main:
+            signals.stop()
 
 
 @contextmanager

@@ -47,7 +47,8 @@ from viewer.app.view.picks import answer_picks
 from viewer.app.weights.explanation_lines import draw_hovered, pinned_annotations
 from viewer.errors import RenderError, ViewerError
 from viewer.formats import FORMATS
-from viewer.loading import Contents, MotionSettings, add_to_actor, bundled_body, bundled_files
+from viewer.loading import Contents, MotionSettings, bundled_body, bundled_files
+from viewer.loading.additions import add_to_actor
 from viewer.loading.capturing import Builder
 from viewer.models import family_model
 from viewer.phrases import printable

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import argparse
 import re
+from typing import TYPE_CHECKING
 
 from viewer.commands._sequence.frame_numbers import parse_range, rate
-from viewer.loading.cleaning import CleanUp
+from viewer.loading.cleaning_settings import CleanUp
 from viewer.phrases import printable
-from viewer.rig.cleanup.one_euro import OneEuro
-from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+
+if TYPE_CHECKING:
+    from viewer.rig.cleanup.one_euro import OneEuro
+    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
 
 __all__ = ["add_cleanup_arguments", "clean_up_of"]
 
@@ -44,7 +47,7 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         "--smooth",
         nargs="?",
         type=_filter,
-        const=SavitzkyGolay(),
+        const="savgol",
         metavar="FILTER",
         help="smooth rotations and translations: savgol (default), savgol:window=7,order=2 (an odd "
         "number of frames, the degree), one-euro or one-euro:cutoff=3,beta=2 (Hz; Hz per rad/s and "
@@ -142,6 +145,8 @@ def _filter(text: str) -> OneEuro | SavitzkyGolay:
 
 
 def _one_euro(values: dict[str, float]) -> OneEuro:
+    from viewer.rig.cleanup.one_euro import OneEuro
+
     found = OneEuro(**values)
     if min(found.cutoff, found.speed_cutoff) <= 0.0:
         raise argparse.ArgumentTypeError("one-euro: expected cutoffs above 0 Hz, found 0")
@@ -149,6 +154,8 @@ def _one_euro(values: dict[str, float]) -> OneEuro:
 
 
 def _savgol(values: dict[str, float]) -> SavitzkyGolay:
+    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+
     window, order = values.get("window", 0.0), values.get("order", 2.0)
     is_odd = window % 2 == 1 and 3 <= window <= _LONGEST_WINDOW
     if "window" in values and not is_odd:

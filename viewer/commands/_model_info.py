@@ -8,12 +8,8 @@ import numpy as np
 
 from viewer.phrases import counted, printable
 from viewer.rig.figure import Figure
-from viewer.rig.inspection.measure import measure
 from viewer.rig.number_text import number_text
 from viewer.rig.pose import Pose
-from viewer.rig.posing.pose_vector import write_vector
-from viewer.rig.retargeting.mirror import asymmetry
-from viewer.rig.scalars import compute, length_text, strongest
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import METHODS, PURE, Skinning
@@ -41,6 +37,8 @@ def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
     if pose is not None:
         model |= _place(pose)
         if figure.pose_layout is not None and figure.skeleton is not None:
+            from viewer.rig.posing.pose_vector import write_vector
+
             numbers = write_vector(figure.pose_layout, figure.skeleton, pose)
             model["own_numbers"] = numbers.tolist()
     model |= _annotations(figure)
@@ -49,6 +47,8 @@ def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
 
 
 def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
+    from viewer.rig.inspection.measure import measure
+
     found = measure(figure if pose is None else shaped(figure, pose.shape_weights))
     return {"height": found.height, "volume": found.volume, "mass": found.mass}
 
@@ -75,6 +75,8 @@ def _annotations(figure: Figure) -> dict[str, Any]:
             "triangles": len(figure.reduced.triangles),
         }
     if figure.symmetry is not None:
+        from viewer.rig.retargeting.mirror import asymmetry
+
         parts["asymmetry"] = float(asymmetry(figure).max())
     return parts
 
@@ -83,6 +85,8 @@ def _effects(figure: Figure, pose: Pose | None, skinning: Skinning) -> dict[str,
     """Return the largest difference between skinning options in this pose, for each option."""
     if not figure.is_attached or pose is None:
         return {}
+    from viewer.rig.scalars import compute, strongest
+
     effects: dict[str, float] = {}
     for count in sorted({*_LIMITS, skinning.max_influences} - {0}):
         if strongest(figure) > count:
@@ -103,10 +107,11 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
     lines = [f"  {name:<10} {printable(text, 400)}" for name, text in _facts(model)]
     if "rest" in model:
         rest = model["rest"]
-        lines.append(
-            f"  rest       {rest['height']:.3f} m high, {1000.0 * rest['volume']:.2f} litres, "
-            f"{rest['mass']:.1f} kg at 985 kg/m3"
-        )
+        solid = "open mesh without a volume"
+        if rest["volume"] is not None:
+            litres = 1000.0 * rest["volume"]
+            solid = f"{litres:.2f} litres, {rest['mass']:.1f} kg at 985 kg/m3"
+        lines.append(f"  rest       {rest['height']:.3f} m high, {solid}")
     if any(model.get("shape_weights", [])):
         weights = ", ".join(number_text(weight) for weight in model["shape_weights"])
         lines.append(f"  shape      {weights}")
@@ -122,12 +127,17 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
     if "keypoints" in model:
         lines.append(f"  keypoints  {len(model['keypoints'])}")
     if "asymmetry" in model:
-        lines.append(
-            f"  symmetry   left and right differ by {length_text(figure, model['asymmetry'])}"
-        )
+        size = _length(figure, model["asymmetry"])
+        lines.append(f"  symmetry   left and right differ by {size}")
     for text, value in model.get("effects", {}).items():
-        lines.append(f"  effect     {text}: up to {length_text(figure, value)} in this pose")
+        lines.append(f"  effect     {text}: up to {_length(figure, value)} in this pose")
     return lines
+
+
+def _length(figure: Figure, value: float) -> str:
+    from viewer.rig.scalars import length_text
+
+    return length_text(figure, value)
 
 
 def _facts(model: dict[str, Any]) -> list[tuple[str, str]]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from pathlib import Path
 
 from viewer.commands._sequence.frame_numbers import numbering_of
@@ -13,6 +12,7 @@ from viewer.export import EXPORTERS, MotionOptions
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.single_frame import upright_single_frame
+from viewer.rig.motion.timing import frame_at
 from viewer.rig.scene import Actor, Scene
 
 
@@ -48,7 +48,7 @@ def animation_of_pose(
     """
     frames = numbering_of(scene.actors, arguments.fps)
     time = frames.start if scene.time is None else scene.time
-    number = frames.first + math.floor((time - frames.start) * frames.rate + 1e-6)
+    number = frames.first + frame_at(time - frames.start, frames.rate)
     keeps_world = EXPORTERS[key].keeps_world and not options.up
     return upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
 

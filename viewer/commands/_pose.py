@@ -6,29 +6,25 @@ import argparse
 import math
 import re
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
 from viewer.commands._numbers import number
 from viewer.commands._sequence.frame_numbers import apply_time
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.formats import Source, detect, read
-from viewer.formats.pose import pose_error
-from viewer.formats.pose import read as read_pose
-from viewer.near_names import near_names
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
-from viewer.rig.hands import hand_vectors
 from viewer.rig.number_text import number_text
-from viewer.rig.posing.pose_record import PoseRecord, apply_record
-from viewer.rig.posing.pose_vector import set_joint_rotations
-from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
 from viewer.rig.skinning import METHODS, Skinning
+
+if TYPE_CHECKING:
+    from viewer.rig.posing.pose_record import PoseRecord
 
 _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 
@@ -127,6 +123,8 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
         notes += _apply_shape(scene, arguments.shape)
     expression = _numbers("--expression", arguments.expression)
     if expression is not None:
+        from viewer.rig.posing.pose_record import PoseRecord
+
         notes += _apply_record("--expression", PoseRecord(expression=expression), scene)
     notes += apply_dofs(scene, arguments.dof)
     if arguments.mirror:
@@ -141,6 +139,9 @@ def pose_files(arguments: argparse.Namespace) -> list[str]:
 
 def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     """Return the pose given as numbers or read from a file, and the file."""
+    from viewer.formats.pose import read as read_pose
+    from viewer.rig.posing.pose_record import PoseRecord
+
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
@@ -174,6 +175,9 @@ def _apply_record(
     option: str, record: PoseRecord, scene: Scene, source: Source | None = None
 ) -> list[Diagnostic]:
     """Apply a record, possibly from a file, to the first actor that accepts it."""
+    from viewer.formats.pose import pose_error
+    from viewer.rig.posing.pose_record import apply_record
+
     problem: RigError | None = None
     for actor in scene.actors:
         if actor.pose is not None:
@@ -190,6 +194,9 @@ def _apply_record(
 
 def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
     """Set shape weights by name or in order; figures without shapes may have morphs."""
+    from viewer.commands._morph_weights import has_only_morphs, is_named, morph_record, named_record
+    from viewer.rig.posing.pose_record import PoseRecord, apply_record
+
     if is_named(text):
         actor, record = named_record(scene, text)
         return apply_record(record, actor.figure, actor.require_pose())
@@ -211,6 +218,9 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
 
 
 def _apply_hands(scene: Scene, which: str) -> None:
+    from viewer.rig.hands import hand_vectors
+    from viewer.rig.posing.pose_vector import set_joint_rotations
+
     handed = [actor for actor in scene.actors if actor.figure.hands and actor.pose is not None]
     if not handed:
         raise ViewerError("--hands: no file has hand components")
@@ -224,6 +234,8 @@ def _apply_hands(scene: Scene, which: str) -> None:
 
 
 def _mirror(scene: Scene) -> None:
+    from viewer.rig.retargeting.mirror import mirror_pose
+
     for actor in scene.actors:
         if actor.pose is not None:
             try:
@@ -268,6 +280,8 @@ def apply_dofs(scene: Scene, settings: Sequence[str]) -> list[str]:
 
 def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
     """Move or scale the first posed figure as a whole; return whether the label refers to it."""
+    from viewer.rig.posing.pose_record import PoseRecord, apply_record
+
     part = label[len(_FIGURE) :].lower()
     actor = next((actor for actor in scene.actors if actor.pose is not None), None)
     if part not in ("tx", "ty", "tz", "scale") or actor is None or actor.pose is None:
@@ -284,6 +298,8 @@ def _place(scene: Scene, label: str, setting: str, text: str) -> bool:
 
 
 def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
+    from viewer.near_names import near_names
+
     problems: list[RigError] = []
     near: list[RigError] = []
     found: list[tuple[Actor, int]] = []

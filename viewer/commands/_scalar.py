@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from viewer.errors import RigError, ViewerError
-from viewer.near_names import name_hint, near_names
 from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
@@ -136,6 +135,8 @@ def scalar_notes(scene: Scene, options: DisplayOptions) -> list[str]:
 
 def _refuse_name(figures: list[Figure], name: str) -> None:
     """Raise if a quantity names a joint or field that no figure has, although others exist."""
+    from viewer.near_names import name_hint, near_names
+
     key, about = split_name(name)
     option = f"--scalar {printable(name, 60)}"
     problems, known = [], []

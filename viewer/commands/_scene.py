@@ -12,15 +12,13 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import clean_up_of
 from viewer.commands._pose import add_pose_arguments, apply_pose
-from viewer.commands._progress import Progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
-from viewer.loading.cleaning import CleanUp, clean_up
-from viewer.models import family_model, known_models, load_model_folder, resolve, save_model_folder
-from viewer.near_names import did_you_mean
+from viewer.loading.cleaning_settings import CleanUp
+from viewer.models import resolve
 from viewer.phrases import printable
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
@@ -192,6 +190,8 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
 
     Raises ViewerError if there are both a video and a folder of images.
     """
+    from viewer.models import family_model
+
     if arguments.video is not None and arguments.images is not None:
         raise ViewerError("--video and --images: expected one of them, found both")
     model = None if arguments.model is None else resolve(arguments.model)
@@ -263,6 +263,8 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
 
 def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
     """Clean up captured motions in place, and print the changes unless they are the output."""
+    from viewer.loading.cleaning import clean_up
+
     stream = sys.stdout if output is None else summary_stream(output)
     for note in clean_up(scene, changes):
         print(note, file=stream)
@@ -270,6 +272,8 @@ def clean(scene: Scene, changes: CleanUp, output: str | None = None) -> None:
 
 def finish(builder: Builder, scene: Scene) -> None:
     """Read a capture to its end, with a progress bar in a terminal, and print warnings."""
+    from viewer.commands._progress import Progress
+
     notes: list[Diagnostic] = []
     with Progress(f"reading {builder.capture.name}", builder.capture.n_frames) as progress:
         while not builder.is_done:
@@ -284,6 +288,8 @@ def finish(builder: Builder, scene: Scene) -> None:
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     """Load enough for a first image, without posing the scene, and print warnings."""
     if arguments.model_path is not None:
+        from viewer.models import save_model_folder
+
         save_model_folder(arguments.model_path)
     files = scene_files(arguments)
     _announce(files)
@@ -300,6 +306,9 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
 
 def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     """Add the names of available models to an error about an unknown name."""
+    from viewer.models import known_models, load_model_folder
+    from viewer.near_names import did_you_mean
+
     folder = load_model_folder()
     missing = [file for file in files if Path(file) == problem.path and not problem.path.exists()]
     if not missing or folder is None or len(problem.path.parts) != 1:

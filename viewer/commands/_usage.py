@@ -12,8 +12,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 from viewer.commands import COMMANDS
 from viewer.errors import ViewerError
-from viewer.models import resolve
-from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
@@ -48,6 +46,8 @@ class Parser(argparse.ArgumentParser):
         ``arguments``: arguments before ``--``.
         Raises ViewerError with the nearest options.
         """
+        from viewer.near_names import near_names, question
+
         known = self._option_string_actions  # argparse has no public name for this table
         for argument in arguments:
             name = argument.partition("=")[0]
@@ -63,6 +63,8 @@ class Parser(argparse.ArgumentParser):
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         """Raise for a value that is not one of an option's choices; suggest the nearest."""
+        from viewer.near_names import did_you_mean
+
         if action.choices is None or value in action.choices:
             return
         choices = [str(choice) for choice in action.choices]
@@ -90,6 +92,9 @@ def check_command(word: str) -> None:
     ``word``: first argument of the command line.
     Raises ViewerError with the nearest command.
     """
+    from viewer.models import resolve
+    from viewer.near_names import did_you_mean
+
     if not _WORD.fullmatch(word) or os.path.lexists(resolve(word)):
         return
     near = did_you_mean(word, COMMANDS)

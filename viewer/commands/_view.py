@@ -6,15 +6,14 @@ import argparse
 import re
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
+from typing import TYPE_CHECKING
 
 from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.errors import ViewerError
-from viewer.near_names import name_hint
 from viewer.phrases import printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
-from viewer.rendering.camera_notes import image_notes, lens_notes
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import (
     BACKGROUNDS,
@@ -26,10 +25,12 @@ from viewer.rendering.options import (
 )
 from viewer.rendering.passes.ground_pass import parse_color
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.rig.captures.camera_view import CameraView
 
 _SWITCHES = (
     ("no-shadows", "omit shadows"),
@@ -218,6 +219,8 @@ def _front_of(arguments: argparse.Namespace, scene: Scene) -> Front:
 
 def _find_view(scene: Scene, text: str) -> CameraView:
     """Return a calibrated camera by its name, or by its number counted from 1."""
+    from viewer.near_names import name_hint
+
     for view in scene.views:
         if view.name == text:
             return view
@@ -274,9 +277,12 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
     """
     seen = None if arguments.view is None else _find_view(scene, arguments.view)
     drawn = scene.views if options.cameras else [view for view in [seen] if view is not None]
-    notes = [note for view in drawn for note in image_notes(scene, view)]
-    if seen is not None:
-        notes += lens_notes(scene, seen)
+    notes: list[str] = []
+    if drawn:
+        from viewer.rendering.camera_notes import image_notes, lens_notes
+
+        notes = [note for view in drawn for note in image_notes(scene, view)]
+        notes += [] if seen is None else lens_notes(scene, seen)
     if options.cameras and not scene.views:
         notes.append("--cameras: no file has calibrated cameras")
     for option, given in (("--images", arguments.images), ("--video", arguments.video)):
@@ -290,6 +296,8 @@ def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOpti
 
     Raises ViewerError if no part has one of the names; the message lists the known ones.
     """
+    from viewer.near_names import name_hint
+
     if not arguments.hide_part:
         return
     parts = next((a.figure.body_parts for a in scene.actors if a.figure.body_parts), None)

@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.commands._clip_info import (
-    animation_lines,
-    clip_lines,
-    describe_animations,
-    describe_clip,
-)
 from viewer.commands._model_info import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.phrases import counted, listed, printable
-from viewer.rig.blendshapes import BlendShapes
-from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
-from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene, actor_points, scene_unit
 from viewer.rig.skeleton import (
@@ -34,8 +24,12 @@ from viewer.rig.skeleton import (
     shown_joints,
     shown_parents,
 )
-from viewer.rig.skin import Skin, has_influence, idle_joints, influence_counts, weight_sums
 from viewer.rig.skinning import Skinning
+
+if TYPE_CHECKING:
+    from viewer.rig.blendshapes import BlendShapes
+    from viewer.rig.material import Material
+    from viewer.rig.skin import Skin
 
 __all__ = ["add_arguments", "describe", "run"]
 
@@ -54,6 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     scene = open_scene(arguments)
     found = describe(scene, skinning)
     if arguments.json:
+        import json
+
         print(json.dumps(found, indent=1, allow_nan=False))
     else:
         for actor, parts in zip(scene.actors, found["actors"], strict=True):
@@ -104,11 +100,23 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
         parts["mesh"] = _describe_mesh(figure.mesh)
     if figure.skin is not None:
         parts["skin"] = _describe_skin(figure.skin, figure.skeleton)
-    if figure.blend_shapes is not None and MORPH_GROUP in figure.blend_shapes.groups:
-        parts["morphs"] = _describe_morphs(figure.blend_shapes)
+    if figure.blend_shapes is not None:
+        from viewer.rig.morph_target import MORPH_GROUP
+
+        if MORPH_GROUP in figure.blend_shapes.groups:
+            parts["morphs"] = _describe_morphs(figure.blend_shapes)
+    return parts | _describe_motions(actor)
+
+
+def _describe_motions(actor: Actor) -> dict[str, Any]:
+    if actor.clip is None and not actor.figure.animations:
+        return {}
+    from viewer.commands._clip_info import describe_animations, describe_clip
+
+    parts: dict[str, Any] = {}
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
-    if figure.animations:
+    if actor.figure.animations:
         parts["animations"] = describe_animations(actor)
     return parts
 
@@ -201,6 +209,8 @@ def _describe_surface(material: Material) -> dict[str, Any]:
 
 
 def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
+    from viewer.rig.skin import has_influence, idle_joints, influence_counts, weight_sums
+
     counts = influence_counts(skin)
     sums = weight_sums(skin)
     moved = has_influence(skin)
@@ -221,6 +231,8 @@ def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
 
 def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
     """Return the morph targets with the number of vertices that each one moves."""
+    from viewer.rig.morph_target import MORPH_GROUP
+
     rows = [row for row, group in enumerate(shapes.groups) if group == MORPH_GROUP]
     counts = shapes.direction_values()[rows].any(axis=2).sum(axis=1)
     return [
@@ -243,9 +255,18 @@ def _lines(actor: dict[str, Any]) -> list[str]:
         f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}"
         for morph in actor.get("morphs", [])
     ]
+    return lines + _motion_lines(actor)
+
+
+def _motion_lines(actor: dict[str, Any]) -> list[str]:
+    lines: list[str] = []
     if "clip" in actor:
+        from viewer.commands._clip_info import clip_lines
+
         lines += clip_lines(actor["clip"])
     if "animations" in actor:
+        from viewer.commands._clip_info import animation_lines
+
         lines += animation_lines(actor["animations"])
     return lines
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._output import PICTURES, inputs_of
@@ -17,7 +18,6 @@ from viewer.commands._scene import (
 )
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
-from viewer.commands._sequence.shots import Request, shots_of
 from viewer.commands._view import (
     add_camera_arguments,
     add_display_arguments,
@@ -40,6 +40,9 @@ from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
 from viewer.streams import summary_stream
+
+if TYPE_CHECKING:
+    from viewer.commands._sequence.shots import Request
 
 __all__ = ["add_arguments", "run"]
 
@@ -147,6 +150,7 @@ def _draw_onion(
     size: tuple[int, int],
 ) -> None:
     """Draw several poses of a motion in one image."""
+    from viewer.commands._sequence.shots import shots_of
     from viewer.formats import save_image
     from viewer.rig.motion.onion import onion
 

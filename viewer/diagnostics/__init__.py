@@ -7,12 +7,16 @@ code and the template of each message. Nothing recovers meaning from text.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 from viewer.diagnostics.codes import SEVERITIES, Code
 from viewer.diagnostics.collector import Collector
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic, Part
 from viewer.diagnostics.phrase import Phrase, frame_range
-from viewer.diagnostics.wording import CODES, MESSAGES
+
+if TYPE_CHECKING:
+    from viewer.diagnostics.wording import CODES, MESSAGES
 
 __all__ = [
     "CODES",
@@ -26,3 +30,12 @@ __all__ = [
     "described",
     "frame_range",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """Import the wording when it is first used: most runs have no message to print."""
+    if name not in ("CODES", "MESSAGES"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from viewer.diagnostics import wording
+
+    return getattr(wording, name)

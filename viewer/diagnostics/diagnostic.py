@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from viewer.diagnostics.template import rendered
-from viewer.diagnostics.wording import CODES, FURTHER, MESSAGES, NOTHING_ELSE, PLACES
 from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:
@@ -82,16 +80,23 @@ class Diagnostic:
     @property
     def severity(self) -> str:
         """One of ``SEVERITIES``; a refusal is an error unless ``level`` differs."""
+        from viewer.diagnostics.wording import CODES
+
         return self.level or ("error" if self.is_refusal else CODES[self.code].severity)
 
     @property
     def message(self) -> str:
         """The message on one line, without the location."""
+        from viewer.diagnostics.template import rendered
+        from viewer.diagnostics.wording import MESSAGES
+
         return rendered(MESSAGES[self.key], self.values)
 
     @property
     def full_message(self) -> str:
         """The message with the number of errors, and whether it stopped parsing."""
+        from viewer.diagnostics.wording import FURTHER, NOTHING_ELSE, PLACES
+
         text = self.message
         if self.count > 1:
             text += FURTHER.format(self.count)

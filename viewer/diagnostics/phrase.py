@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from viewer.diagnostics.template import rendered
-from viewer.diagnostics.wording import PHRASES
-
 
 class Phrase:
     """A message value that is itself a template with values.
@@ -27,6 +24,9 @@ class Phrase:
 
     def __str__(self) -> str:
         """Return the rendered template."""
+        from viewer.diagnostics.template import rendered
+        from viewer.diagnostics.wording import PHRASES
+
         return rendered(PHRASES[self.key], self.values)
 
     def __repr__(self) -> str:

@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import contextlib
 import re
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
 from viewer.formats._file_bytes import unreadable
-from viewer.formats._mesh.texture import read_picture
-from viewer.formats._references import referenced_path
+from viewer.formats._format import Format
 from viewer.formats._source import MAX_SIZE, Source
-from viewer.media.file_names import file_stem, folder_name, opened_text
-from viewer.media.image import is_picture, save_image
-from viewer.media.saving import (
-    all_or_none,
-    free_path,
-    keeping_written,
-    save_arrays,
-    save_bytes,
-    save_text,
-)
-from viewer.media.targets import check_folder_target, check_targets
-from viewer.phrases import printable
 
 if TYPE_CHECKING:
-    from viewer.formats._archive.values import Archive
+    from viewer.formats._mesh.texture import read_picture
+    from viewer.formats._references import referenced_path
     from viewer.formats.rig import NamedFiles
+    from viewer.media.file_names import file_stem, folder_name, opened_text
+    from viewer.media.image import is_picture, save_image
+    from viewer.media.saving import (
+        all_or_none,
+        free_path,
+        keeping_written,
+        save_arrays,
+        save_bytes,
+        save_text,
+    )
+    from viewer.media.targets import check_folder_target, check_targets
     from viewer.rig.captures.capture import Capture
     from viewer.rig.figure import Figure
     from viewer.rig.figure_group import FigureGroup
@@ -81,42 +79,29 @@ __all__ = [
     "write",
 ]
 
+_HOMES = {
+    "all_or_none": "viewer.media.saving",
+    "check_folder_target": "viewer.media.targets",
+    "check_targets": "viewer.media.targets",
+    "file_stem": "viewer.media.file_names",
+    "folder_name": "viewer.media.file_names",
+    "free_path": "viewer.media.saving",
+    "is_picture": "viewer.media.image",
+    "keeping_written": "viewer.media.saving",
+    "opened_text": "viewer.media.file_names",
+    "read_picture": "viewer.formats._mesh.texture",
+    "referenced_path": "viewer.formats._references",
+    "save_arrays": "viewer.media.saving",
+    "save_bytes": "viewer.media.saving",
+    "save_image": "viewer.media.image",
+    "save_text": "viewer.media.saving",
+}
+"""Modules of names that are imported on first use, as few commands need them to start."""
+
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
 _ANY_TEXT = (".txt",)  # does not identify the content
 _HEAD = 1 << 16  # bytes that must identify a file
-_NAMED_KEYS = 3  # per format, in a message about unknown archives
-
-
-@dataclass(frozen=True, slots=True)
-class Format:
-    """Properties of a format that menus and dialogs need before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Name in menus and the manual.
-    suffixes : tuple of str
-        Suffixes with their dots; files are written with the first suffix.
-    signature : bytes
-        Regular expression that the head of every such text file contains; empty for none.
-    keys : tuple of str
-        Keys that identify an archive (``.pkl``, ``.npz``) of this format: any one is sufficient.
-    files : tuple of str
-        Files that identify a folder of this format: any one is sufficient.
-    writes : bool
-        Whether there is a writer.
-    is_bare_mesh : bool
-        Whether files of this format contain only a mesh, without skeleton and skin.
-    """
-
-    title: str
-    suffixes: tuple[str, ...]
-    signature: bytes = b""
-    keys: tuple[str, ...] = ()
-    files: tuple[str, ...] = ()
-    writes: bool = True
-    is_bare_mesh: bool = False
 
 
 FORMATS = {
@@ -218,6 +203,12 @@ FORMATS = {
 """Modules in this folder; each has ``read(source)``, ``write(content, path)``, or both."""
 
 
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
+
+
 def detect(source: Source) -> str:
     """Return a file's key in ``FORMATS``, determined by its content, then by its suffix.
 
@@ -311,50 +302,15 @@ def _is_archive(source: Source) -> bool:
 
 
 def _detect_archive(source: Source) -> str:
-    from viewer.formats._archive.checking import archive_of
+    from viewer.formats._archive.recognition import archive_format
 
-    archive = archive_of(source)
-    keys = archive.keys
-    for kind, form in FORMATS.items():
-        if kind == "smpl" and set(keys).intersection(FORMATS["skel_body"].keys):
-            continue  # SKEL also has arrays of SMPL
-        if set(keys).intersection(form.keys):
-            if kind not in ("amass", "pose"):
-                return kind
-            return "video_mocap" if _is_video_mocap(archive) else _pose_or_motion(archive)
-    if _is_video_mocap(archive):
-        return "video_mocap"
-    wanted = "; ".join(
-        f"{form.title}: {', '.join(form.keys[:_NAMED_KEYS])}"
-        for form in FORMATS.values()
-        if form.keys
-    )
-    if not keys:
-        raise source.fault("F002.empty-archive", wanted=wanted)
-    found = [printable(key, 40) for key in keys]
-    raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+    return archive_format(source, FORMATS)
 
 
 def _is_video_folder(source: Source, names: set[str]) -> bool:
     from viewer.formats._video_mocap.tools import folder_tool
 
     return folder_tool(source, names) is not None
-
-
-def _is_video_mocap(archive: Archive) -> bool:
-    """Return whether an archive has results of a tool that have no keys of their own."""
-    from viewer.formats._video_mocap.tools import tool_of
-
-    return tool_of(archive) is not None
-
-
-def _pose_or_motion(archive: Archive) -> str:
-    """Return whether an archive is one pose or a motion; both have the same keys."""
-    from viewer.formats.amass import has_frames
-
-    is_pose = set(archive.keys).intersection(FORMATS["pose"].keys)
-    is_other = set(archive.keys).intersection(("markers_latent", "smpl_poses"))
-    return "pose" if is_pose and not is_other and not has_frames(archive) else "amass"
 
 
 def read(source: Source) -> Content:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.formats import MAX_SIZE
-from viewer.loading.additions import add_to_actor
 from viewer.loading.assembly import assemble, begin
 from viewer.loading.bundled import bundled_body, bundled_files
 from viewer.loading.contents import Contents, read_files, read_source
@@ -15,7 +14,6 @@ from viewer.rig.scene import Scene
 __all__ = [
     "Contents",
     "MotionSettings",
-    "add_to_actor",
     "assemble",
     "begin",
     "bundled_body",

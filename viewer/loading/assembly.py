@@ -10,20 +10,18 @@ from typing import TYPE_CHECKING
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
-from viewer.loading.additions import apply_pose
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.covering import with_texture
 from viewer.loading.placing import place_side_by_side, placed_views, stand_up
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import first_person_parts
-from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
+    from viewer.rig.posing.pose_record import PoseRecord
 
 __all__ = ["assemble", "begin"]
 
@@ -211,6 +209,8 @@ def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
 
 def _give_morphs(contents: Contents, cast: Cast) -> None:
     """Give all blend shape targets to the first mesh with their vertex count."""
+    if not contents.morphs:
+        return
     actors = cast.actors
     from viewer.rig.morph_target import on_one_joint, with_morphs
 
@@ -236,6 +236,8 @@ def _give_morphs(contents: Contents, cast: Cast) -> None:
 
 def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Diagnostic]:
     """Apply a pose to the first actor that it matches."""
+    from viewer.loading.additions import apply_pose
+
     problem: FormatError | None = None
     for actor in actors:
         if actor.pose is not None:
@@ -248,6 +250,8 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     """Apply a texture to the first actor that can show it and has none."""
+    from viewer.loading.covering import with_texture
+
     open_for_it = [
         actor
         for actor in actors

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from viewer.loading.settings import MotionSettings
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viewer.loading.settings import MotionSettings
 
 __all__ = ["reader_options"]
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
+from viewer.loading.cleaning_settings import CleanUp
 from viewer.loading.merging import merge_people
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.displacement import joint_displacement, point_displacement
@@ -35,46 +36,6 @@ __all__ = ["CleanUp", "clean_up"]
 Smoothing = OneEuro | SavitzkyGolay
 
 _ROUNDING = 1e-9  # scene or figure units
-
-
-@dataclass(frozen=True, slots=True)
-class CleanUp:
-    """Requested changes of captured motions, in the order in which they are made.
-
-    Attributes
-    ----------
-    merged : tuple of tuple of int
-        Numbers of people whose tracks belong to one person, who keeps the first number.
-    interpolates : bool
-        Whether gaps are interpolated.
-    longest_gap : int or None
-        Longest gap to interpolate, frames; None for one second.
-    smoothing : OneEuro, SavitzkyGolay or None
-        The filter.
-    locks_feet : bool
-        Whether feet that stand are held in place.
-    grounds : bool
-        Whether people are moved up or down until their feet rest at height 0.
-    frames : (int or None, int or None) or None
-        First frame to keep and the frame after the last one, with the numbers of the file; None for
-        the motion's own ends.
-    rate : float or None
-        New frames per second.
-    """
-
-    merged: tuple[tuple[int, ...], ...] = ()
-    interpolates: bool = False
-    longest_gap: int | None = None
-    smoothing: Smoothing | None = None
-    locks_feet: bool = False
-    grounds: bool = False
-    frames: tuple[int | None, int | None] | None = None
-    rate: float | None = None
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether nothing is requested."""
-        return self == CleanUp()
 
 
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:

@@ -9,18 +9,8 @@ from typing import TYPE_CHECKING, cast
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.formats import (
-    MAX_SIZE,
-    Source,
-    claims,
-    detect,
-    is_picture,
-    read,
-    read_picture,
-    referenced_path,
-)
+from viewer.formats import MAX_SIZE, Source, claims, detect, read
 from viewer.loading.choices import reader_options
-from viewer.loading.covering import with_texture
 from viewer.loading.settings import MotionSettings
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
@@ -157,6 +147,8 @@ def read_source(source: Source, contents: Contents, settings: MotionSettings) ->
         Other files that it refers to.
     """
     if _is_picture(source):
+        from viewer.formats import read_picture
+
         contents.pictures.append((source.path, read_picture(source)))
         return ()
     return _sort(source, contents, settings)
@@ -245,6 +237,8 @@ def _video_rate(settings: MotionSettings) -> float | None:
 
 
 def _is_picture(source: Source) -> bool:
+    from viewer.formats import is_picture
+
     if source.is_folder or claims(source.path.suffix):
         return False
     return is_picture(source.peek(_PEEK))
@@ -252,6 +246,9 @@ def _is_picture(source: Source) -> bool:
 
 def _with_own_picture(source: Source, figure: Figure) -> Figure:
     """Apply the image in a figure's folder as its texture, if there is exactly one."""
+    from viewer.formats import read_picture, referenced_path
+    from viewer.loading.covering import with_texture
+
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:
         return figure

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from viewer.loading.cast import Cast
-from viewer.rig.captures.camera_view import CameraView, placed_view
-from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box
+
+if TYPE_CHECKING:
+    from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.figure_group import FigureGroup
 
 __all__ = ["place_side_by_side", "placed_views", "stand_up"]
 
@@ -65,6 +69,10 @@ def placed_views(cast: Cast) -> list[CameraView]:
         for actor, group in zip(cast.actors, cast.groups, strict=True)
         if group is not None
     }
+    if not placements:
+        return []
+    from viewer.rig.captures.camera_view import placed_view
+
     return [
         placed_view(view, placement)
         for group, placement in placements.items()

@@ -14,7 +14,6 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError
 from viewer.media.png import encode_png
-from viewer.media.saving import save_bytes
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
 
@@ -184,6 +183,8 @@ def save_image(path: Path, pixels: Bytes) -> int:
     OutputError
         If it cannot be written.
     """
+    from viewer.media.saving import save_bytes
+
     data = _encoded(path, pixels)
     save_bytes(path, data)
     return len(data)

@@ -5,10 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
-import shutil
 import stat
-import tempfile
-import zipfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
@@ -100,6 +97,8 @@ def save_text(path: str | Path, text: str) -> None:
 
 def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
     """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
+    import zipfile
+
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, array in arrays.items():
@@ -186,6 +185,8 @@ class Replacement:
 
     def begin(self) -> Path:
         """Create the temporary file, with the target's suffix, and return its path."""
+        import tempfile
+
         target = self._target
         try:
             handle, name = tempfile.mkstemp(
@@ -285,6 +286,9 @@ def _keep_copy(path: Path, copies: _Copies) -> None:
 
 
 def _copy(target: Path) -> Path:
+    import shutil
+    import tempfile
+
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     os.close(handle)
     try:
@@ -314,6 +318,8 @@ def _write_through(target: Path, data: bytes) -> None:
 
 
 def _replace(target: Path, data: bytes, permissions: int) -> None:
+    import tempfile
+
     _require_folder(target)
     handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name[:40]}.")
     note_unfinished(Path(name))

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
-from viewer.formats import save_bytes
 from viewer.interrupts import deferred
 from viewer.phrases import printable
 
@@ -57,6 +55,8 @@ def _settings_file() -> Path:
 
 def load_model_folder() -> Path | None:
     """Return the remembered folder; None if there is none or the setting cannot be read."""
+    import json
+
     try:
         folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
     except (OSError, ValueError, TypeError, KeyError, RecursionError):
@@ -74,6 +74,10 @@ def save_model_folder(folder: str | Path) -> Path:
     OutputError
         If the setting cannot be saved.
     """
+    import json
+
+    from viewer.formats import save_bytes
+
     # The methods of Path raise for names that are too long and for unknown users.
     path = Path(os.path.expanduser(folder))  # noqa: PTH111
     if not str(folder) or not os.path.isdir(path):  # noqa: PTH112

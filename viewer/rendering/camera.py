@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pyrr import matrix44
 
-from viewer.rendering.pinhole import picture_size, pinhole_projection, pinhole_view
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView, view_at
 from viewer.rig.mesh import bounding_box, box_size
+
+if TYPE_CHECKING:
+    from viewer.rig.captures.camera_view import CameraView
 
 __all__ = [
     "VIEWS",
@@ -103,7 +104,11 @@ class Camera:
     @property
     def pinhole(self) -> CameraView | None:
         """The calibrated camera to look through as it is at ``seconds``; None without one."""
-        return None if self.fixed is None else view_at(self.fixed, self.seconds)
+        if self.fixed is None:
+            return None
+        from viewer.rig.captures.camera_view import view_at
+
+        return view_at(self.fixed, self.seconds)
 
     @property
     def is_parallel(self) -> bool:
@@ -114,6 +119,8 @@ class Camera:
         """Return the rotation from scene to camera space, for column vectors: (3, 3)."""
         pinhole = self.pinhole
         if pinhole is not None:
+            from viewer.rendering.pinhole import pinhole_view
+
             return pinhole_view(pinhole)[:3, :3]
         return np.array(camera_axes(self))
 
@@ -121,6 +128,8 @@ class Camera:
         """Return the matrix from scene to camera space, for column vectors: (4, 4)."""
         pinhole = self.pinhole
         if pinhole is not None:
+            from viewer.rendering.pinhole import pinhole_view
+
             return pinhole_view(pinhole)
         _, up, _ = camera_axes(self)
         # pyrr's matrices are for row vectors.
@@ -143,6 +152,8 @@ class Camera:
         """
         pinhole = self.pinhole
         if pinhole is not None:
+            from viewer.rendering.pinhole import pinhole_projection
+
             return pinhole_projection(pinhole, aspect, box)
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
         reach = reach or self.distance  # even an empty scene needs a depth range
@@ -248,6 +259,9 @@ def camera_from_view(
     RigError
         If the size of the camera's images is unknown.
     """
+    from viewer.rendering.pinhole import picture_size
+    from viewer.rig.captures.camera_view import view_at
+
     fixed, view = view, view_at(view, seconds)
     width, height = picture_size(view)
     aspect = size[0] / size[1]

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.annotation import Annotation
-from viewer.rendering.overlay.frusta import frusta_annotation, frusta_points, frustum_depth
 from viewer.rendering.passes.late_passes import LatePasses
-from viewer.rendering.pinhole import picture_size
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_images import CameraImage
-from viewer.rig.captures.camera_view import CameraView, motion_times, view_at
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene
+
+if TYPE_CHECKING:
+    from viewer.rendering.overlay.annotation import Annotation
+    from viewer.rig.captures.camera_images import CameraImage
+    from viewer.rig.captures.camera_view import CameraView
 
 __all__ = [
     "draw_image_behind",
@@ -34,8 +36,10 @@ def drawn_cameras(
     scene: Scene, view_through: CameraView | None, options: DisplayOptions
 ) -> list[CameraView]:
     """Return the cameras whose frusta are drawn, at the scene's time: all except the one in use."""
-    if not options.cameras:
+    if not options.cameras or not scene.views:
         return []
+    from viewer.rig.captures.camera_view import view_at
+
     seconds = scene.time or 0.0
     return [view_at(camera, seconds) for camera in scene.views if camera is not view_through]
 
@@ -45,7 +49,11 @@ def reach_of(
 ) -> Floats:
     """Return the box of a scene and its drawn cameras, for the depth range: (2, 3)."""
     cameras = drawn_cameras(scene, view_through, options)
-    return bounding_box(np.concatenate([box, frusta_points(cameras, box)])) if cameras else box
+    if not cameras:
+        return box
+    from viewer.rendering.overlay.frusta import frusta_points
+
+    return bounding_box(np.concatenate([box, frusta_points(cameras, box)]))
 
 
 def frusta_of(
@@ -57,7 +65,11 @@ def frusta_of(
 ) -> list[Annotation]:
     """Return the annotation of the drawn frusta, or None if there are none."""
     cameras = drawn_cameras(scene, view_through, options)
-    return [frusta_annotation(cameras, box, size)] if cameras else []
+    if not cameras:
+        return []
+    from viewer.rendering.overlay.frusta import frusta_annotation
+
+    return [frusta_annotation(cameras, box, size)]
 
 
 def _image(scene: Scene, camera: CameraView) -> CameraImage | None:
@@ -70,6 +82,8 @@ def _image(scene: Scene, camera: CameraView) -> CameraImage | None:
 
 def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
     """Return whether images of a size have the aspect ratio of a camera's calibration."""
+    from viewer.rendering.pinhole import picture_size
+
     width, height = picture_size(camera)
     return abs(size[0] * height / (size[1] * width) - 1.0) <= _TOLERANCE
 
@@ -81,6 +95,9 @@ def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Float
     """
     if not options.cameras or not scene.views:
         return points
+    from viewer.rendering.overlay.frusta import frusta_points
+    from viewer.rig.captures.camera_view import motion_times, view_at
+
     cameras = [
         view_at(camera, seconds)
         for camera in scene.views
@@ -107,6 +124,8 @@ def draw_image_planes(
     """Draw the images of the cameras whose frusta are drawn."""
     if scene.images is None:
         return
+    from viewer.rendering.overlay.frusta import frustum_depth
+
     for camera in drawn_cameras(scene, view.camera.fixed, options):
         image = _image(scene, camera)
         if image is not None:

@@ -5,23 +5,26 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import moderngl
 import numpy as np
 
 from viewer.rendering.bounds import Bounds
-from viewer.rendering.casters import Casters
 from viewer.rendering.effects import Effects, Shadow
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.passes.contact_pass import Contact, ContactPass
 from viewer.rendering.passes.ground_pass import ground_axes
-from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
-from viewer.rendering.passes.occlusion_pass import OcclusionPass
-from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
 from viewer.rendering.sampling import Sample, n_passes, tilted
 from viewer.rendering.view import View, key_direction
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+
+if TYPE_CHECKING:
+    from viewer.rendering.casters import Casters
+    from viewer.rendering.passes.contact_pass import Contact, ContactPass
+    from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+    from viewer.rendering.passes.occlusion_pass import OcclusionPass
+    from viewer.rendering.passes.shadow_pass import ShadowPass
 
 __all__ = ["Lighting"]
 
@@ -52,11 +55,15 @@ class Lighting:
 
     @cached_property
     def _contact_pass(self) -> ContactPass:
+        from viewer.rendering.passes.contact_pass import ContactPass
+
         self._made.append(made := ContactPass(self.context, self.programs))
         return made
 
     @cached_property
     def _ground_pass(self) -> GroundShadowPass:
+        from viewer.rendering.passes.ground_shadow_pass import GroundShadowPass
+
         self._made.append(made := GroundShadowPass(self.context, self.programs))
         return made
 
@@ -128,6 +135,8 @@ class Lighting:
         return replace(view, effects=Effects(shadow, occlusion))
 
     def _shadow_pass(self, size: tuple[int, int]) -> ShadowPass:
+        from viewer.rendering.passes.shadow_pass import ShadowPass, map_side
+
         side = map_side(size)
         if self._shadow is None or self._shadow.side != side:
             if self._shadow is not None:
@@ -137,6 +146,8 @@ class Lighting:
         return self._shadow
 
     def _occlusion_pass(self, size: tuple[int, int]) -> OcclusionPass:
+        from viewer.rendering.passes.occlusion_pass import OcclusionPass
+
         if self._occlusion is None or self._occlusion.size != size:
             if self._occlusion is not None:
                 self._occlusion.release()

@@ -15,14 +15,12 @@ from viewer.rendering.camera_views import (
     frusta_of,
     reach_of,
 )
-from viewer.rendering.casters import Casters
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlays import Overlays, draw_overlays
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
@@ -51,6 +49,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
+    from viewer.rendering.outlined import Outlined
     from viewer.rendering.overlay.annotation import Annotation
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
@@ -150,6 +149,8 @@ class Renderer:
         strength : float
             Strength of shadows and occlusion, 0 to 1.
         """
+        from viewer.rendering.casters import Casters
+
         self._note_samples(target)
         self.buffers.keep_only(scene.actors)
         target.framebuffer.use()
@@ -177,6 +178,8 @@ class Renderer:
             self.late, over, scene, view, options, target.size, selected
         )
         if options.outline:
+            from viewer.rendering.outlined import Outlined
+
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.overlay.legend import Legend, Shown, legend_of
 from viewer.rendering.passes.skin_pass import PosedMesh
-from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import find_quantity, joint_text, missing_part
 from viewer.rig.scene import Actor
+
+if TYPE_CHECKING:
+    from viewer.rendering.overlay.legend import Legend
 
 __all__ = ["ScalarQuantities", "name_for"]
 
@@ -82,6 +84,9 @@ class ScalarQuantities:
         options: DisplayOptions,
         figures: Sequence[Figure],
     ) -> None:
+        from viewer.rendering.overlay.legend import Shown, legend_of
+        from viewer.rendering.scalar_look import look_of, shown_ends
+
         having = [one for one in meshes if not missing_part(name, one[0].figure)]
         ranges = [mesh.scalars.range for _, mesh in having] or [(0.0, 0.0)]
         self.range = min(low for low, _ in ranges), max(high for _, high in ranges)

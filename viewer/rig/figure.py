@@ -7,24 +7,24 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
 from viewer.rig.arrays import Floats, Ints, frozen
-from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
-from viewer.rig.file_record import FileRecord
-from viewer.rig.hands import Hand
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion.animation import Animation
 from viewer.rig.pose import Pose
-from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
 
 if TYPE_CHECKING:
+    from viewer.diagnostics import Diagnostic
+    from viewer.rig.annotations import BodyParts, Keypoints, ReducedMesh, VertexField
+    from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor
     from viewer.rig.bodies.model_parameters import ModelParameters
     from viewer.rig.captures.points import PointLayout
+    from viewer.rig.file_record import FileRecord
+    from viewer.rig.hands import Hand
+    from viewer.rig.motion.animation import Animation
+    from viewer.rig.posing.pose_vector import PoseLayout
+    from viewer.rig.skin import Skin
 
 __all__ = ["AttachedFigure", "Figure", "skeleton_points"]
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
-from viewer.rig.material import Material
+
+if TYPE_CHECKING:
+    from viewer.rig.material import Material
 
 __all__ = [
     "Mesh",

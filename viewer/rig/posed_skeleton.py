@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from viewer.rig.arrays import Floats
 from viewer.rig.number_key import NumberKey
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
+
+if TYPE_CHECKING:
+    from viewer.rig.skin import Skin
 
 __all__ = ["PosedSkeleton"]
 

@@ -12,14 +12,11 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.person import person_name
 from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped
-from viewer.rig.skinning import deform
-from viewer.rig.units import METRES
 
 __all__ = [
     "Actor",
@@ -129,6 +126,8 @@ class Actor:
     @property
     def name(self) -> str:
         """Label in menus and files: the title, and the person or figure in the recording."""
+        from viewer.rig.captures.person import person_name
+
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
         return name if self.person is None else f"{name} {person_name(self.person)}"
@@ -300,6 +299,8 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     (N, 3)
         Scene space.
     """
+    from viewer.rig.skinning import deform
+
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
@@ -335,6 +336,8 @@ def scene_unit(scene: Scene) -> str:
     str
         Key of ``viewer.rig.units.METRES``; empty if no unit is known.
     """
+    from viewer.rig.units import METRES
+
     actor = next((actor for actor in scene.actors if actor.figure.unit in METRES), None)
     if actor is None:
         return ""
@@ -345,5 +348,7 @@ def scene_unit(scene: Scene) -> str:
 
 def _unit_of(metres: float) -> str:
     """Return the unit of this length; empty if there is none."""
+    from viewer.rig.units import METRES
+
     known = (unit for unit, size in METRES.items() if math.isclose(size, metres, rel_tol=1e-6))
     return next(known, "")

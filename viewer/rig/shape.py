@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import Correctives, corrective_weights, regress_joints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.kinematics import world_matrices
@@ -15,7 +15,10 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.pose import Pose, joint_rotations, rest_pose
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
+
+if TYPE_CHECKING:
+    from viewer.rig.blendshapes import Correctives
+    from viewer.rig.skin import Skin
 
 __all__ = [
     "joint_directions",
@@ -98,6 +101,8 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     Figure
         With new normals, rest translations and inverse bind matrices.
     """
+    from viewer.rig.blendshapes import regress_joints
+
     mesh, skeleton, skin = figure.require_mesh(), figure.skeleton, figure.skin
     normals = vertex_normals(positions, mesh.triangles) if normals is None else normals
     new_mesh = replace(mesh, positions=positions, normals=normals)
@@ -206,6 +211,8 @@ def joint_directions(figure: Figure) -> Floats:
     (S, J, 3)
         Figure units per weight of 1; zeros where joints do not follow the mesh.
     """
+    from viewer.rig.blendshapes import regress_joints
+
     regressor, shapes, mesh = figure.joint_regressor, figure.blend_shapes, figure.mesh
     directions = np.zeros((figure.n_shapes, figure.require_skeleton().n_joints, 3))
     if regressor is None or shapes is None or mesh is None:
@@ -242,6 +249,8 @@ def pose_weights(correctives: Correctives, skeleton: Skeleton, pose: Pose) -> Fl
     (P,)
         One per row of the correctives.
     """
+    from viewer.rig.blendshapes import corrective_weights
+
     if correctives.feature is None:
         return corrective_weights(joint_rotations(skeleton, pose))
     return correctives.feature.weights(skeleton, pose)

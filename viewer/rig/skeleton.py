@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
-from viewer.rig.bodies.joint_posing import JointPosing
-from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.humanoid import Humanoid
-from viewer.rig.springs.springs import Springs
+
+if TYPE_CHECKING:
+    from viewer.rig.bodies.joint_posing import JointPosing
+    from viewer.rig.constraints.constraint import Constraint
+    from viewer.rig.springs.springs import Springs
 
 __all__ = [
     "DOF_KINDS",

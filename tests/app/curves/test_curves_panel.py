@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from app.curves.plotted import ARM_X, _arm, _at, _center, _clip, _pick, _scale, _type_into
 from numpy.testing import assert_allclose, assert_array_equal
 
+from viewer.app.curves.axes import value_limits
+from viewer.app.curves.data import curves_of
+from viewer.app.curves.plot import unit_text
 from viewer.app.curves.state import Curves
 from viewer.rig.motion.clip_sampling import evaluate
 
@@ -18,6 +22,29 @@ def _chosen(hand):
 
 
 # What is shown
+
+
+def test_rounding_of_a_constant_curve_is_not_magnified():
+    noise = np.random.default_rng(2).normal(scale=1e-6, size=200)
+    for values, least in ((30.0 + noise, 0.1), (1e5 + 5e3 * noise, 1e-3), (noise, 1e-3)):
+        bottom, top = value_limits(values, least)
+        assert np.ptp(values) < 0.05 * (top - bottom) and bottom < values.min() < top
+    # A small motion is shown, between a third of the height and all but the margins.
+    bottom, top = value_limits(np.array([2.0, 2.05]), 0.1)
+    assert 0.05 / (top - bottom) == pytest.approx(0.5)
+
+
+def test_units_of_the_axes_follow_the_curves(curves):
+    figure = curves.state.actor.figure
+    for unit, shown in (("", "units"), ("cm", "cm")):
+        curves.state.actor.figure = replace(figure, unit=unit)
+        curves.click("curves of root")
+        assert curves.state.of(Curves).rows == (0, 1, 2, 3, 4, 5)
+        lengths, angles = (curves.state.of(Curves).rows[k:][:3] for k in (0, 3))
+        found = curves_of(curves.state.actor)
+        assert all(found[row].is_length for row in lengths)
+        assert not any(found[row].is_length for row in angles)
+        assert unit_text(curves.state, found) == f"{shown}, degrees"
 
 
 def test_curves_follow_the_selected_joint_and_the_list(curves):

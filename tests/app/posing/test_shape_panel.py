@@ -12,7 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import viewer
 from viewer.app.posing.state import Posing
+from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
+from viewer.rig.mesh import Mesh
 from viewer.rig.morph_target import MorphTarget, with_morphs
 from viewer.rig.scene import Actor
 from viewer.rig.shape import rest_joints, shaped
@@ -197,6 +199,24 @@ def test_read_outs_show_the_box_dimensions(shape, texts):
     assert found.mass == pytest.approx(325.05, abs=1e-9)
     said = _said(shape, texts)
     assert (said["Height"], said["Volume"]) == ("2.200 m", "330.0 litres")
+
+
+def test_open_mesh_has_no_volume(shape, texts):
+    figure = shape.state.actor.figure
+    mesh = Mesh(figure.mesh.positions, figure.mesh.normals, figure.mesh.triangles[2:])
+    shape.state.actor.figure = replace(figure, mesh=mesh)
+    texts.clear()
+    shape.step()
+    # The two triangles of one side are missing, whose outline has four edges.
+    assert "none: open mesh (4 boundary edges)" in texts and "Mass" not in texts
+
+
+def test_doubled_vertices_do_not_open_a_mesh(shape):
+    figure = shape.state.actor.figure
+    positions = figure.mesh.positions[figure.mesh.triangles].reshape(-1, 3)
+    triangles = np.arange(len(positions)).reshape(-1, 3)
+    found = measure(Figure("box", Mesh(positions, positions, triangles), unit="m"))
+    assert (found.n_open_edges, found.mass) == (0, pytest.approx(246.25, abs=1e-9))
 
 
 def test_read_outs_measure_the_rest_pose(shape, texts):

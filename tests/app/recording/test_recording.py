@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from PIL import Image
 
 from viewer.app.files.state import Files
+from viewer.app.recording.recorded_frames import playback_frames, recorded_times
 from viewer.app.recording.recorded_marks import RecordedMarks
 from viewer.app.recording.state import Recording, RecordSettings
 from viewer.app.weights.actions import pin_vertex, unpin
@@ -179,6 +180,20 @@ def test_video_has_every_frame(moving, tmp_path):
         stream = container.streams.video[0]
         assert (stream.width, stream.height, stream.average_rate) == (320, 240, 10)
         assert sum(1 for _ in container.decode(stream)) == 11
+
+
+def test_dialog_shows_the_frames_that_are_recorded(moving):
+    state, settings = moving.state, RecordSettings()
+    # 7.6 frames: the last one that begins is number 7. Its end in single precision is still 7.
+    for end, n_frames in ((7.6 / 30.0, 8), (float(np.float32(7.0 / 30.0)), 8), (6.9 / 30.0, 7)):
+        state.clock.set_range(0.0, end)
+        assert playback_frames(state) == (0, n_frames - 1)
+        times, numbers, _ = recorded_times(state, settings)
+        assert numbers == list(range(n_frames)) and times[-1] <= end
+    state.clock.set_range(2.5 / 30.0, 7.6 / 30.0)  # 5.1 frames
+    first, last = playback_frames(state)
+    assert (first, last) == (2, 7)
+    assert recorded_times(state, settings)[1] == list(range(first, last + 1))
 
 
 def test_cancelling_leaves_no_files(moving, tmp_path):

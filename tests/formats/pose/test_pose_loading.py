@@ -12,7 +12,8 @@ from formats.synthetic_smpl import model
 import viewer
 from viewer.errors import FormatError, RigError
 from viewer.formats import save_image
-from viewer.loading import add_to_actor, read_files
+from viewer.loading import read_files
+from viewer.loading.additions import add_to_actor
 from viewer.rig.pose import pose_key
 
 SKEL = "balljoint hip { rotxlimit -1 1 balljoint knee { offset 0 -1 0 } }"

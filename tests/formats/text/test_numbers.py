@@ -1,5 +1,6 @@
 import random
 import struct
+from decimal import Decimal
 
 import pytest
 from hypothesis import example, given, settings
@@ -68,6 +69,25 @@ def test_every_decimal_point_position_matches_float_bit_for_bit(length):
             digits = "".join(rng.choices("0123456789", k=length))
             words += [f"{sign}{digits[:place]}.{digits[place:]}", f"{sign}{digits}"]
     values, bad = parsed(" ".join(words))
+    assert bad == -1
+    assert bits(values) == bits(map(float, words))
+
+
+@pytest.mark.parametrize("most", [8, 17, 20, 24])
+def test_exponents_and_ties_match_float_bit_for_bit(most):
+    rng = random.Random(most)
+    words = ["9007199254740993e0", "9007199254740992.5e1", "18446744073709551615e-30", "0e999"]
+    for _ in range(3000):
+        length = rng.randint(1, most)
+        place = rng.randint(0, length)
+        digits = "".join(rng.choices("0123456789", k=length))
+        exponent = f"{rng.choice('eE')}{rng.choice(['', '+', '-'])}{rng.randint(0, 19)}"
+        words.append(f"{rng.choice(['', '-'])}{digits[:place]}.{digits[place:]}{exponent}")
+        # Halfway between two floats: an odd integer of 54 bits over a power of two.
+        half = Decimal(rng.randrange(1 << 53, 1 << 54) | 1) / (1 << rng.randint(0, 8))
+        words.append(f"{half:.20e}" if most > 20 else str(half)[:most])
+    words = [word for word in words if abs(float(word)) <= LARGEST]
+    values, bad = parsed(" \r\n\t".join(words))
     assert bad == -1
     assert bits(values) == bits(map(float, words))
 

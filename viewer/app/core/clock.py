@@ -9,7 +9,7 @@ from typing import NamedTuple
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import scene_rate, time_span
 from viewer.rig.motion.instances import pose_actors
-from viewer.rig.motion.timing import DEFAULT_RATE
+from viewer.rig.motion.timing import DEFAULT_RATE, frame_at
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor, Scene
 
@@ -187,13 +187,13 @@ class Clock:
     def frame_range(self) -> tuple[int, int]:
         """First and last frame of the whole range, in the numbering of ``frame``."""
         low, high = self.whole
-        first = math.ceil((low - self.origin) * self.frame_rate - 1e-6)
-        return first, math.floor((high - self.origin) * self.frame_rate + 1e-6)
+        first = -frame_at(self.origin - low, self.frame_rate)
+        return first, frame_at(high - self.origin, self.frame_rate)
 
     @property
     def frame(self) -> int:
         """Index of the current frame, 0 at the origin."""
-        return math.floor((self.time - self.origin) * self.frame_rate + 1e-6)
+        return frame_at(self.time - self.origin, self.frame_rate)
 
     def frame_time(self, frame: int) -> float:
         """Return the time of a frame, seconds."""

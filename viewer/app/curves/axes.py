@@ -3,18 +3,30 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
 from imgui_bundle import implot
 
 from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import Curve
 from viewer.app.curves.state import Curves
+from viewer.rig.arrays import Floats
 
-__all__ = ["Color", "Plot", "curve_color", "factor_of", "measured"]
+__all__ = ["Color", "Plot", "curve_color", "factor_of", "least_height", "measured", "value_limits"]
 
 Color = tuple[float, float, float, float]
+
+# Least difference of values that fitted axes magnify to the height of the plot. Rotations and
+# positions in single precision, as files store them, are rounded to far smaller steps.
+_LEAST_ANGLE = math.radians(0.1)
+_LEAST_LENGTH = 5e-4  # relative to the size of the scene
+_LEAST = 1e-3  # scales and weights
+_LEAST_RELATIVE = 1e-5  # relative to the values themselves
+_CONSTANT = 0.02  # of the least difference: smaller ones are drawn as constants
+_MARGIN = 0.16  # above and below the curves, relative to their height
 
 _COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
 _SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness of the same axis of several joints
@@ -82,3 +94,42 @@ def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
     shade = _SHADES[groups.index(number) % len(_SHADES)] if number in groups else 1.0
     red, green, blue = (min(part * shade, 1.0) for part in _COLORS[curves[row].axis])
     return ink((red, green, blue, 1.0))
+
+
+def least_height(state: AppState, curves: Sequence[Curve]) -> float:
+    """Return the least height of fitted axes for some curves, in the displayed units."""
+    low, high = state.box
+    length = _LEAST_LENGTH * float(np.linalg.norm(high - low))
+    return max(
+        (
+            factor_of(state, curve)
+            * (_LEAST_ANGLE if curve.is_angle else length if curve.is_length else _LEAST)
+            for curve in curves
+        ),
+        default=_LEAST,
+    )
+
+
+def value_limits(values: Floats, least: float) -> tuple[float, float]:
+    """Return the ends of an axis that shows some values, with a margin.
+
+    Parameters
+    ----------
+    values : (N,)
+        Values; those that are not finite are ignored.
+    least : float
+        Least height of the axis, so that rounding errors do not look like a motion.
+
+    >>> value_limits(np.array([0.0, 100.0]), 0.1), value_limits(np.array([30.0, 30.0]), 0.1)
+    ((-16.0, 116.0), (15.0, 45.0))
+    """
+    values = values[np.isfinite(values)]
+    bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
+    height, largest = top - bottom, max(abs(top), abs(bottom))
+    least = max(least, _LEAST_RELATIVE * largest)
+    if height < _CONSTANT * least:
+        middle = 0.5 * (bottom + top)
+        pad = max(0.5 * abs(middle), 0.5)
+        return middle - pad, middle + pad
+    pad = max(_MARGIN * height, 0.5 * (least - height))
+    return bottom - pad, top + pad

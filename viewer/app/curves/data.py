@@ -62,6 +62,12 @@ class Curve:
         """Name of joint and axis."""
         return f"{self.group}.{self.name}"
 
+    @property
+    def is_length(self) -> bool:
+        """Whether the values have the figure's unit of length."""
+        is_scale = self.name.startswith(_PREFIXES["scale"])
+        return not (self.is_angle or is_scale or self.number == _SHAPE_NUMBER)
+
 
 _of_skeleton: Memo[Skeleton, tuple[Curve, ...]] = Memo(kept=2)
 _of_transforms: Memo[TransformClip, tuple[Curve, ...]] = Memo()

@@ -12,7 +12,7 @@ from imgui_bundle import imgui, implot
 
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
-from viewer.app.curves.axes import Color, Plot, factor_of, measured
+from viewer.app.curves.axes import Color, Plot, factor_of, least_height, measured, value_limits
 from viewer.app.curves.data import Curve, sampled_points
 from viewer.app.curves.editing import set_clip_range
 from viewer.app.curves.keyed import KeyedMotion, keyed_of
@@ -22,13 +22,13 @@ from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = ["draw_plot"]
+__all__ = ["draw_plot", "unit_text"]
 
 _TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), 0.55
 _OUTSIDE = (0.0, 0.0, 0.0, 0.2)
 _MOST_SAMPLES = 900
 _DASHES = 90  # samples across the plot
-_MARGIN = 0.08  # margin around fitted curves, relative to their size
+_MARGIN = 0.08  # before and after the clip, relative to its duration
 _FARTHEST = 1e9
 _TIME_ID, _START_ID, _END_ID = 1, 2, 3
 
@@ -70,11 +70,19 @@ def _draw(state: AppState, curves: tuple[Curve, ...]) -> None:
     _draw_units(plot)
 
 
+def unit_text(state: AppState, curves: tuple[Curve, ...]) -> str:
+    """Return the units of the values of the selected curves, as text."""
+    shown = [curves[row] for row in state.of(Curves).rows]
+    units = {
+        state.actor.figure.unit or "units": any(curve.is_length for curve in shown),
+        "degrees" if state.in_degrees else "radians": any(curve.is_angle for curve in shown),
+    }
+    return ", ".join(unit for unit, is_used in units.items() if is_used)
+
+
 def _draw_units(plot: Plot) -> None:
     """Draw the unit of the values in a corner."""
-    kinds = {plot.curves[row].is_angle for row in plot.view.rows}
-    angle = "degrees" if plot.state.in_degrees else "radians"
-    text = ", ".join(["units"] * (False in kinds) + [angle] * (True in kinds))
+    text = unit_text(plot.state, plot.curves)
     place, size = implot.get_plot_pos(), implot.get_plot_size()
     corner = (place.x + 6.0, place.y + size.y - imgui.get_text_line_height() - 3.0)
     implot.get_plot_draw_list().add_text(corner, imgui.get_color_u32(faint(_RANGE)), text)
@@ -102,13 +110,8 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
             factor * sampled_points(clip, row, low, high)[1]
             for row, factor in zip(rows, factors, strict=True)
         ]
-    values = np.concatenate(parts)
-    values = values[np.isfinite(values)]
-    bottom, top = (float(values.min()), float(values.max())) if len(values) else (-1.0, 1.0)
-    pad = 2.0 * _MARGIN * (top - bottom)
-    # A constant curve must not be magnified until its rounding errors show.
-    pad = pad if pad > 1e-6 * max(abs(top), 1e-6) else max(0.5 * abs(top), 0.5)
-    return low, high, bottom - pad, top + pad
+    least = least_height(state, [curves[row] for row in rows])
+    return low, high, *value_limits(np.concatenate(parts), least)
 
 
 def _spec(color: Color, weight: float = 1.5, flags: int = 0) -> implot.Spec:

@@ -30,6 +30,7 @@ from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.own_animations import keeps_keys
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
+from viewer.rig.motion.timing import frame_at
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
@@ -228,7 +229,7 @@ def _range(state: AppState, actor: Actor) -> tuple[int, int] | None:
     if (clock.start, clock.end) == clock.whole or clip is None:
         return None
     rate = clip.timing.frame_rate if isinstance(clip, SampledClip) else clock.frame_rate
-    count = int((clip.end - clip.start) * rate + 1e-6) + 1
-    first = round((clock.start - actor.offset - clip.start) * rate)
-    stop = round((clock.end - actor.offset - clip.start) * rate) + 1
+    count = frame_at(clip.end - clip.start, rate) + 1
+    first = -frame_at(clip.start + actor.offset - clock.start, rate)
+    stop = frame_at(clock.end - actor.offset - clip.start, rate) + 1
     return max(first, 0), min(stop, count)

@@ -28,6 +28,7 @@ from viewer.lint import SEVERITIES, Finding, LintOptions
 from viewer.lint.captures import LOW_FRACTION, LOW_FRAMES
 from viewer.phrases import printable
 from viewer.rig.mesh import box_size
+from viewer.rig.scene import scene_unit
 
 __all__ = ["draw"]
 
@@ -109,7 +110,8 @@ def _draw_limits(state: AppState) -> None:
     if moved != rotation:
         view.options = replace(view.options, max_rotation=float(np.radians(max(moved, 0.0))))
     speed = options.max_speed or 0.0
-    text = "%.2f units/s" if speed else "automatic"
+    unit = scene_unit(state.scene) or "units"
+    text = f"%.2f {unit}/s" if speed else "automatic"
     moved = slider(state, "Largest speed", speed, 0.0, _FASTEST, text)
     explain("speed of joints and captured points; 0 for 15 times the figure's size per second")
     if moved != speed:

@@ -21,7 +21,7 @@ from viewer.app.core.widgets import (
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.pose_actions import random_shape, reset_shape
 from viewer.app.posing.state import Posing
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.measure import measure
@@ -94,6 +94,10 @@ def _draw_measures(figure: Figure, pose: Pose) -> None:
 
 def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:
     found = measure(rest)
+    if found.volume is None:
+        height = f"{found.height:.3f} m" if rest.unit == "m" else f"{found.height:.4g}"
+        edges = counted(found.n_open_edges, "boundary edge")
+        return (("Height", height), ("Volume", f"none: open mesh ({edges})"))
     if found.mass is None:
         return (("Height", f"{found.height:.4g}"), ("Volume", f"{found.volume:.4g}"))
     return (
@@ -173,7 +177,7 @@ def _slider_range(shapes: BlendShapes, index: int) -> tuple[float, float, str]:
         low, high = shapes.ranges[index].tolist()
         return low, high, f"{low:.2g} to {high:.2g}"
     if shapes.groups[index] == MORPH_GROUP:
-        return 0.0, 1.0, "1 is the full morph target"
+        return 0.0, 1.0, "the whole morph target applies at 1"
     return -_REACH, _REACH, _SIGMA
 
 

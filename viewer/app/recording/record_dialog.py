@@ -23,8 +23,10 @@ from viewer.app.core.widgets import (
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.state import Files
 from viewer.app.recording.preview import preview_size
+from viewer.app.recording.recorded_frames import playback_frames, recorded_times
 from viewer.app.recording.state import KINDS, LEAST_PIXELS, Recording, RecordSettings
 from viewer.formats import file_stem
+from viewer.phrases import counted
 from viewer.rendering.options import QUALITIES
 from viewer.rig.number_text import number_text
 
@@ -170,7 +172,7 @@ def _draw_range(state: AppState, settings: RecordSettings) -> None:
     """Draw the first and last frame, which are those of the playback range unless edited."""
     clock = state.clock
     lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
-    shown = settings.frames or _playback_frames(state)
+    shown = settings.frames or playback_frames(state)
     found = _pair_field(state, "First and last frame", shown)
     explain("the playback range, unless other frames are entered")
     if found is not None:
@@ -202,23 +204,17 @@ def _within(state: AppState, value: float, low: float, high: float) -> float:
     return limited
 
 
-def _playback_frames(state: AppState) -> tuple[int, int]:
-    clock = state.clock
-    first, last = (
-        round((time - clock.origin) * clock.frame_rate) + clock.first_frame
-        for time in (clock.start, clock.end)
-    )
-    return first, last
-
-
 def _span_text(state: AppState, settings: RecordSettings) -> str:
-    clock = state.clock
-    if not clock.has_motion:
-        return "one revolution" if settings.turntable else "no motion: one frame"
-    low, high = clock.start, clock.end
-    if settings.frames is not None:
-        low, high = (clock.frame_time(frame - clock.first_frame) for frame in settings.frames)
-    return f"{number_text(low, '.3f')} to {number_text(high, '.3f')} s"
+    """Return the number of frames that are recorded, and their times."""
+    times, _, rate = recorded_times(state, settings)
+    frames = counted(len(times), "frame")
+    if state.clock.has_motion:
+        low, high = (number_text(float(time), ".3f") for time in times[[0, -1]])
+        return f"{frames}, {low} to {high} s"
+    if settings.turntable:
+        seconds = "" if settings.kind == "sheet" else f", {number_text(len(times) / rate)} s"
+        return f"one revolution: {frames}{seconds}"
+    return f"no motion: {frames}"
 
 
 def ask_where(state: AppState, settings: RecordSettings) -> None:

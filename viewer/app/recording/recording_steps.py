@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import contextlib
-import math
 from collections.abc import Generator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from viewer.app.core.state import AppState
+from viewer.app.recording.recorded_frames import recorded_times
 from viewer.app.recording.recorded_marks import RecordedMarks
 from viewer.app.recording.recorded_options import recorded_follow, recorded_options
 from viewer.app.recording.state import RecordSettings
 from viewer.errors import OutputError
 from viewer.formats import check_targets
-from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ghost_pass import Ghost
@@ -66,7 +63,7 @@ def recording_steps(
     ViewerError
         If a frame cannot be drawn or written.
     """
-    times, numbers, rate = _times(state, settings)
+    times, numbers, rate = recorded_times(state, settings)
     size = settings.pixels((state.view_rect[2], state.view_rect[3]))
     files = [path]
     if settings.kind == "pictures":
@@ -108,30 +105,6 @@ def _recording(
         selected=(state.chosen_actor, state.selected_joint),
         annotations=RecordedMarks(state).at,
     )
-
-
-def _times(state: AppState, settings: RecordSettings) -> tuple[Floats, list[int], float]:
-    """Return the times of all frames in seconds, their numbers, and the frame rate."""
-    clock = state.clock
-    rate = settings.rate or clock.frame_rate
-    if settings.kind == ".gif":
-        rate = min(rate, MOST_GIF_RATE)
-    if not clock.has_motion:
-        count = max(round(settings.seconds * rate), 1) if settings.turntable else 1
-        if settings.kind == "sheet":
-            count = settings.n_cells if settings.turntable else 1
-        return np.zeros(count), list(range(count)), rate
-    start, end = clock.start, clock.end
-    if settings.frames is not None:
-        start, end = (clock.frame_time(n - clock.first_frame) for n in settings.frames)
-    count = math.floor((end - start) * rate + 1e-6) + 1
-    times = start + np.arange(count) / rate
-    first = clock.first_frame if rate == clock.frame_rate else 0
-    first += math.floor((start - clock.origin) * rate + 1e-6)
-    if settings.kind == "sheet":
-        chosen = np.unique(np.rint(np.linspace(0, count - 1, settings.n_cells)).astype(int))
-        return times[chosen], (first + chosen).tolist(), rate
-    return times, list(range(first, first + count)), rate
 
 
 def _numbered(path: Path, numbers: list[int]) -> list[Path]:

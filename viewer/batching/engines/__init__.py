@@ -93,6 +93,7 @@ class EngineKind:
 
 ENGINES = {
     "sequential": EngineKind("in this process", is_isolated=False),
+    "processes": EngineKind("in worker processes", ("pebble",)),
 }
 
 

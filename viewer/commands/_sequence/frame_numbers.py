@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -122,6 +121,7 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     from viewer.rig.motion.clip import Clip
     from viewer.rig.motion.evaluation import scene_rate, time_span
     from viewer.rig.motion.sampled_clip import SampledClip
+    from viewer.rig.motion.timing import frame_at
 
     captures = [a.clip for a in actors if isinstance(a.clip, SampledClip | PointClip)]
     longest = max(captures, key=lambda clip: clip.end - clip.start, default=None)
@@ -129,7 +129,7 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     counted = rate or own
     first = longest.timing.first_frame if longest is not None and counted == own else 0
     start, end = time_span(actors)
-    count = math.floor((end - start) * counted + 1e-6) + 1
+    count = frame_at(end - start, counted) + 1
     runs_on = any(isinstance(actor.clip, Clip) for actor in actors)
     return Numbering(first, count, start, end, counted, runs_on)
 

@@ -11,10 +11,8 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
-from viewer.commands._progress import Progress
 from viewer.commands._scene import print_warnings
 from viewer.commands._sequence.frame_numbers import parse_range
-from viewer.commands._sequence.shots import Request, Shots, parse_turntable, shots_of
 from viewer.commands._view import camera_of
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
@@ -24,6 +22,7 @@ from viewer.phrases import printable
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
+    from viewer.commands._sequence.shots import Request, Shots
     from viewer.media.picture_sinks import PictureSink, SheetSink
     from viewer.media.video import VideoSink
     from viewer.rendering.options import DisplayOptions
@@ -84,7 +83,11 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
     Raises ViewerError if options conflict, or the name of numbered images has no frame field.
     """
     frames = None if arguments.frames is None else parse_range(arguments.frames)
-    turntable = None if arguments.turntable is None else parse_turntable(arguments.turntable)
+    turntable = None
+    if arguments.turntable is not None:
+        from viewer.commands._sequence.shots import parse_turntable
+
+        turntable = parse_turntable(arguments.turntable)
     kind, is_certain = _kind(arguments, output)
     _check_options(arguments, kind)
     if not kind:
@@ -92,6 +95,8 @@ def request_of(arguments: argparse.Namespace, output: Path) -> Request | None:
     if kind == "pictures":
         _check_name(str(output))
         _check_picture(output)
+    from viewer.commands._sequence.shots import Request
+
     return Request(kind, output, frames, turntable, is_certain)
 
 
@@ -195,6 +200,8 @@ def draw_sequence(
     Raises ViewerError if nothing moves, options do not apply to the scene, or drawing fails.
     Raises OutputError if a file already exists, or cannot be written.
     """
+    from viewer.commands._progress import Progress
+    from viewer.commands._sequence.shots import shots_of
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
     from viewer.rendering.gpu.graphics import thread_graphics
@@ -226,10 +233,8 @@ def draw_sequence(
         with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
             for progress in steps:
                 line.show(progress.done)
-                if (
-                    progress.done < progress.total
-                ):  # after this, the file may be complete at any moment
-                    poll()
+                if progress.done < progress.total:
+                    poll()  # after the last frame, the file may be complete at any moment
         print_warnings(offscreen.renderer.notes)
     return _summary(request, shots, outputs, frame_size, sink)
 

@@ -1,9 +1,7 @@
 """Parser for long blocks of decimal numbers, in numpy, exact as ``float()`` above 5e-324.
 
-Eight characters are treated as one 64-bit word ("SIMD within a register"). A number with at most 15
-digits is an integer below 2^53 divided by a power of ten of at most 10^22, both exact in float64,
-so the quotient is the correctly rounded value (Clinger 1990). Words that are longer or have an
-exponent are converted by ``float()``, one by one.
+A block is parsed in chunks that fit into the processor's cache, see ``decimal_words``. The few
+words that it cannot round correctly are converted by ``float()``, one by one.
 
 Grammar of a number: ``[+-]? (digits [. digits?] | . digits) ([eE] [+-]? digits)? [fF]?``. This is
 stricter than ``float()``, which accepts ``nan``, ``1_000`` and digits of other scripts.
@@ -18,7 +16,9 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.arrays import Floats
+from viewer.formats._text.decimal_words import parse_decimals, parse_exponentials, parse_short
+from viewer.formats._text.swar import Indices, Words, padded
+from viewer.rig.arrays import Bools, Floats
 
 __all__ = [
     "LARGEST",
@@ -43,20 +43,10 @@ _NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
 _SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest positive float64
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes; temporary arrays stay in the processor's cache
-_PAD = 16  # bytes before a chunk, so that the first words can be read as 16 characters
-_MANTISSA_DIGITS = 15
-
-_U = np.uint64
-_ZEROS = _U(0x3030303030303030)
-_DOTS = _U(0x2E2E2E2E2E2E2E2E)
-_LOW7 = _U(0x7F7F7F7F7F7F7F7F)
-_HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
-_SIXES = _U(0x0606060606060606)
-_POWERS = 10.0 ** np.arange(_PAD + 1)
-# The mask of the last k characters of a little-endian word.
-_KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], dtype=np.uint64)
-
-Words = NDArray[np.uint64]
+_FEW = 0.25  # fraction of words with more than 8 characters that are evaluated separately
+_HANDFUL = 200  # words with an exponent for which float() is faster
+_MANY = 0.5  # fraction of words with an exponent from which all are evaluated like these
+_GROWTH = 1.02  # of the expected number of values
 
 
 def is_number(word: bytes) -> bool:
@@ -123,13 +113,7 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     >>> parse_numbers(b"1 -2.5  1e3", 0, 11)[0].tolist()
     [1.0, -2.5, 1000.0]
     """
-    parts: list[Floats] = []
-    for first, last in _chunk_bounds(data, start, end):
-        values, bad = _parse_chunk(data[first:last])
-        parts.append(values)
-        if bad >= 0:
-            return np.concatenate(parts), sum(map(len, parts))
-    return (np.concatenate(parts) if parts else np.zeros(0)), -1
+    return _parse(data, start, end, whole=False)
 
 
 def parse_words(data: bytes, start: int, end: int) -> Floats:
@@ -150,10 +134,7 @@ def parse_words(data: bytes, start: int, end: int) -> Floats:
     >>> parse_words(b"1 up 1e3", 0, 8).tolist()
     [1.0, nan, 1000.0]
     """
-    bounds = _chunk_bounds(data, start, end)
-    return np.concatenate(
-        [np.zeros(0), *(_parse_chunk(data[first:last], whole=True)[0] for first, last in bounds)]
-    )
+    return _parse(data, start, end, whole=True)[0]
 
 
 def word_begins(letters: NDArray[np.uint8]) -> NDArray[np.int64]:
@@ -177,22 +158,40 @@ def _chunk_bounds(data: bytes, start: int, end: int) -> Iterator[tuple[int, int]
         start = stop
 
 
-def _parse_chunk(chunk: bytes, whole: bool = False) -> tuple[Floats, int]:
+def _parse(data: bytes, start: int, end: int, whole: bool) -> tuple[Floats, int]:
     """Return the numbers before the first invalid word, or all with NaN for invalid words."""
-    padded = b" " * _PAD + chunk + b" "
-    letters = np.frombuffer(padded, dtype=np.uint8)
+    values, count = np.empty(0), 0
+    for first, last in _chunk_bounds(data, start, end):
+        found, bad = _parse_chunk(data[first:last], whole)
+        if count + len(found) > len(values):
+            # A large array grows without being copied, because its pages are moved.
+            rest = len(found) * (end - last) / (last - first)
+            values.resize(count + len(found) + int(_GROWTH * rest), refcheck=False)
+        values[count : count + len(found)] = found
+        count += len(found)
+        if bad >= 0:
+            break
+    else:
+        bad = -1
+    values.resize(count, refcheck=False)
+    return values, count if bad >= 0 else -1
+
+
+def _parse_chunk(chunk: bytes, whole: bool) -> tuple[Floats, int]:
+    text = padded(chunk)
+    letters = np.frombuffer(text, dtype=np.uint8)
     # Control characters, 0-8 and 14-31, would count as white space below, but they are part of
     # a word. The subtraction wraps around, so one comparison finds the second range.
     if letters.min() < 9 or (letters - np.uint8(14) < 18).any():
         return _parse_slowly(chunk, whole)
     space = letters <= ord(" ")
     edges = np.flatnonzero(space[1:] != space[:-1]) + 1
-    starts, ends = edges[0::2], edges[1::2]
+    starts, ends = np.ascontiguousarray(edges.reshape(-1, 2).T)
     if len(starts) == 0:
         return np.zeros(0), -1
-    values, odd = _parse_words(padded, letters, starts, ends)
+    values, odd = _parse_signed(text, letters, starts, ends)
     for index in np.flatnonzero(odd):
-        value = to_number(padded[starts[index] : ends[index]])
+        value = to_number(text[starts[index] : ends[index]])
         if value is None and not whole:
             return values[:index], int(index)
         values[index] = np.nan if value is None else value
@@ -209,103 +208,41 @@ def _parse_slowly(chunk: bytes, whole: bool) -> tuple[Floats, int]:
     return np.array(values, dtype=np.float64), -1
 
 
-def _parse_words(
-    padded: bytes, letters: NDArray[np.uint8], starts: NDArray[np.intp], ends: NDArray[np.intp]
-) -> tuple[Floats, NDArray[np.bool_]]:
+def _parse_signed(
+    text: bytes, letters: NDArray[np.uint8], starts: Indices, ends: Indices
+) -> tuple[Floats, Bools]:
     """Return the values of words, and a mask of the words that need ``float()`` instead."""
-    lengths = ends - starts
     minus = None
-    if b"-" in padded or b"+" in padded:
+    if b"-" in text or b"+" in text:
         first = letters.take(starts)
         minus = first == ord("-")
-        lengths -= minus | (first == ord("+"))
-    # V8 has alignment 1, so eight characters can be gathered from any address.
-    windows = np.ndarray(len(padded) - 7, dtype="V8", buffer=padded, strides=(1,))
-    has_dots = b"." in padded
-    values, odd = _parse_short(windows, ends, lengths, has_dots)
-    long_words = np.flatnonzero(lengths > 8)
-    if len(long_words):
-        values[long_words], odd[long_words] = _parse_long(
-            windows, ends.take(long_words), lengths.take(long_words)
-        )
+        starts = starts + (minus | (first == ord("+")))
+    aligned = letters.view("<u8")
+    n_exponents = int(np.count_nonzero(letters | np.uint8(32) == ord("e")))
+    if n_exponents > _MANY * len(ends):
+        values, odd = parse_exponentials(letters, aligned, starts, ends)
+    else:
+        values, odd = _parse_plain(letters, aligned, starts, ends, b"." in text)
+        some = np.flatnonzero(odd) if n_exponents > _HANDFUL else ()
+        if len(some):
+            values[some], odd[some] = parse_exponentials(letters, aligned, starts[some], ends[some])
+    odd |= values > LARGEST
     if minus is not None:
         np.negative(values, where=minus, out=values)
     return values, odd
 
 
-def _parse_short(
-    windows: NDArray[np.void], ends: NDArray[np.intp], lengths: NDArray[np.intp], has_dots: bool
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Parse unsigned words of at most 8 characters; results of longer ones must be replaced."""
-    words = _digits_only(windows.take(ends - 8).view("<u8"), np.minimum(lengths, 8))
-    if not has_dots:
-        return _eight_digits(words).astype(np.float64), (lengths < 1) | _not_digits(words)
-    dot = _dot_bit(words)
-    has_dot = dot != 0
-    decimals = np.where(has_dot, _letters_after(dot), 0)
-    words = np.where(has_dot, _close(words, dot) | _U(0x30), words)
-    values = _eight_digits(words) / _POWERS.take(decimals)
-    return values, (lengths - has_dot < 1) | _not_digits(words)
-
-
-def _parse_long(
-    windows: NDArray[np.void], ends: NDArray[np.intp], lengths: NDArray[np.intp]
-) -> tuple[Floats, NDArray[np.bool_]]:
-    """Parse unsigned words of 9 to 16 characters.
-
-    If a word has several points, one remains and is then rejected as a digit.
-    """
-    low = windows.take(ends - 8).view("<u8")
-    high = _digits_only(windows.take(ends - 16).view("<u8"), np.minimum(lengths - 8, 8))
-    low_dot, high_dot = _dot_bit(low), _dot_bit(high)
-    in_low = low_dot != 0
-    in_high = (high_dot != 0) & ~in_low
-    decimals = np.where(in_low, _letters_after(low_dot), 0)
-    decimals = np.where(in_high, _letters_after(high_dot) + 8, decimals)
-    # The free byte of the low word takes the last character of the high word, which moves up by
-    # one.
-    low = np.where(in_low, _close(low, low_dot) | (high >> _U(56)), low)
-    gapless = np.where(in_high, _close(high, high_dot) | _U(0x30), high)
-    high = np.where(in_low, (high << _U(8)) | _U(0x30), gapless)
-    mantissa = _eight_digits(high) * _U(100_000_000) + _eight_digits(low)
-    too_many = lengths - (in_low | in_high) > _MANTISSA_DIGITS
-    return mantissa / _POWERS.take(decimals), too_many | _not_digits(low) | _not_digits(high)
-
-
-def _digits_only(words: Words, lengths: NDArray[np.intp]) -> Words:
-    """Replace the characters before the last ``lengths`` with zeros."""
-    keep = _KEEP.take(lengths)
-    return ((words ^ _ZEROS) & keep) ^ _ZEROS
-
-
-def _dot_bit(words: Words) -> Words:
-    """Return the top bit of the first character that is a decimal point, or 0."""
-    x = words ^ _DOTS
-    zero = ~(((x & _LOW7) + _LOW7) | x | _LOW7)
-    return zero & (~zero + _U(1))
-
-
-def _letters_after(dot: Words) -> NDArray[np.intp]:
-    above = ~((dot << _U(1)) - _U(1))
-    return (np.bitwise_count(above) >> 3).astype(np.intp)
-
-
-def _close(words: Words, dot: Words) -> Words:
-    """Move the characters before the point one position towards it."""
-    below = (dot >> _U(7)) - _U(1)
-    above = ~((dot << _U(1)) - _U(1))
-    return (words & above) | ((words & below) << _U(8))
-
-
-def _not_digits(words: Words) -> NDArray[np.bool_]:
-    return (((words & _HIGH_NIBBLES) ^ _ZEROS) | (((words + _SIXES) & _HIGH_NIBBLES) ^ _ZEROS)) != 0
-
-
-def _eight_digits(words: Words) -> Words:
-    """Evaluate eight digits, first character most significant (Lemire's three-step product)."""
-    x = words - _ZEROS
-    x = (x * _U(10)) + (x >> _U(8))
-    mask = _U(0x000000FF000000FF)
-    left = (x & mask) * _U(0x000F424000000064)
-    right = ((x >> _U(16)) & mask) * _U(0x0000271000000001)
-    return (left + right) >> _U(32)
+def _parse_plain(
+    letters: NDArray[np.uint8], aligned: Words, starts: Indices, ends: Indices, has_dots: bool
+) -> tuple[Floats, Bools]:
+    """Return the values of words without exponents, and a mask of all others."""
+    lengths = ends - starts
+    is_long = lengths > 8
+    n_long = int(np.count_nonzero(is_long))
+    if n_long > _FEW * len(ends):
+        return parse_decimals(letters, aligned, starts, ends)
+    values, odd = parse_short(aligned, ends, lengths, has_dots)
+    if n_long:
+        some = np.flatnonzero(is_long)
+        values[some], odd[some] = parse_decimals(letters, aligned, starts[some], ends[some])
+    return values, odd

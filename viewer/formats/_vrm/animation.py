@@ -28,7 +28,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
-from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.timing import Timing, frame_at, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.transforms.rate import key_rate
 
@@ -36,7 +36,6 @@ __all__ = ["EXTENSION", "read_motion"]
 
 EXTENSION = "VRMC_vrm_animation"
 _MOST_FRAMES = 1_000_000
-_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame
 
 
 def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
@@ -71,10 +70,10 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     if not clip.channels:
         raise source.fault("F002.vrma-animation")
     rate = key_rate(clip)
-    count = int((clip.end - clip.start) * rate + _ON_FRAME) + 1
+    count = frame_at(clip.end - clip.start, rate) + 1
     if count > _MOST_FRAMES:
         raise source.fault("F002.vrma-long", "/animations/0", most=_MOST_FRAMES, found=count)
-    times = clip.start + np.arange(count) / rate
+    times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(figure, clip, times)
     return SkeletonMotion(
         figure,

@@ -13,7 +13,6 @@ import moderngl
 
 from viewer.errors import RenderError, ViewerError
 from viewer.interrupts import deferred
-from viewer.rendering.gpu.offer import headless_offer, offer_text
 
 __all__ = [
     "check_device",
@@ -85,6 +84,8 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
         with deferred():
             return moderngl.create_context(**settings)
     except Exception as problem:  # glcontext raises plain Exception
+        from viewer.rendering.gpu.offer import headless_offer, offer_text
+
         text = str(problem)
         offer = headless_offer(settings) if "0x3009" in text or "version" in text else None
         raise RenderError(explain(text) if offer is None else offer_text(offer)) from None

@@ -12,7 +12,6 @@ from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture
-from viewer.rendering.part_colors import part_colors
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, bounding_box, split_seams, visible_vertices
@@ -176,6 +175,8 @@ class MeshBuffers:
         """A colour for every split vertex by its body part; None if the figure has no parts."""
         parts = self.figure.body_parts
         if self._colors is None and parts is not None:
+            from viewer.rendering.part_colors import part_colors
+
             self._colors = self.upload(part_colors(len(parts.names))[parts.of_vertex])
         return self._colors
 

@@ -15,7 +15,6 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import active_rows
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.shape import pose_weights
@@ -95,6 +94,8 @@ class RestBuffers:
 
     def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
         """Upload positions, and normals if the shape changed, of every split vertex."""
+        from viewer.rig.blendshapes import active_rows
+
         shape = figure.require_mesh()
         if self._own is None:
             size = self.mesh.positions.size

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.upload import float32, ramp_texture
-from viewer.rendering.scalar_look import ScalarLook, typical_span
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.scalars import compute, find_quantity, missing_part
 from viewer.rig.skinning import Skinning
+
+if TYPE_CHECKING:
+    from viewer.rendering.scalar_look import ScalarLook
 
 __all__ = ["ScalarBuffer"]
 
@@ -69,6 +73,8 @@ class ScalarBuffer:
         skinning : Skinning
             Skinning of the drawn mesh.
         """
+        from viewer.rendering.scalar_look import typical_span
+
         depends = find_quantity(name).moves and pose is not None
         key = (name, repr(skinning), pose is None, pose_key(pose) if depends and pose else None)
         if key == self._key:

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from viewer.rendering.gpu.box_buffers import BoxBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.bone_style import bone_style, skeleton_opacity
 from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
@@ -27,6 +25,7 @@ from viewer.rig.skinning import deform
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.bone_buffers import BoneBuffers
+    from viewer.rendering.gpu.box_buffers import BoxBuffers
 
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
@@ -40,6 +39,8 @@ class SkeletonBuffers:
     """Shapes of one figure's joints, moved by one actor's pose."""
 
     def __init__(self, context: moderngl.Context, figure: Figure, cube: moderngl.Buffer) -> None:
+        from viewer.rendering.gpu.box_buffers import BoxBuffers
+
         skeleton = figure.require_skeleton()
         self.context, self.figure = context, figure
         self._size = _size(figure)
@@ -49,10 +50,14 @@ class SkeletonBuffers:
 
     def style(self, options: DisplayOptions) -> str:
         """Return the style of the drawn skeleton, as ``bone_style``."""
+        from viewer.rendering.passes.bone_style import bone_style
+
         return bone_style(self.figure.require_skeleton(), options)
 
     def opacity(self, options: DisplayOptions) -> float:
         """Return the opacity of the skeleton over a skin."""
+        from viewer.rendering.passes.bone_style import skeleton_opacity
+
         return skeleton_opacity(self.figure.require_skeleton(), options)
 
     def bones(self, style: str) -> BoneBuffers:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import moderngl
 
@@ -14,13 +14,15 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
-from viewer.rendering.passes.blended_order import SortedTriangles
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
+
+if TYPE_CHECKING:
+    from viewer.rendering.passes.blended_order import SortedTriangles
 
 __all__ = ["SKIN_COLOR", "MeshPass", "has_tints", "set_surface", "shading_of", "uses_materials"]
 
@@ -113,6 +115,8 @@ class MeshPass:
         indices = mesh.index_set(options)
         if not (blended and indices.is_blended):
             return indices
+        from viewer.rendering.passes.blended_order import SortedTriangles
+
         found = self._sorted.get(mesh, lambda: SortedTriangles(self.context))
         found.sort(mesh, indices, (view.matrix @ placement)[2, :3])
         return found

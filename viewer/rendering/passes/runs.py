@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import moderngl
 
@@ -11,7 +12,9 @@ from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.blended_order import SortedTriangles
+
+if TYPE_CHECKING:
+    from viewer.rendering.passes.blended_order import SortedTriangles
 
 __all__ = ["Prepare", "draw_runs", "draw_shapes"]
 
@@ -31,7 +34,7 @@ def draw_runs(
 
     Of blended triangles that are not sorted, the back faces are drawn first.
     """
-    two_passes = blended and not isinstance(indices, SortedTriangles)
+    two_passes = blended and isinstance(indices, IndexSet)
     plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
     for run in indices.runs:
         if run.surface.is_blended != blended:

@@ -33,7 +33,6 @@ from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
-from viewer.rig.skinning.dqs import split_palette
 
 __all__ = ["PosedMesh", "skinning_options_key"]
 
@@ -167,6 +166,8 @@ class PosedMesh:
         if method.uses_matrices:
             write_matrices(self._palette, palette)
         if method.uses_quaternions:
+            from viewer.rig.skinning.dqs import split_palette
+
             if self._rigid is None:
                 self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
             centers = bind_positions(skin) - self.mesh.center

@@ -15,13 +15,17 @@ Source: ``VRMC_node_constraint`` 1.0, github.com/vrm-c/vrm-specification.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.geometry.quaternion import conjugate, multiply, slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
+
+if TYPE_CHECKING:
+    from viewer.rig.constraints.constraint import Constraint
 
 __all__ = ["constrained", "constrained_matrices"]
 

@@ -18,7 +18,6 @@ from viewer.rig.inspection.front_evidence import (
     from_travel,
 )
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
@@ -138,6 +137,8 @@ def _path(actor: Actor) -> Floats:
     clip, places = actor.clip, []
     if clip is None or clip.end <= clip.start:
         return np.zeros((0, 3))
+    from viewer.rig.motion.evaluation import pose_actor
+
     moved = actor.copy()
     for time in _times(clip.start, clip.end):
         pose_actor(moved, time + actor.offset)

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from viewer.errors import RigError
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box, volume
+from viewer.rig.mesh import bounding_box, triangle_areas, volume
 
 __all__ = ["DENSITY", "Measures", "measure"]
 
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
+
+# Part of the surface that may be missing, as at the eyes or the mouth of a body, without making
+# the volume meaningless.
+_HOLE = 0.01
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,15 +29,18 @@ class Measures:
     ----------
     height : float
         Extent along the up axis.
-    volume : float
-        Enclosed volume, cubed units.
+    volume : float or None
+        Enclosed volume, cubed units; None if the mesh is open.
     mass : float or None
-        Volume times ``DENSITY``, kilograms; None unless the unit is metres.
+        Volume times ``DENSITY``, kilograms; None without a volume, or unless the unit is metres.
+    n_open_edges : int
+        Number of edges of one triangle only; vertices at the same position are one.
     """
 
     height: float
-    volume: float
+    volume: float | None
     mass: float | None
+    n_open_edges: int = 0
 
 
 def measure(figure: Figure) -> Measures:
@@ -50,6 +60,33 @@ def measure(figure: Figure) -> Measures:
         raise RigError(f"figure {figure.name} has no mesh to measure")
     box = bounding_box(figure.mesh.positions)
     axis = 2 if figure.up == "z" else 1
-    inside = abs(volume(figure.mesh.positions, figure.mesh.triangles))
+    height = float(box[1, axis] - box[0, axis])
+    positions, triangles = figure.mesh.positions, figure.mesh.triangles
+    edges = _open_edges(positions, triangles)
+    lengths = np.linalg.norm(positions[edges[:, 1]] - positions[edges[:, 0]], axis=1)
+    # No boundary of a given length encloses more than a circle.
+    hole = lengths.sum() ** 2 / (4.0 * np.pi)
+    if not len(triangles) or hole > _HOLE * triangle_areas(positions, triangles).sum():
+        return Measures(height, None, None, len(edges))
+    inside = abs(volume(positions, triangles))
     mass = DENSITY * inside if figure.unit == "m" else None
-    return Measures(float(box[1, axis] - box[0, axis]), inside, mass)
+    return Measures(height, inside, mass, len(edges))
+
+
+def _open_edges(positions: Floats, triangles: Ints) -> Ints:
+    """Return the edges that belong to one triangle only, (E, 2) vertices."""
+    corners: Ints = triangles
+    for merges in (False, True):
+        if merges:
+            # Vertices are often doubled along texture seams.
+            same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
+            corners = same[triangles]
+        following = np.roll(corners, -1, axis=1)
+        low, high = np.minimum(corners, following), np.maximum(corners, following)
+        keys = low.astype(np.int64) * len(positions) + high
+        _, first, counts = np.unique(keys.reshape(-1), return_index=True, return_counts=True)
+        if (counts != 1).all():
+            break
+    chosen = first[counts == 1]
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=-1)
+    return ends.reshape(-1, 2)[chosen]

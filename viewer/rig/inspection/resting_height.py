@@ -9,6 +9,7 @@ import numpy as np
 from viewer.rig.inspection.ground_height import ground_of
 from viewer.rig.inspection.soles import extent, soles_of
 from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames
+from viewer.rig.motion.timing import frame_times
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 
@@ -48,8 +49,7 @@ def resting_height(actor: Actor, up: str) -> RestingHeight | None:
     if figure.skeleton is None or not isinstance(motion, JointMotion):
         return None
     rate = frame_rate(motion)
-    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
-    times = motion.start + np.arange(min(count, _MOST)) / rate
+    times = frame_times(motion.start, motion.end, rate)[:_MOST]
     frames = frames_of(figure, motion, times, actor.pose)
     soles = soles_of(shaped(figure, frames.shape_weights[0]), figure.is_attached)
     if soles is None or not frames.present.any():

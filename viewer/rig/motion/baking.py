@@ -7,13 +7,11 @@ import numpy as np
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frame_rate, frames_of
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.timing import Timing, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose
 
 __all__ = ["baked"]
-
-_ON_FRAME = 1e-6  # fraction of a frame
 
 
 def baked(
@@ -38,11 +36,11 @@ def baked(
         If the figure has no skeleton.
     """
     rate = frame_rate(clip) if rate is None else rate
-    count = int(np.floor((clip.end - clip.start) * rate + _ON_FRAME)) + 1
-    frames = frames_of(figure, clip, clip.start + np.arange(count) / rate, base)
+    times = frame_times(clip.start, clip.end, rate)
+    frames = frames_of(figure, clip, times, base)
     return SampledClip(
         clip.name,
-        Timing(rate, np.arange(count, dtype=np.int32), start=clip.start),
+        Timing(rate, np.arange(len(times), dtype=np.int32), start=clip.start),
         frames.rotations,
         frames.translations,
         shape_weights=frames.shape_weights if figure.n_shapes else None,

@@ -20,6 +20,7 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
 )
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import frame_at, frame_times
 from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Motion, Scene
@@ -101,7 +102,9 @@ def sample_animation(
     own = frame_rate(motion)
     rate = own if rate is None else rate
     first, stop = frame_range(motion, rate, frames)
-    times: Floats = motion.start + np.arange(first, stop) / rate
+    times = frame_times(motion.start, motion.end, rate)[first:stop]
+    if len(times) < stop - first:
+        times = motion.start + np.arange(first, stop) / rate
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, interpolate)
     base = None if actor.pose is None else actor.pose.copy()
@@ -124,7 +127,7 @@ def frame_range(
     RigError
         If no frame is in the range.
     """
-    count = int(np.floor((motion.end - motion.start) * rate + 1e-6)) + 1
+    count = frame_at(motion.end - motion.start, rate) + 1
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
     if not isinstance(motion, Clip):

@@ -21,7 +21,7 @@ from viewer.rig.motion.evaluation import (
 )
 from viewer.rig.motion.own_animations import still_pose
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import Timing
+from viewer.rig.motion.timing import Timing, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.pose import Pose, PoseKey, pose_key
 from viewer.rig.posing.pose_vector import set_joint_rotations
@@ -40,7 +40,6 @@ __all__ = [
 ]
 
 _MOST_TRACKS = 4
-_ON_FRAME = 1e-6  # fraction of a frame
 
 
 class SpringMotion:
@@ -162,13 +161,12 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
         raise RigError(f"{actor.name} has no motion of spring joints")
     if rate is None:
         rate = STEPS_PER_SECOND if isinstance(clip, Clip) else frame_rate(clip)
-    count = int(np.floor((clip.end - clip.start) * rate + _ON_FRAME)) + 1
-    times = clip.start + np.arange(count) / rate
+    times = frame_times(clip.start, clip.end, rate)
     frames = frames_of(actor.figure, clip, times, actor.pose)
     rotations = frames.rotations.copy()
     swings = actor.springs if isinstance(actor.springs, SpringMotion) else SpringMotion()
     rotations[:, skeleton.springs.joints] = swings.rotations(actor, times)
-    rows: Ints = np.arange(count, dtype=np.int32)
+    rows: Ints = np.arange(len(times), dtype=np.int32)
     return SampledClip(
         clip.name,
         Timing(rate, np.where(frames.present, rows, -1).astype(np.int32), start=clip.start),

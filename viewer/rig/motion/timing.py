@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,16 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["DEFAULT_RATE", "FASTEST", "RATES", "SLOWEST", "Timing", "is_rate"]
+__all__ = [
+    "DEFAULT_RATE",
+    "FASTEST",
+    "RATES",
+    "SLOWEST",
+    "Timing",
+    "frame_at",
+    "frame_times",
+    "is_rate",
+]
 
 SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
@@ -21,6 +31,8 @@ RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
 """The limits as text, for messages."""
 
 _ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
+# The same for the ends of motions, which files store in seconds of single precision.
+_AT_FRAME = 1e-3
 
 
 def is_rate(rate: float) -> bool:
@@ -30,6 +42,22 @@ def is_rate(rate: float) -> bool:
     (True, False, False)
     """
     return SLOWEST <= rate <= FASTEST
+
+
+def frame_at(seconds: float, rate: float) -> int:
+    """Return the frame that is shown at a time since frame 0: the last one that has begun.
+
+    >>> frame_at(0.99, 10.0), frame_at(33.299999237060547, 30.0)  # the single precision of 33.3
+    (9, 999)
+    """
+    return math.floor(seconds * rate + _AT_FRAME)
+
+
+def frame_times(start: float, end: float, rate: float) -> Floats:
+    """Return the times of all frames from a start to an end (F,), seconds."""
+    times: Floats = start + np.arange(frame_at(end - start, rate) + 1) / rate
+    # A curve that repeats would be back at its start just after its end.
+    return np.minimum(times, end)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

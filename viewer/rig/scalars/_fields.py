@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from viewer.rig.annotations import VertexField
+from typing import TYPE_CHECKING
+
 from viewer.rig.figure import Figure
+
+if TYPE_CHECKING:
+    from viewer.rig.annotations import VertexField
 
 
 def field_of(figure: Figure, name: str, is_class: bool) -> VertexField | None:

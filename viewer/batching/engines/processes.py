@@ -1,0 +1,240 @@
+"""Items in worker processes of this machine.
+
+Workers start as new interpreters, because a fork would inherit OpenGL contexts and threads, and
+stay warm: modules, GPU programs and models are loaded by the first item that needs them. A worker
+that crashes, hangs or exceeds its memory is replaced, and its item is run again.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import os
+import signal
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, replace
+from multiprocessing.synchronize import Event
+from queue import Empty, SimpleQueue
+from typing import TYPE_CHECKING
+
+from viewer.batching.engines import IN_FLIGHT, Job, Limits
+from viewer.batching.items import Item, Result
+from viewer.errors import ViewerError
+from viewer.interrupts import Interrupted
+
+if TYPE_CHECKING:
+    from pebble import ProcessFuture, ProcessPool
+
+__all__ = ["run"]
+
+_TICK = 0.2  # seconds between checks whether the batch is stopping
+_NO_MEMORY = 99  # exit code of a worker that reached its memory limit
+_MOST_BREAKS = 3  # pools that end without a result, before the batch is given up
+_RETRIED = ("crashed", "timeout", "memory")
+
+
+def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
+    """Run items in worker processes.
+
+    Raises
+    ------
+    ViewerError
+        If pebble is missing, or the workers do not start.
+    """
+    try:
+        import pebble  # noqa: F401
+    except ImportError:
+        raise ViewerError(
+            "worker processes need pebble: pip install pebble, or use --workers 0"
+        ) from None
+    pool = _Workers(job, limits)
+    waiting, left = iter(items), True
+    try:
+        while True:
+            while left and len(pool.flying) < limits.workers * IN_FLIGHT and not pool.stops():
+                item = next(waiting, None)
+                left = item is not None
+                if item is not None:
+                    pool.schedule(_Attempt(item))
+            if not pool.flying:
+                return
+            yield from pool.finished()
+    finally:
+        pool.close()
+
+
+@dataclass(frozen=True)
+class _Attempt:
+    """An item and how often it has been started before."""
+
+    item: Item
+    earlier: int = 0
+
+
+class _Workers:
+    """A pool of workers, replaced as a whole if it breaks."""
+
+    def __init__(self, job: Job, limits: Limits) -> None:
+        self.job, self.limits = job, limits
+        self.flying: dict[ProcessFuture[Result], _Attempt] = {}
+        self._done: SimpleQueue[ProcessFuture[Result]] = SimpleQueue()
+        self._context = multiprocessing.get_context("spawn")
+        self._is_stopping = self._context.Event()
+        self._n_breaks = 0
+        self._pool = self._new_pool()
+
+    def stops(self) -> bool:
+        """Return whether the batch is stopping; workers then skip the items that wait."""
+        if not self._is_stopping.is_set() and self.limits.is_stopping():
+            self._is_stopping.set()
+        return self._is_stopping.is_set()
+
+    def schedule(self, attempt: _Attempt) -> None:
+        """Hand an item to the pool."""
+        try:
+            future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
+        except RuntimeError:  # the pool broke after its last result
+            self._renew()
+            future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
+        self.flying[future] = attempt
+        future.add_done_callback(lambda _: self._done.put(future))
+
+    def finished(self) -> Iterator[Result]:
+        """Wait for an attempt to end; yield its result unless the item is run again."""
+        try:
+            future = self._done.get(timeout=_TICK)
+        except Empty:
+            self.stops()
+            return
+        attempt = self.flying.pop(future)
+        result = self._result(future, attempt)
+        if result.status == "cancelled" and not result.message:
+            return  # it had not been started
+        if result.status in _RETRIED and attempt.earlier < self.limits.retries and not self.stops():
+            self.schedule(_Attempt(attempt.item, attempt.earlier + 1))
+            return
+        yield replace(result, attempts=attempt.earlier + 1)
+
+    def close(self) -> None:
+        """End the workers, and what they run."""
+        self._pool.stop()  # type: ignore[no-untyped-call]
+        self._pool.join()
+
+    def _result(self, future: ProcessFuture[Result], attempt: _Attempt) -> Result:
+        from pebble import ProcessExpired
+
+        problem = future.exception()
+        item = attempt.item
+        if problem is None:
+            self._n_breaks = 0
+            return future.result()
+        if isinstance(problem, TimeoutError):
+            message = f"no result after {self.limits.timeout:g} s"
+            return Result(item, "timeout", 2, self.limits.timeout or 0.0, message=message)
+        if isinstance(problem, ProcessExpired):
+            self._n_breaks = 0
+            return self._expired(item, problem.exitcode)
+        if isinstance(problem, BrokenProcessPool):
+            self._renew()
+            return Result(item, "crashed", 2, message="the worker processes ended")
+        return Result(item, "failed", 1, message=f"{type(problem).__name__}: {problem}")
+
+    def _expired(self, item: Item, code: int | None) -> Result:
+        """Return the result of an item whose worker has ended."""
+        if code == _NO_MEMORY:
+            limit = f"{(self.limits.memory or 0) / (1 << 20):,.0f} MiB"
+            return Result(item, "memory", 2, message=f"more memory needed than {limit}")
+        is_ended = code in (-signal.SIGTERM, signal.SIGTERM, 128 + signal.SIGTERM)
+        if is_ended and self.stops():
+            return Result(item, "cancelled", 2, message="the worker process was terminated")
+        return Result(item, "crashed", 2, message=f"the worker process {_end_of(code)}")
+
+    def _renew(self) -> None:
+        """Replace a pool that broke; its other items come back one by one, as crashed."""
+        if self._pool.active:
+            return  # replaced when the first of its items came back
+        self._n_breaks += 1
+        if self._n_breaks >= _MOST_BREAKS:
+            raise ViewerError(
+                "the worker processes end before they do anything; a script that calls "
+                'viewer.batch needs the line if __name__ == "__main__": before its own work'
+            )
+        self.close()
+        self._pool = self._new_pool()
+
+    def _new_pool(self) -> ProcessPool:
+        from pebble import ProcessPool
+
+        given = (self.job, self.limits.memory, self._is_stopping)
+        pool = ProcessPool(
+            self.limits.workers, initializer=_prepare, initargs=given, context=self._context
+        )
+        # Ctrl-C and a closed terminal reach all of its processes, but the batch decides what they
+        # end. Workers inherit the mask, as do the threads that start further workers.
+        with _blocked():
+            _ = pool.active  # starts it
+        return pool
+
+
+@contextlib.contextmanager
+def _blocked() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _end_of(code: int | None) -> str:
+    """Return how a process ended, for a message."""
+    if code is not None and code < 0:
+        name = signal.Signals(-code).name if -code in signal.valid_signals() else str(-code)
+        often = ", as the system does if memory runs out" if -code == signal.SIGKILL else ""
+        return f"was ended by {name}{often}"
+    return f"exited with {code}"
+
+
+# The rest runs in the workers.
+
+_job: Job | None = None
+_stopping: Event | None = None
+
+
+def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
+    """Begin a worker."""
+    global _job, _stopping
+    _job, _stopping = job, stopping
+    if memory is not None:
+        _limit_memory(memory)
+
+
+def _limit_memory(size: int) -> None:
+    if sys.platform == "win32":
+        return
+    import resource
+
+    # On Linux, the address space also has mapped files and reserves of drivers, which cost nothing.
+    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
+    most = resource.getrlimit(kind)[1]
+    limit = size if most == resource.RLIM_INFINITY else min(size, most)
+    resource.setrlimit(kind, (limit, most))
+
+
+def _work(item: Item) -> Result:
+    assert _job is not None and _stopping is not None  # set by _prepare
+    if _stopping.is_set():
+        return Result(item, "cancelled")
+    try:
+        result = _job(item)
+    except Interrupted as stop:
+        # The pool ends this worker; what the item was writing has been removed.
+        os._exit(stop.exit_code)
+    if result.status == "memory":
+        # Memory is fragmented now, and libraries may hold on to half-built objects.
+        os._exit(_NO_MEMORY)
+    return result

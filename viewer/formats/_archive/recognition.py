@@ -1,0 +1,59 @@
+"""Recognition of the formats of archives by their keys."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.values import Archive
+from viewer.formats._format import Format
+from viewer.formats._source import Source
+from viewer.phrases import printable
+
+_NAMED_KEYS = 3  # per format, in a message about unknown archives
+
+
+def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
+    """Return the key of an archive's format, determined by its keys and the shapes of its arrays.
+
+    ``formats``: all formats by key.
+    Raises FormatError if none matches; the message lists keys of each format.
+    """
+    archive = archive_of(source)
+    keys = archive.keys
+    for kind, form in formats.items():
+        if kind == "smpl" and set(keys).intersection(formats["skel_body"].keys):
+            continue  # SKEL also has arrays of SMPL
+        if set(keys).intersection(form.keys):
+            if kind not in ("amass", "pose"):
+                return kind
+            if not _is_video_mocap(archive):
+                return _pose_or_motion(archive, formats["pose"].keys)
+            return "video_mocap"
+    if _is_video_mocap(archive):
+        return "video_mocap"
+    wanted = "; ".join(
+        f"{form.title}: {', '.join(form.keys[:_NAMED_KEYS])}"
+        for form in formats.values()
+        if form.keys
+    )
+    if not keys:
+        raise source.fault("F002.empty-archive", wanted=wanted)
+    found = [printable(key, 40) for key in keys]
+    raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+
+
+def _is_video_mocap(archive: Archive) -> bool:
+    """Return whether an archive has results of a tool that have no keys of their own."""
+    from viewer.formats._video_mocap.tools import tool_of
+
+    return tool_of(archive) is not None
+
+
+def _pose_or_motion(archive: Archive, keys: Collection[str]) -> str:
+    """Return whether an archive is one pose or a motion; both have the same keys."""
+    from viewer.formats.amass import has_frames
+
+    is_pose = set(archive.keys).intersection(keys)
+    is_other = set(archive.keys).intersection(("markers_latent", "smpl_poses"))
+    return "pose" if is_pose and not is_other and not has_frames(archive) else "amass"

@@ -1,0 +1,36 @@
+"""Properties of a file format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """Properties of a format that menus and dialogs need before its module is imported.
+
+    Attributes
+    ----------
+    title : str
+        Name in menus and the manual.
+    suffixes : tuple of str
+        Suffixes with their dots; files are written with the first suffix.
+    signature : bytes
+        Regular expression that the head of every such text file contains; empty for none.
+    keys : tuple of str
+        Keys that identify an archive (``.pkl``, ``.npz``) of this format: any one is sufficient.
+    files : tuple of str
+        Files that identify a folder of this format: any one is sufficient.
+    writes : bool
+        Whether there is a writer.
+    is_bare_mesh : bool
+        Whether files of this format contain only a mesh, without skeleton and skin.
+    """
+
+    title: str
+    suffixes: tuple[str, ...]
+    signature: bytes = b""
+    keys: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
+    writes: bool = True
+    is_bare_mesh: bool = False

@@ -1,0 +1,113 @@
+"""Eight characters of a text as one 64-bit word ("SIMD within a register").
+
+A window of a padded text ends at any character: its last character is the most significant byte of
+the little-endian word, so that numbers are aligned at their last digit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = [
+    "PAD",
+    "ZEROS",
+    "Indices",
+    "Words",
+    "close_gap",
+    "digits_only",
+    "eight_digits",
+    "first_of",
+    "letters_after",
+    "not_digits",
+    "padded",
+    "words_before",
+]
+
+PAD = 24
+"""Spaces before a text, so that 24 characters can be read before the end of the first number."""
+
+Words = NDArray[np.uint64]
+Indices = NDArray[np.intp]
+
+_U = np.uint64
+ZEROS = _U(0x3030303030303030)
+"""Eight times the character 0."""
+
+_LOW7 = _U(0x7F7F7F7F7F7F7F7F)
+_HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
+_SIXES = _U(0x0606060606060606)
+# The mask of the last k characters of a word.
+_KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], dtype=np.uint64)
+
+
+def padded(text: bytes) -> bytes:
+    """Return a text between spaces that ``words_before`` can read."""
+    return b" " * PAD + text + b" " * (16 - len(text) % 8)
+
+
+def words_before(aligned: Words, ends: Indices, count: int) -> list[Words]:
+    """Return eight characters before each offset, eight before these, and so on.
+
+    Parameters
+    ----------
+    aligned : (N,)
+        A padded text as 64-bit words.
+    ends : (W,)
+        Offsets in characters.
+    count : int
+        Number of words to return, 1 to 3.
+    """
+    # Gathering aligned words and shifting them is faster than gathering at any address.
+    first = (ends - 8) >> 3
+    right = ((ends & 7) << 3).view(np.uint64)
+    left = _U(63) - right
+    found, after = [], aligned.take(first + 1)
+    for back in range(count):
+        here = aligned.take(first - back)
+        found.append((here >> right) | ((after << _U(1)) << left))
+        after = here
+    return found
+
+
+def digits_only(words: Words, lengths: Indices) -> Words:
+    """Replace the characters before the last ``lengths``, 0 to 8, with zeros."""
+    return ((words ^ ZEROS) & _KEEP.take(lengths)) ^ ZEROS
+
+
+def first_of(words: Words, letters: np.uint64) -> Words:
+    """Return the top bit of the first character that equals that of ``letters``, or 0."""
+    x = words ^ letters
+    zero = ~(((x & _LOW7) + _LOW7) | x | _LOW7)
+    return zero & (~zero + _U(1))
+
+
+def letters_after(bits: Words) -> Indices:
+    """Return the number of characters after the one marked by ``first_of``."""
+    above = ~((bits << _U(1)) - _U(1))
+    return (np.bitwise_count(above) >> 3).astype(np.intp)
+
+
+def close_gap(words: Words, bits: Words) -> Words:
+    """Remove a marked character: those before it move one place towards it.
+
+    The first character becomes a null byte.
+    """
+    below = (bits >> _U(7)) - _U(1)
+    above = ~((bits << _U(1)) - _U(1))
+    return (words & above) | ((words & below) << _U(8))
+
+
+def not_digits(words: Words) -> Words:
+    """Return 0 for words of eight digits, and any other number for the rest."""
+    return ((words & _HIGH_NIBBLES) ^ ZEROS) | (((words + _SIXES) & _HIGH_NIBBLES) ^ ZEROS)
+
+
+def eight_digits(words: Words) -> Words:
+    """Evaluate eight digits, first character most significant (Lemire's three-step product)."""
+    x = words - ZEROS
+    x = (x * _U(10)) + (x >> _U(8))
+    mask = _U(0x000000FF000000FF)
+    left = (x & mask) * _U(0x000F424000000064)
+    right = ((x >> _U(16)) & mask) * _U(0x0000271000000001)
+    return (left + right) >> _U(32)

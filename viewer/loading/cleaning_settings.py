@@ -1,0 +1,52 @@
+"""Settings for cleaning up captured motions."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from viewer.rig.cleanup.one_euro import OneEuro
+    from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
+
+__all__ = ["CleanUp"]
+
+
+@dataclass(frozen=True, slots=True)
+class CleanUp:
+    """Requested changes of captured motions, in the order in which they are made.
+
+    Attributes
+    ----------
+    merged : tuple of tuple of int
+        Numbers of people whose tracks belong to one person, who keeps the first number.
+    interpolates : bool
+        Whether gaps are interpolated.
+    longest_gap : int or None
+        Longest gap to interpolate, frames; None for one second.
+    smoothing : OneEuro, SavitzkyGolay or None
+        The filter.
+    locks_feet : bool
+        Whether feet that stand are held in place.
+    grounds : bool
+        Whether people are moved up or down until their feet rest at height 0.
+    frames : (int or None, int or None) or None
+        First frame to keep and the frame after the last one, with the numbers of the file; None for
+        the motion's own ends.
+    rate : float or None
+        New frames per second.
+    """
+
+    merged: tuple[tuple[int, ...], ...] = ()
+    interpolates: bool = False
+    longest_gap: int | None = None
+    smoothing: OneEuro | SavitzkyGolay | None = None
+    locks_feet: bool = False
+    grounds: bool = False
+    frames: tuple[int | None, int | None] | None = None
+    rate: float | None = None
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is requested."""
+        return self == CleanUp()
