@@ -51,9 +51,7 @@ def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
     return Chains(joints, above, place)
 
 
-def chain_worlds(
-    clip: SampledClip, chains: Chains, translations: Floats, scales: Floats
-) -> Floats:
+def chain_worlds(clip: SampledClip, chains: Chains, translations: Floats, scales: Floats) -> Floats:
     """Return the world matrices of some joints in every row of a clip: (N, K, 4, 4).
 
     Parameters

@@ -25,7 +25,7 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
 _SOLE_DOWN = 0.3  # cosine of the largest tilt of a foot that stands on its sole
-_HIGH_ANKLE = 0.1  # in proportion to the body: a higher ankle is that of a foot that points down
+_STEEP = 0.9  # sine of the steepest foot of somebody who stands
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +93,14 @@ class DrivenLegs:
         facing = np.einsum("nlab,lb,a->nl", ankles, self.level, up)
         return facing > _SOLE_DOWN * np.linalg.norm(ankles @ self.level[..., None], axis=2)[..., 0]
 
+    def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
+        """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""
+        ankles = [worlds[:, leg.ankle, :3, 3] for leg in self.legs]
+        return [
+            (toe - ankle, heel - ankle)
+            for ankle, (toe, heel) in zip(ankles, self.feet(worlds), strict=True)
+        ]
+
     def feet(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
         """Return the paths of the balls and the heels of all feet: (N, 3) each."""
         return [
@@ -147,7 +155,7 @@ def driven_legs(
     if (chains.place[constrained] >= 0).any():
         return None
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
-    still = SampledClip("", Timing(1.0, np.zeros(1)), skeleton.rest_rotations[None])
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
     world = chain_worlds(still, chains, *rests)[0]
     place = chains.place
     own = tuple(
@@ -179,7 +187,11 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
 
 
 def foot_paths(
-    found: Retargeted, clip: SampledClip, pairs: list[LegPair], size: float, up: Floats
+    found: Retargeted,
+    clip: SampledClip,
+    pairs: list[LegPair],
+    vectors: list[tuple[Floats, Floats]],
+    up: Floats,
 ) -> list[FootPath]:
     """Return the paths of the source's feet, in the axes and the unit of the figure.
 
@@ -191,25 +203,28 @@ def foot_paths(
         Motion of the source, its rows in the order of the frames.
     pairs : list of LegPair
         The legs.
-    size : float
-        About the height of the figure.
+    vectors : list of ((N, 3), (N, 3))
+        From the ankles of the figure to its balls and heels: they replace those of a source that
+        has no balls, or no standing rest pose.
     up : (3,)
         The up axis.
     """
     skeleton = found.source.figure.require_skeleton()
     chains = chains_to(skeleton, [joint for pair in pairs for joint in (pair.ankle, pair.toe)])
     rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
-    still = SampledClip("", Timing(1.0, np.zeros(1)), skeleton.rest_rotations[None])
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
     rest = chain_worlds(still, chains, *rests)[0]
     world = chain_worlds(clip, chains, *rests)
     axes, result = found.scale * found.to_target, []
-    for pair in pairs:
+    for pair, own in zip(pairs, vectors, strict=True):
         ankle, toe = (int(chains.place[joint]) for joint in (pair.ankle, pair.toe))
+        place = world[:, ankle, :3, 3] @ axes.T
         upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
         height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
-        # Without a standing rest pose, the ankle itself counts as the heel.
-        drop = height if 0.0 < height < _HIGH_ANKLE * size else 0.0
-        heel = world[:, ankle, :3] @ np.append(-drop / found.scale * upward, 1.0)
+        length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
+        if not 0.0 < height < _STEEP * length:
+            result.append(FootPath(place + own[0], place + own[1]))
+            continue
+        heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
         result.append(FootPath(world[:, toe, :3, 3] @ axes.T, heel @ axes.T))
     return result
-

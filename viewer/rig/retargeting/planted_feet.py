@@ -14,7 +14,7 @@ from typing import cast
 
 import numpy as np
 
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
 from viewer.rig.cleanup.leg_solving import EASE, faded, leg_rotations, lowering
 from viewer.rig.figure import Figure
@@ -40,6 +40,8 @@ __all__ = ["PlantedFeet", "plant_feet"]
 _EXTENDED = 0.985  # corrections straighten a leg up to this fraction of its length
 # Heights of the source's feet above a ground at height 0, relative to the body.
 _GROUND = (-0.015, 0.06)
+_ALIKE = 1e-4  # relative to the body
+_ROUNDING = 1e-6  # relative to the body
 _SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
 
 
@@ -58,6 +60,8 @@ class PlantedFeet:
         Largest height of a standing sole above or below the ground.
     lowered : float
         Largest distance by which the body was lowered.
+    size : float
+        About the height of the body.
     """
 
     n_contacts: int = 0
@@ -67,6 +71,14 @@ class PlantedFeet:
     gap_before: float = 0.0
     gap_after: float = 0.0
     lowered: float = 0.0
+    size: float = 1.0
+
+    @property
+    def is_better(self) -> bool:
+        """Whether feet slide less or are nearer to the ground, and neither is worse."""
+        slack = _ROUNDING * self.size
+        slides, gap = self.after - self.before, self.gap_after - self.gap_before
+        return max(slides, gap) <= slack and min(slides, gap) < -slack
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +112,8 @@ def plant_feet(
     clip : SampledClip
         The motion; unchanged if it would not become better.
     changes : PlantedFeet or None
-        What was changed; None if the figure or the source has no legs of known names.
+        What was changed; None if the figure or the source has no legs of known names, or the
+        figure has the source's proportions.
     """
     pairs = leg_pairs(found, figure.require_skeleton())
     rest_up = np.eye(3)["xyz".index(figure.up)]
@@ -110,11 +123,13 @@ def plant_feet(
     if body is None or clip.n_rows == 0:
         return found.clip, None
     source = cast("SampledClip", in_frame_order(found.source.clip))
-    feet = foot_paths(found, source, pairs, body.size, rest_up)
+    worlds = body.worlds(clip)
+    feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
+    if _moves_alike(feet, body.feet(worlds), body.size):
+        return found.clip, None
     plan = _plan(feet, body, clip, up)
     if not any(plan.contacts):
         return found.clip, PlantedFeet()
-    worlds = body.worlds(clip)
     planted, lowered = _planted(clip, body, worlds, feet, plan)
     after = body.worlds(planted)
     changes = PlantedFeet(
@@ -125,8 +140,20 @@ def plant_feet(
         _gap(body, worlds, plan),
         _gap(body, after, plan),
         lowered,
+        body.size,
     )
-    return planted, changes
+    return (planted if changes.is_better else found.clip), changes
+
+
+def _moves_alike(
+    feet: Sequence[FootPath], own: Sequence[tuple[Floats, Floats]], size: float
+) -> bool:
+    """Return whether the figure's ankles move exactly as those of the source."""
+    for foot, (_, heel) in zip(feet, own, strict=True):
+        away = heel - foot.heel
+        if float(np.abs(away - away[0]).max()) > _ALIKE * size:
+            return False
+    return True
 
 
 def _plan(feet: list[FootPath], body: DrivenLegs, clip: SampledClip, up: Floats) -> _Plan:
@@ -158,24 +185,22 @@ def _planted(
     rotations[:, joints] = leg_rotations(
         rotations[:, joints], worlds, body.chains.parents, body.legs, drop, shifts
     )
-    moved = _translated(clip, drop, np.flatnonzero(body.chains.parents < 0), joints)
+    moved = _translated(clip, drop, joints[body.chains.parents < 0])
     return replace(moved, rotations=rotations), float(lowered.max(initial=0.0))
 
 
-def _translated(clip: SampledClip, drop: Floats, roots: Floats, joints: Floats) -> SampledClip:
+def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
     """Return a motion of the whole body moved by offsets (N, 3)."""
     if clip.figure_translations is not None:
         return replace(clip, figure_translations=clip.figure_translations + drop)
     shifts = np.zeros_like(clip.rotations[..., :3])
     if clip.translations is not None:
         shifts += clip.translations
-    shifts[:, joints[roots]] += drop[:, None]
+    shifts[:, roots] += drop[:, None]
     return replace(clip, translations=shifts)
 
 
-def _horizontal(
-    points: tuple[Floats, Floats], contacts: Sequence[Contact], plan: _Plan
-) -> Floats:
+def _horizontal(points: tuple[Floats, Floats], contacts: Sequence[Contact], plan: _Plan) -> Floats:
     """Return horizontal shifts (N, 3) that keep a foot in its place in every contact."""
     shift = np.zeros_like(points[0])
     is_held = np.zeros(len(shift), dtype=np.bool_)
