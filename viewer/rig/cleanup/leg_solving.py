@@ -12,7 +12,7 @@ from viewer.rig.cleanup.leg_ik import Leg, bend, reach
 from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 
-__all__ = ["EASE", "faded", "leg_rotations", "lowering"]
+__all__ = ["EASE", "faded", "falling", "leg_rotations", "lowering"]
 
 EASE = 0.2
 """Seconds over which a correction begins and ends outside contacts."""
@@ -161,7 +161,7 @@ def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
         before, after = held[np.maximum(place - 1, 0)], held[np.minimum(place, len(held) - 1)]
         left = np.where(place > 0, frames - before, ease + 1)
         right = np.where(place < len(held), after - frames, ease + 1)
-        first, second = _falling(left / (ease + 1)), _falling(right / (ease + 1))
+        first, second = falling(left / (ease + 1)), falling(right / (ease + 1))
         # Between two contacts that are near each other the value moves from one to the other.
         total = np.maximum(first + second, 1.0)[:, None]
         mixed = first[:, None] * values[before] + second[:, None] * values[after]
@@ -169,7 +169,7 @@ def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
     return result
 
 
-def _falling(x: Floats) -> Floats:
+def falling(x: Floats) -> Floats:
     """Return 1 at 0 and 0 from 1 on, with slope 0 at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return 1.0 - x * x * (3.0 - 2.0 * x)

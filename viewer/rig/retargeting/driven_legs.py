@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from viewer.rig.arrays import Bools, Floats
+from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.foot_lock import legs_of
 from viewer.rig.cleanup.frame_rows import runs_of
 from viewer.rig.cleanup.leg_ik import Leg
@@ -24,7 +24,6 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
-_SOLE_DOWN = 0.3  # cosine of the largest tilt of a foot that stands on its sole
 _STEEP = 0.9  # sine of the steepest foot of somebody who stands
 
 
@@ -87,11 +86,11 @@ class DrivenLegs:
         scale = float(np.linalg.norm(worlds[0, self.legs[0].ankle, :3, 0]))
         return self.soles.heights(worlds, np.append(up, 0.0), scale)
 
-    def stands_on_sole(self, worlds: Floats, up: Floats) -> Bools:
-        """Return whether the sole of each foot faces the ground: (N, L)."""
+    def facing(self, worlds: Floats, up: Floats) -> Floats:
+        """Return the cosine of the angle between each sole and the ground: (N, L)."""
         ankles = worlds[:, [leg.ankle for leg in self.legs], :3, :3]
-        facing = np.einsum("nlab,lb,a->nl", ankles, self.level, up)
-        return facing > _SOLE_DOWN * np.linalg.norm(ankles @ self.level[..., None], axis=2)[..., 0]
+        normals = np.einsum("nlab,lb->nla", ankles, self.level)
+        return normals @ up / np.linalg.norm(normals, axis=2)
 
     def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
         """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
-from viewer.rig.cleanup.leg_solving import EASE, faded, leg_rotations, lowering
+from viewer.rig.cleanup.leg_solving import faded, falling, leg_rotations, lowering
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_legs import (
@@ -37,9 +37,14 @@ from viewer.rig.retargeting.source_contacts import (
 
 __all__ = ["PlantedFeet", "plant_feet"]
 
-_EXTENDED = 0.985  # corrections straighten a leg up to this fraction of its length
+_EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
+_EASE = 0.3  # seconds over which a correction begins and ends outside contacts
 # Heights of the source's feet above a ground at height 0, relative to the body.
 _GROUND = (-0.015, 0.06)
+# Cosine of the angle between the sole and the ground: nothing is held up to the first value, and
+# everything from the second one on.
+_ON_SOLE = (0.3, 0.7)
+_ON_SIDE = (0.1, 0.3)
 _ALIKE = 1e-4  # relative to the body
 _ROUNDING = 1e-6  # relative to the body
 _SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
@@ -174,8 +179,8 @@ def _planted(
     up = plan.up
     raised, heights = _vertical(body, worlds, feet, plan)
     moves = []
-    for number, (points, contacts) in enumerate(zip(body.feet(worlds), plan.contacts, strict=True)):
-        flat = _horizontal(points, contacts, plan)
+    for number, points in enumerate(body.feet(worlds)):
+        flat = _horizontal(points, feet[number], plan.contacts[number], plan)
         moves.append(flat + heights[:, number, None] * up)
     lowered = lowering(worlds[..., :3, 3], body.legs, moves, plan.rate, up, _EXTENDED)
     drop = (raised - lowered)[:, None] * up
@@ -200,13 +205,19 @@ def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
     return replace(clip, translations=shifts)
 
 
-def _horizontal(points: tuple[Floats, Floats], contacts: Sequence[Contact], plan: _Plan) -> Floats:
-    """Return horizontal shifts (N, 3) that keep a foot in its place in every contact."""
+def _horizontal(
+    points: tuple[Floats, Floats], foot: FootPath, contacts: Sequence[Contact], plan: _Plan
+) -> Floats:
+    """Return horizontal shifts (N, 3) that keep a foot in its place in every contact.
+
+    Where a contact begins and ends, the foot follows that of the source.
+    """
     shift = np.zeros_like(points[0])
     is_held = np.zeros(len(shift), dtype=np.bool_)
     for contact in contacts:
         rows = slice(contact.start, contact.stop)
-        steps = np.cumsum(_steps(points, contact, plan.up), axis=0)
+        wanted = (1.0 - contact.hold)[:, None] * _steps((foot.toe, foot.heel), contact, plan.up)
+        steps = np.cumsum(_steps(points, contact, plan.up) - wanted, axis=0)
         shift[rows] = steps.mean(axis=0) - steps
         is_held[rows] = True
     return _eased(shift, is_held, plan)
@@ -222,7 +233,7 @@ def _steps(points: tuple[Floats, Floats], contact: Contact, up: Floats) -> Float
 
 def _eased(values: Floats, is_held: Bools, plan: _Plan) -> Floats:
     """Return corrections (N, C) that fade outside the rows that are held."""
-    result, ease = np.zeros_like(values), max(1, round(EASE * plan.rate))
+    result, ease = np.zeros_like(values), max(1, round(_EASE * plan.rate))
     for start, stop in plan.spans:
         part = slice(start, stop)
         there = np.ones(stop - start, dtype=np.bool_)
@@ -234,27 +245,40 @@ def _vertical(
     body: DrivenLegs, worlds: Floats, feet: list[FootPath], plan: _Plan
 ) -> tuple[float, Floats]:
     """Return how far the body is raised, and then each foot: (N, L)."""
-    heights = body.heights(worlds, plan.up)
-    faces = body.stands_on_sole(worlds, plan.up)
-    needed, is_held = np.zeros_like(heights), np.zeros(heights.shape, dtype=np.bool_)
+    heights, facing = body.heights(worlds, plan.up), body.facing(worlds, plan.up)
+    needed, holds = np.zeros_like(heights), _holds(facing, plan)
     for foot, (contacts, grounds) in enumerate(zip(plan.contacts, plan.grounds, strict=True)):
         for contact, ground in zip(contacts, grounds, strict=True):
             rows = slice(contact.start, contact.stop)
-            needed[rows, foot] = ground - heights[rows, foot]
-            is_held[rows, foot] = faces[rows, foot]
-    if not is_held.any():
-        return 0.0, np.zeros_like(heights)
-    raised = float(np.median(needed[is_held]))
-    result = np.zeros_like(heights)
+            own = feet[foot].lowest(plan.up)[rows] - contact.height
+            needed[rows, foot] = ground + (1.0 - contact.hold) * own - heights[rows, foot]
+    result, stands = np.zeros_like(heights), holds >= 1.0
+    if not stands.any():
+        return 0.0, result
+    raised = float(np.median(needed[stands]))
     for foot, contacts in enumerate(plan.contacts):
-        values = np.where(is_held[:, foot], needed[:, foot] - raised, 0.0)[:, None]
-        result[:, foot] = _eased(values, is_held[:, foot], plan)[:, 0]
-        if contacts:
-            floor = _floor(feet[foot], contacts, plan.grounds[foot], body.size, plan)
-            sunk = floor - (heights[:, foot] + raised + result[:, foot])
-            lifts = faces[:, foot] & ~is_held[:, foot]
-            result[:, foot] += np.where(lifts, np.maximum(sunk, 0.0), 0.0)
+        if not contacts:
+            continue
+        held = np.where(holds[:, foot] > 0.0, needed[:, foot] - raised, 0.0)
+        eased = _eased(held[:, None], stands[:, foot], plan)[:, 0]
+        eased += holds[:, foot] * (held - eased)
+        floor = _floor(feet[foot], contacts, plan.grounds[foot], body.size, plan)
+        sunk = np.maximum(floor - (heights[:, foot] + raised + eased), 0.0)
+        on_side = falling((facing[:, foot] - _ON_SIDE[0]) / (_ON_SIDE[1] - _ON_SIDE[0]))
+        result[:, foot] = eased + np.where(stands[:, foot], 0.0, (1.0 - on_side) * sunk)
     return raised, result
+
+
+def _holds(facing: Floats, plan: _Plan) -> Floats:
+    """Return how far the sole of each foot is held on the ground, 0 to 1: (N, L).
+
+    ``facing``: cosine of the angle between each sole and the ground.
+    """
+    result = np.zeros_like(facing)
+    for foot, contacts in enumerate(plan.contacts):
+        for contact in contacts:
+            result[contact.start : contact.stop, foot] = contact.hold
+    return result * falling((_ON_SOLE[1] - facing) / (_ON_SOLE[1] - _ON_SOLE[0]))
 
 
 def _floor(
@@ -272,8 +296,7 @@ def _floor(
     levels = np.array(grounds)
     stands = np.array([contact.height for contact in contacts])
     lowest = np.minimum(levels[before], levels[after])
-    low = np.minimum(foot.toe @ plan.up, foot.heel @ plan.up)
-    sunk = np.minimum(stands[before], stands[after]) - low - _SUNK * size
+    sunk = np.minimum(stands[before], stands[after]) - foot.lowest(plan.up) - _SUNK * size
     return lowest - np.maximum(sunk, 0.0)
 
 
@@ -288,11 +311,12 @@ def _slide(feet: Sequence[tuple[Floats, Floats]], plan: _Plan) -> float:
 
 def _gap(body: DrivenLegs, worlds: Floats, plan: _Plan) -> float:
     """Return the largest distance of a standing sole from the ground."""
-    heights, faces = body.heights(worlds, plan.up), body.stands_on_sole(worlds, plan.up)
+    heights = body.heights(worlds, plan.up)
+    stands = _holds(body.facing(worlds, plan.up), plan) >= 1.0
     largest = 0.0
     for foot, (contacts, grounds) in enumerate(zip(plan.contacts, plan.grounds, strict=True)):
         for contact, ground in zip(contacts, grounds, strict=True):
             rows = slice(contact.start, contact.stop)
-            gaps = np.abs(heights[rows, foot] - ground)[faces[rows, foot]]
+            gaps = np.abs(heights[rows, foot] - ground)[stands[rows, foot]]
             largest = max(largest, float(gaps.max(initial=0.0)))
     return largest

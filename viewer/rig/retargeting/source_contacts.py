@@ -16,11 +16,12 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.foot_contacts import mean_speeds
 from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.leg_solving import falling
 
 __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
 
 # Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SLOW, _FAST = 0.12, 0.25  # per second: a contact begins, and ends
+_SLOW, _FAST = 0.08, 0.2  # per second: a contact begins, and ends
 _LOW, _HIGH = 0.015, 0.025  # above the lower point of the foot: a contact begins, and ends
 _LOWEST = 0.02  # a foot this far above the other one may be the lowest
 _SHORTEST = 0.1  # seconds
@@ -42,6 +43,10 @@ class FootPath:
     toe: Floats
     heel: Floats
 
+    def lowest(self, up: Floats) -> Floats:
+        """Return the height of the lower one of both points: (N,)."""
+        return np.minimum(self.toe @ up, self.heel @ up)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
@@ -53,6 +58,8 @@ class Contact:
         Half-open range of rows.
     on_toe : (N,)
         Rows of the range in which the ball stands; in the others only the heel does.
+    hold : (N,)
+        1 in rows in which the foot is slow, less where the contact begins and ends.
     height : float
         Height of the foot's lower point.
     tilt : float
@@ -62,6 +69,7 @@ class Contact:
     start: int
     stop: int
     on_toe: Bools
+    hold: Floats
     height: float
     tilt: float
 
@@ -84,7 +92,7 @@ def foot_contacts(
     up : (3,)
         The up axis.
     """
-    lows = np.array([np.minimum(foot.toe @ up, foot.heel @ up) for foot in feet])
+    lows = np.array([foot.lowest(up) for foot in feet])
     result = []
     for number, foot in enumerate(feet):
         others = np.delete(lows, number, axis=0)
@@ -92,13 +100,16 @@ def foot_contacts(
         found = []
         for first, last in spans:
             part = slice(first, last)
-            toe, heel = _stands(foot, part, lows[number], rate, size, up)
+            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up)
+            hold = falling((np.where(toe, *speeds) / size - _SLOW) / (_FAST - _SLOW))
             for a, b in runs_of(toe | heel):
-                if b - a >= _shortest(rate) and is_lowest[first + a : first + b].any():
-                    rows = slice(first + a, first + b)
-                    height = float(np.median(lows[number, rows]))
-                    tilt = float(np.median((foot.heel[rows] - foot.toe[rows]) @ up))
-                    found.append(Contact(rows.start, rows.stop, toe[a:b], height, tilt))
+                rows = slice(first + a, first + b)
+                if b - a < _shortest(rate) or not is_lowest[rows].any():
+                    continue
+                slow = hold[a:b] >= 1.0
+                height = float(np.median(lows[number, rows][slow]))
+                tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
+                found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
         result.append(found)
     return result
 
@@ -109,9 +120,9 @@ def _shortest(rate: float) -> int:
 
 def _stands(
     foot: FootPath, part: slice, lows: Floats, rate: float, size: float, up: Floats
-) -> tuple[Bools, Bools]:
-    """Return the rows of a part in which the ball and the heel are in contact."""
-    found = []
+) -> tuple[list[Bools], list[Floats]]:
+    """Return the rows of a part in which the ball and the heel are in contact, and their speeds."""
+    found, paces = [], []
     for points in (foot.toe[part], foot.heel[part]):
         above = points @ up - lows[part]
         speeds = mean_speeds(points, rate)
@@ -122,7 +133,8 @@ def _stands(
             if b - a >= _shortest(rate) and begins[a:b].any():
                 stands[a:b] = True
         found.append(stands)
-    return found[0], found[1]
+        paces.append(speeds)
+    return found, paces
 
 
 def ground_level(contacts: Sequence[Sequence[Contact]], size: float) -> float:
