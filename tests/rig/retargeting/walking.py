@@ -42,16 +42,14 @@ def walk(rise: float = 0.0, lift: float = 12.0) -> tuple[np.ndarray, np.ndarray]
     vectors = np.zeros((N_WALK, len(NAMES), 3))
     path = np.zeros((N_WALK, 3))
     path[:, 2] = STRIDE * np.arange(N_WALK) / 100.0
-    path[:, 1] = PELVIS + rise * np.arange(N_WALK) / 50.0
+    path[:, 1] = PELVIS + rise * (np.arange(N_WALK) / 50.0 - 1.4)
     for side in ("Left", "Right"):
         names = [NAMES.index(f"{side}{part}") for part in ("UpLeg", "Leg", "Foot")]
         hip, knee, ankle = POINTS[names][:, [2, 1]]
         a, b = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
         goal = ankle_path(side, lift)
-        first = (np.arange(N_WALK) + (0 if side == "Left" else 50)) // 100
         moved = (goal[:, 0] - ankle[0] - STRIDE * (0.3 if side == "Left" else -0.2)) / STRIDE
         goal[:, 1] += rise * (2.0 * moved + (0.0 if side == "Left" else -1.0))
-        assert (first >= 0).all()
         away = goal - (hip + path[:, [2, 1]])
         distance = np.linalg.norm(away, axis=1)
         assert (distance < a + b).all()

@@ -39,8 +39,6 @@ __all__ = ["PlantedFeet", "plant_feet"]
 
 _EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
 _EASE = 0.3  # seconds over which a correction begins and ends outside contacts
-# Heights of the source's feet above a ground at height 0, relative to the body.
-_GROUND = (-0.015, 0.06)
 # Cosine of the angle between the sole and the ground: nothing is held up to the first value, and
 # everything from the second one on.
 _ON_SOLE = (0.3, 0.7)
@@ -92,7 +90,6 @@ class _Plan:
 
     contacts: list[list[Contact]]
     grounds: list[list[float]]  # height of the ground of each contact
-    level: float  # height at which the source's feet stand
     spans: list[tuple[int, int]]
     rate: float
     up: Floats
@@ -165,11 +162,12 @@ def _plan(feet: list[FootPath], body: DrivenLegs, clip: SampledClip, up: Floats)
     """Return the contacts of the source, and the heights of the ground under the figure."""
     spans, rate, size = spans_of(clip.timing), clip.timing.frame_rate, body.size
     contacts = foot_contacts(feet, spans, rate, size, up)
-    level = ground_level(contacts, size)
-    low, high = (limit * size for limit in _GROUND)
-    ground = 0.0 if low <= level <= high else level - body.clearance
+    if not any(contacts):
+        return _Plan(contacts, [], spans, rate, up)
+    level, is_usual = ground_level(contacts, size, body.clearance)
+    ground = 0.0 if is_usual else level - body.clearance
     grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
-    return _Plan(contacts, grounds, level, spans, rate, up)
+    return _Plan(contacts, grounds, spans, rate, up)
 
 
 def _planted(

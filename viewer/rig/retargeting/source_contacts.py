@@ -26,6 +26,8 @@ _LOW, _HIGH = 0.015, 0.025  # above the lower point of the foot: a contact begin
 _LOWEST = 0.02  # a foot this far above the other one may be the lowest
 _SHORTEST = 0.1  # seconds
 _LEVEL = 0.015  # heights this close are one level
+_GROUND = (-0.015, 0.06)  # heights of feet that stand on a ground at height 0
+_SIMILAR = 1.0 / 3.0  # fraction of the longest duration
 _TILTED = 0.04  # height of the heel above the ball, or of the ball above the heel
 _TIPTOE = 0.07  # the ball of a foot on tiptoe is at most this far above the ground
 
@@ -137,19 +139,37 @@ def _stands(
     return found, paces
 
 
-def ground_level(contacts: Sequence[Sequence[Contact]], size: float) -> float:
-    """Return the height at which feet stand longest; 0 without contacts."""
+def ground_level(
+    contacts: Sequence[Sequence[Contact]], size: float, clearance: float
+) -> tuple[float, bool]:
+    """Return the height of feet on the ground, and whether the ground is at height 0.
+
+    This is the height at which feet stand longest, or one with a similar duration at which they
+    stand on a ground at height 0, as on the lowest step of stairs.
+
+    Parameters
+    ----------
+    contacts : sequence of sequence of Contact
+        Contacts of every foot, at least one.
+    size : float
+        About the height of the body.
+    clearance : float
+        Probable height of a standing foot's lower point above the ground.
+    """
     every = [contact for foot in contacts for contact in foot]
-    if not every:
-        return 0.0
     heights = np.array([contact.height for contact in every])
     rows = np.array([contact.stop - contact.start for contact in every])
     near = np.abs(heights[:, None] - heights) < _LEVEL * size
-    best = int((near @ rows).argmax())
+    counts = near @ rows
+    is_usual = (heights > _GROUND[0] * size) & (heights < _GROUND[1] * size)
+    is_usual &= counts >= _SIMILAR * counts.max()
+    best = int(counts.argmax())
+    if is_usual.any():
+        best = int(np.where(is_usual, np.abs(heights - clearance), np.inf).argmin())
     order = np.argsort(heights[near[best]])
     passed = np.cumsum(rows[near[best]][order])
     middle = int(np.searchsorted(passed, 0.5 * passed[-1]))
-    return float(heights[near[best]][order][middle])
+    return float(heights[near[best]][order][middle]), bool(is_usual.any())
 
 
 def step_height(contact: Contact, level: float, size: float) -> float:
