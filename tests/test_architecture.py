@@ -20,7 +20,7 @@ OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.
-EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases"}
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress"}
 PARTS = {
     "rig": set(),
     "autorig": {"rig"},
@@ -46,6 +46,7 @@ LEAVES = {
     "diagnostics": {"phrases"},
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
+    "progress": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
     name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
@@ -73,6 +74,7 @@ ALLOWED_IN_APP = {
         *("core", "features", "actors", "posing", "weights", "view", "palette", "context"),
     },
     "linting": {"core", "shown_panels", "playback", "view", "linting"},
+    "retargeting": {"core", "files", "retargeting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
 }

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from formats.capture_files import body, write_frames
@@ -13,6 +15,8 @@ from viewer.cli import run
 from viewer.errors import RigError
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.joint_map import JointMap
 
 LIMBS = {
     "leftUpperArm": "leftLowerArm",
@@ -108,6 +112,25 @@ def test_amass_moves_the_figure_of_the_model_option(amass, hero):
     (found,) = load(amass, motion=MotionSettings(model=hero)).actors
     assert found.figure.name == "hero" and found.title == "walk"
     assert_allclose(directions(found, 0.1), directions(plain, 0.1, NAMES), rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("is_named", [True, False])
+def test_a_joint_map_applies_to_all_people_of_a_capture(capture, hero, is_named, tmp_path):
+    files = [capture] if is_named else [capture, hero]
+    settings = MotionSettings(model=hero if is_named else None)
+    (own, _) = load(*files, motion=settings).actors
+    names, arm = own.figure.skeleton.names, own.figure.skeleton.humanoid.joints["leftLowerArm"]
+    chosen = JointMap(((names[arm], ""),), tmp_path / "map.txt", (1,))
+    for actor in load(*files, motion=replace(settings, joint_map=chosen)).actors:
+        clip, _ = driven_clip(actor.drive, actor.figure)
+        assert actor.drive.motion.clip.n_rows == 4
+        assert_allclose(actor.clip.rotations, clip.rotations, rtol=0, atol=1e-12)
+        assert not np.ptp(clip.rotations[:, arm], axis=0).any()
+    bad = replace(chosen, pairs=((names[arm], "left_elbw"),))
+    with pytest.raises(RigError) as problem:
+        load(*files, motion=replace(settings, joint_map=bad))
+    found = problem.value.diagnostic
+    assert (found.key, found.path, found.line) == ("F004.mapping-joint", bad.path, 1)
 
 
 @pytest.mark.parametrize("is_named", [True, False])

@@ -9,6 +9,8 @@
 Importing this package is cheap: each name loads its own module on first use.
 """
 
+from viewer.version import VERSION
+
 # Not imported from ``typing``: no signal handler is installed yet, so imports here must be quick.
 # Type checkers recognise the name.
 TYPE_CHECKING = False
@@ -16,6 +18,8 @@ if TYPE_CHECKING:
     from typing import Any
 
     from viewer.app.window import show
+    from viewer.batching.report import Report
+    from viewer.commands._batch.calling import batch
     from viewer.errors import ViewerError
     from viewer.export import export
     from viewer.formats import write
@@ -40,7 +44,7 @@ if TYPE_CHECKING:
     from viewer.rig.skin import Skin
     from viewer.rig.skinning import Skinning, deform, deform_frames, joint_matrices
 
-__version__ = "0.1.0"
+__version__ = VERSION
 
 __all__ = [
     "Actor",
@@ -57,6 +61,7 @@ __all__ = [
     "MotionArrays",
     "Pose",
     "PoseRecord",
+    "Report",
     "Scene",
     "Skeleton",
     "Skin",
@@ -64,6 +69,7 @@ __all__ = [
     "Texture",
     "ViewerError",
     "apply_record",
+    "batch",
     "deform",
     "deform_frames",
     "evaluate",
@@ -98,6 +104,7 @@ _HOMES = {
     "MotionArrays": "rig.motion.motion_arrays",
     "Pose": "rig.pose",
     "PoseRecord": "rig.posing.pose_record",
+    "Report": "batching.report",
     "Scene": "rig.scene",
     "Skeleton": "rig.skeleton",
     "Skin": "rig.skin",
@@ -105,6 +112,7 @@ _HOMES = {
     "Texture": "rig.material",
     "ViewerError": "errors",
     "apply_record": "rig.posing.pose_record",
+    "batch": "commands._batch.calling",
     "deform": "rig.skinning",
     "deform_frames": "rig.skinning",
     "evaluate": "rig.motion.clip_sampling",

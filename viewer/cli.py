@@ -95,7 +95,7 @@ def _dispatch(arguments: list[str]) -> int:
         name = arguments.pop(0)
     elif arguments:
         check_command(arguments[0])
-    parser = command_parser(name)
+    parser = command_parser(name, arguments)
     # Everything after "--" is a file, even if it looks like an option.
     end = arguments.index("--") if "--" in arguments else len(arguments)
     before_end = protect_numbers(arguments[:end])

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from app.retargeting.driven import driven_scene
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
@@ -161,6 +162,19 @@ def test_body_panels_match_golden_images(drive_body, name):
     hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
+
+
+@pytest.mark.golden("app_joint_match")
+def test_joint_match_panel_matches_its_golden_image(drive):
+    hand = drive(scene=driven_scene(), size=BODY_SIZE, samples=4, pixels_per_point=1.0)
+    hand.state.of(ShownPanels).closed.add("stats")
+
+    def prepare(hand):
+        hand.show_panel("Joint match")
+        hand.step(3)
+        hand.move("joint left_hip")
+
+    _compare(_shown(hand, prepare), "joint_match")
 
 
 def _compare(pixels, name):

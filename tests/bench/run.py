@@ -11,6 +11,7 @@ NAMES = [
     "memory",
     "models",
     "skinning",
+    "frames",
     "bodies",
     "deform",
     "instances",

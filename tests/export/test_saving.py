@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import stat
+import tempfile
 from itertools import count
 from pathlib import Path
 
@@ -50,7 +52,7 @@ class Fault:
         self.calls, self.number, self.step = 0, number, step
         self.stays = step in ("open", "write", "flush")
         wrapped = {
-            "open": (saving.tempfile, "mkstemp"),
+            "open": (tempfile, "mkstemp"),
             "flush": (saving.os, "fsync"),
             "rights": (Path, "chmod"),
             "rename": (Path, "replace"),
@@ -266,7 +268,7 @@ def test_all_or_none_refuses_before_anything_changes(tmp_path, monkeypatch):
     def full(*_):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.setattr(saving.shutil, "copy2", full)
+    monkeypatch.setattr(shutil, "copy2", full)
     with pytest.raises(OutputError) as caught, all_or_none([tmp_path / "new", old]):
         pytest.fail("the block must not run")
     assert str(caught.value) == f"{old}: No space left on device"

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 
 from viewer.formats import skel, skin
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import Material, Mesh
+from viewer.rig.material import Material
+from viewer.rig.mesh import Mesh
 from viewer.rig.skin import skin_from_lists
 
 pytestmark = pytest.mark.slow

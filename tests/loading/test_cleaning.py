@@ -14,6 +14,9 @@ from viewer.loading.cleaning import CleanUp, clean_up
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor, Scene
 
 FIGURE = legs()
@@ -176,3 +179,27 @@ def test_clips_of_keys_are_refused_alone_and_reported_beside_captures():
 def test_ranges_outside_the_frames_of_the_file_are_refused(frames):
     with pytest.raises(RigError, match="100:160"):
         clean_up(Scene([person(0, 0, 60)]), CleanUp(frames=frames))
+
+
+def driven() -> Actor:
+    """Return a person whose motion was retargeted from a skeleton with the same joints."""
+    actor = person(0, 0, 60)
+    drive = Drive(SkeletonMotion(actor.figure, actor.clip))
+    return replace(actor, clip=driven_clip(drive, actor.figure)[0], drive=drive)
+
+
+def test_motions_that_are_retargeted_again_are_cleaned_again():
+    actor = driven()
+    clean_up(Scene([actor]), CleanUp(smoothing=SavitzkyGolay(), frames=(110, 131), rate=60.0))
+    again = actor.drive.finish(driven_clip(actor.drive, actor.figure)[0])
+    assert_array_equal(again.rotations, actor.clip.rotations)
+    assert again.timing.n_frames == actor.clip.timing.n_frames == 41
+
+
+def test_keypoints_of_a_person_without_any_get_the_first_number():
+    figure, clip = keypoints()
+    scene = Scene([person(3, 0, 60), Actor(figure, clip=clip, person=7)])
+    (note,) = clean_up(scene, CleanUp(merged=((3, 7),)))
+    assert note.key == "X006.renumbered"
+    assert str(note) == "keypoints of person 7 assigned to person 3"
+    assert [actor.person for actor in scene.actors] == [3, 3]

@@ -18,7 +18,7 @@ from rendering.drawn_figures import (
 from rendering.golden_motion import SHOTS
 from rendering.plain_pictures import N, front, lights, plain
 
-from viewer.rendering.bounds import Bounds
+from viewer.rendering.bounds import spheres_of
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
@@ -182,7 +182,7 @@ def test_spheres_of_joints_contain_all_vertices(seed):
     actor = Actor(figure)
     actor.pose = random_pose(figure.skeleton, rng)
     actor.placement[:3] = np.array([[0.0, -2, 0, 5], [2, 0, 0, 1], [0, 0, 2, -3]])
-    spheres = Bounds().spheres(actor, DisplayOptions())
+    spheres = spheres_of(actor, DisplayOptions())
     points = deform(figure, actor.pose)[0] @ actor.placement[:3, :3].T + actor.placement[:3, 3]
     directions = rng.normal(size=(50, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]

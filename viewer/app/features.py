@@ -51,8 +51,8 @@ class Panel:
         Initial dock: ``"left"``, ``"bottom"``, or ``"right 1"`` to ``"right 3"`` downwards.
     needs : str
         Part of ``Figure`` without which the panel is hidden. ``"motion"`` requires a motion,
-        ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts; empty if the
-        panel is always available.
+        ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
+        motion of another skeleton; empty if the panel is always available.
     leads : bool
         Whether it is brought in front of the other tabs when a scene makes it available.
     on_demand : bool
@@ -155,6 +155,7 @@ PANELS = {
     "parts": Panel("actors", "Parts", "right 3", needs="parts"),
     "timeline": Panel("playback", "Timeline", "bottom", needs="motion", leads=True),
     "curves": Panel("curves", "Curves", "bottom", needs="motion"),
+    "joint_match": Panel("retargeting", "Joint match", "bottom", needs="drive"),
 }
 """Panels in the order in which they are docked and listed in the menu."""
 
@@ -244,6 +245,7 @@ KEYS = (
 
 _WANT = "window_actions.want"
 _ROOM = "core.reasons.no_job_room"
+_MATCH = "retargeting.match_actions"
 
 ACTIONS = (
     Action("Open the bundled figure", _WANT, ("open bundled",)),
@@ -266,6 +268,9 @@ ACTIONS = (
     Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
     Action("Reset shape", "posing.pose_actions.reset_shape"),
     Action("Random shape", "posing.pose_actions.random_shape"),
+    Action("Match joints automatically", f"{_MATCH}.match_automatically", why=f"{_MATCH}.no_edit"),
+    Action("Load joint map…", f"{_MATCH}.ask_for_map", why=f"{_MATCH}.no_edit"),
+    Action("Save joint map…", f"{_MATCH}.ask_where_to_save", why="core.reasons.no_drive"),
     Action("Show all parts", "actors.part_actions.show_all_parts", why="core.reasons.no_parts"),
     Action("Springs", "actors.springs.toggle_springs", why="actors.springs.no_springs"),
     Action("Reset lights", "view.display_actions.reset_lights"),

@@ -81,7 +81,7 @@ def default_sizes(window: tuple[float, float], letter: float, lines: float, plot
     lines : float
         Height of the Timeline's content in font sizes.
     plots : bool
-        Whether the Curves panel is in front of the Timeline.
+        Whether the Curves or Joint match panel is in front of the Timeline.
 
     >>> default_sizes((1280, 800), 15.0, 8.0, False)
     Sizes(left=281.6, right=320.0, bottom=120.0, rows=2)
@@ -135,7 +135,7 @@ def _wanted(state: AppState) -> Sizes:
     # Tab bar, two rows of controls, ruler and tracks.
     rows = 3.0 * imgui.get_frame_height_with_spacing() + 2.0 * style.window_padding.y
     rows += (tracks + 1.5) * imgui.get_text_line_height_with_spacing()
-    plots = _is_in_front(PANELS["curves"].title)
+    plots = any(_is_in_front(PANELS[name].title) for name in ("curves", "joint_match"))
     return default_sizes((size.x, size.y), letter, rows / letter, plots)
 
 

@@ -18,18 +18,20 @@ from viewer.app.core.widgets import Rect, begin_overlay, button, overlay_rect
 from viewer.app.files.state import Files
 from viewer.app.keys_list import draw_keys
 from viewer.app.posing.toolbar import draw_toolbar
+from viewer.app.view.axis_gizmo import gizmo_rect
 from viewer.app.weights.hover_text import draw_hover_text
 from viewer.app.weights.legend import draw_legend
 from viewer.phrases import printable
 from viewer.rendering.passes.ground_pass import grid_step
 from viewer.rig.scene import scene_unit
 
-__all__ = ["draw_hints", "draw_overlays", "n_newest"]
+__all__ = ["draw_hints", "draw_overlays", "hint_rect", "n_newest"]
 
 _SHOW_PROGRESS_AFTER = 0.3  # seconds
 _BAR_WIDTH = 52.0 / 3.0  # in font sizes
 _GAP = 10.0  # points from the edges of the view
 _BETWEEN = 6.0  # points between one overlay and another
+_BESIDE = 0.6  # least part of the view's width for messages beside the hints
 _MOST_NOTES = 8
 _LONGEST_NOTE = 400  # characters
 
@@ -49,17 +51,29 @@ def draw_hints(state: AppState) -> None:
 
     Like the image of the scene, they are drawn behind the panels, so they must be drawn after it.
     """
+    text, place = _hint(state)
+    draw_list = imgui.get_background_draw_list()
+    shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
+    draw_list.add_text((place[0] + 1, place[1] + 1), shadow, text)
+    draw_list.add_text(place, color, text)
+
+
+def hint_rect(state: AppState) -> Rect:
+    """Return the rectangle of the hints, window coordinates."""
+    text, (x, y) = _hint(state)
+    size = imgui.calc_text_size(text)
+    return x, y, x + size.x, y + size.y
+
+
+def _hint(state: AppState) -> tuple[str, tuple[float, float]]:
+    """Return the text of the hints, and its upper left corner."""
     x, y, width, height = state.view_rect
     step = grid_step(state.box)
     unit = scene_unit(state.scene) or f"unit{'s' * (step != 1.0)}"
     grid = f"grid {step:g} {unit}   " if state.options.grid else ""
     text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
-    place = (x + width - size.x - 10, y + height - size.y - 8)
-    draw_list = imgui.get_background_draw_list()
-    shadow, color = imgui.get_color_u32((0, 0, 0, 0.5)), imgui.get_color_u32((1, 1, 1, 0.85))
-    draw_list.add_text((place[0] + 1, place[1] + 1), shadow, text)
-    draw_list.add_text(place, color, text)
+    return text, (x + width - size.x - _GAP, y + height - size.y - 8.0)
 
 
 class _Progress(NamedTuple):
@@ -129,22 +143,23 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
 def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     """Draw the newest messages that fit, and the number of hidden ones."""
     state.messages.drop_old()
-    x, y, width, height = state.view_rect
+    x, y, width, _ = state.view_rect
     if not state.messages.notes or width <= 40:
         return
     style = imgui.get_style()
-    wrap = max(width - 40.0, 50.0)
+    right, bottom = _notes_corner(state)
+    wrap = max(right - x - _GAP - 2.0 * style.window_padding.x, 50.0)
     texts = [printable(note.text, _LONGEST_NOTE) for note in state.messages.notes]
     line = imgui.get_text_line_height_with_spacing()
     heights = [imgui.calc_text_size(text, False, wrap).y + style.item_spacing.y for text in texts]
     top = max((rect[3] + _BETWEEN for rect in above), default=y + _GAP)
-    room = y + height - _GAP - top - 2.0 * style.window_padding.y + style.item_spacing.y
+    room = bottom - top - 2.0 * style.window_padding.y + style.item_spacing.y
     count = n_newest(heights, line, room)
     if not count and not above:
         count = 1  # a clipped message is better than none
     if not count and room < line:
         return
-    if begin_overlay("##notes", x + _GAP, y + height - _GAP, (0.0, 1.0)):
+    if begin_overlay("##notes", x + _GAP, bottom, (0.0, 1.0)):
         imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + wrap)
         for text in texts[len(texts) - count :]:
             imgui.text_unformatted(text)
@@ -155,6 +170,17 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
         imgui.pop_text_wrap_pos()
     overlay_rect(state, "##notes")
     imgui.end()
+
+
+def _notes_corner(state: AppState) -> tuple[float, float]:
+    """Return the lower right corner of the room for messages: beside the hints, or above them."""
+    x, y, width, height = state.view_rect
+    hint = hint_rect(state)
+    gizmo = gizmo_rect(state)
+    right = min(hint[0], hint[0] if gizmo is None else gizmo[0]) - _BETWEEN
+    if right - x > _BESIDE * width:
+        return right, y + height - _GAP
+    return x + width - _GAP, hint[1] - _BETWEEN
 
 
 def n_newest(heights: Sequence[float], line: float, room: float) -> int:

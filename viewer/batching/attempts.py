@@ -90,7 +90,8 @@ def _outcome(item: Item, call: Callable[[Item], Any], record: Record) -> Result:
     except MemoryError:
         return Result(item, "memory", _BAD_INPUT, message="not enough memory")
     except OSError as problem:
-        reason = printable(problem.strerror or problem, _LONGEST)
+        where = "" if problem.filename is None else f"{problem.filename}: "
+        reason = printable(f"{where}{problem.strerror or problem}", _LONGEST)
         return Result(item, "failed", _UNWRITTEN, message=reason)
     except (Exception, SystemExit) as problem:
         # The one place that catches everything: a batch is run for hours unattended, and a defect

@@ -8,6 +8,7 @@ COMMANDS = {
     "view": "open files in a window (the default)",
     "render": "render files to an image or video, without a window",
     "convert": "write figures, poses and motions in other formats",
+    "batch": "run convert, render, rig, info, diff or lint for many files, in parallel",
     "rig": "transfer the rig of a figure to an unrigged mesh",
     "info": "describe the contents of files",
     "diff": "compare figures or motions with a reference: how far apart, where, in which pose",

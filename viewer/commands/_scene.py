@@ -14,6 +14,7 @@ from viewer.commands._cleanup import clean_up_of
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
@@ -231,20 +232,24 @@ def _joint_map(arguments: argparse.Namespace) -> JointMap | None:
     """Return the requested match of joints; raises FormatError if its file cannot be read."""
     if arguments.joint_map is None:
         return None
-    from viewer.formats._joint_map import read_joint_map
+    from viewer.formats._text.joint_map import read_joint_map
 
     return read_joint_map(Source.open(arguments.joint_map, size_limit(arguments)))
 
 
 def size_limit(arguments: argparse.Namespace) -> int:
     """Return the file size limit in bytes."""
-    return _parse_bytes(arguments.max_size)
+    return parse_bytes(arguments.max_size)
 
 
-def _parse_bytes(text: str) -> int:
+def parse_bytes(text: str, option: str = "--max-size") -> int:
+    """Return the number of bytes that an option gives, such as ``2G``.
+
+    Raises ViewerError if the text is no such number.
+    """
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
-        raise ViewerError(f'--max-size: expected a number with k, M or G, found "{text}"')
+        raise ViewerError(f'{option}: expected a number with k, M or G, found "{text}"')
     return int(found[1]) * _UNITS.get(found[2].lower(), 1)
 
 
@@ -303,7 +308,7 @@ def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     _announce(files)
     settings = motion_settings(arguments)
     try:
-        contents = read_files(files or bundled_files(), _parse_bytes(arguments.max_size), settings)
+        contents = read_files(files or bundled_files(), parse_bytes(arguments.max_size), settings)
         scene, builders = begin(contents, settings)
     except FormatError as problem:
         named = [*arguments.files, *filter(None, [arguments.model])]
@@ -340,6 +345,7 @@ def _announce(files: Sequence[str | Path]) -> None:
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line per warning to the error stream."""
+    """Print one line per warning to the error stream, unless the run is recorded."""
     for warning in warnings:
-        print(f"warning: {warning}", file=sys.stderr)
+        if not note_found(warning):
+            print(f"warning: {warning}", file=sys.stderr)

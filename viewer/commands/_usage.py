@@ -6,7 +6,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, NoReturn
 
@@ -73,16 +73,27 @@ class Parser(argparse.ArgumentParser):
         raise argparse.ArgumentError(action, f"{wrong}; {near}" if near else wrong)
 
 
-def command_parser(name: str) -> Parser:
+def command_parser(name: str, words: Sequence[str] = ()) -> Parser:
     """Return the parser of a command with all its options.
 
     Parameters
     ----------
     name : str
         A key of ``COMMANDS``.
+    words : sequence of str
+        The arguments, for commands with ``parser_of``, whose options depend on the first one.
+
+    Raises
+    ------
+    ViewerError
+        If the first argument selects no options.
     """
+    module = import_module(f"viewer.commands.{name}")
+    own: Parser | None = module.parser_of(words) if words and hasattr(module, "parser_of") else None
+    if own is not None:
+        return own
     parser = Parser(prog=f"viewer {name}", description=COMMANDS[name])
-    import_module(f"viewer.commands.{name}").add_arguments(parser)
+    module.add_arguments(parser)
     return parser
 
 

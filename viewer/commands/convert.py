@@ -36,6 +36,7 @@ from viewer.commands._writing.motion_export import (
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
 from viewer.export._motion_paths import motion_paths
@@ -94,6 +95,8 @@ def run(arguments: argparse.Namespace) -> int:
         write = _write_clips
     with saving_joint_map(arguments, scene):
         notes = [*write(arguments, scene, output, skinning), *baked]
+    for note in notes:
+        note_found(note)
     print("\n".join(map(str, notes)), file=summary_stream(output))
     return 0
 

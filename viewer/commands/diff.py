@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import math
 import sys
 from collections.abc import Callable, Sequence
@@ -14,13 +15,14 @@ from typing import TextIO
 from viewer.commands._diff.inputs import input_files
 from viewer.commands._diff.pairs import Pairing, pair_actors
 from viewer.commands._diff.picture import Heat, heat_of, save_heat
-from viewer.commands._diff.report import Compared, json_text, lines_of, table_of
+from viewer.commands._diff.report import Compared, json_data, lines_of, table_of
 from viewer.commands._output import PICTURES
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._progress import Progress
 from viewer.commands._scene import add_animation_argument, print_warnings
 from viewer.commands._sequence.frame_numbers import parse_range
 from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics.record import is_recorded, note_values
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.loading import MotionSettings, load
@@ -227,8 +229,11 @@ def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
 
 def _print(arguments: argparse.Namespace, rows: Sequence[Compared], stream: TextIO) -> None:
     tolerance = arguments.tolerance
+    if arguments.json or is_recorded():
+        found = json_data(arguments.reference, rows, tolerance)
+        note_values(found)
     if arguments.json:
-        print(json_text(arguments.reference, rows, tolerance), file=stream)
+        print(json.dumps(found, indent=2, ensure_ascii=False), file=stream)
     elif len(rows) > 1:
         print("\n".join(table_of(rows, tolerance)), file=stream)
     else:

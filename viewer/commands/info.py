@@ -13,6 +13,7 @@ from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
+from viewer.diagnostics.record import note_values
 from viewer.phrases import counted, listed, printable
 from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
 from viewer.rig.number_text import number_text
@@ -47,6 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
     found = describe(scene, skinning)
+    note_values(found)
     if arguments.json:
         import json
 

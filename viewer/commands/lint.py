@@ -20,6 +20,7 @@ from viewer.commands._scene import (
 )
 from viewer.commands._sequence.frame_numbers import rate
 from viewer.commands._usage import require_files
+from viewer.diagnostics.record import note_values
 from viewer.errors import ViewerError
 from viewer.lint import (
     CODES,
@@ -131,8 +132,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     findings = [finding for finding in findings if finding.code not in ignored]
     findings = worst_first(findings)
+    described = describe(findings, scene)
+    note_values(described)
     if arguments.json:
-        print(json.dumps(describe(findings, scene), indent=1, allow_nan=False))
+        print(json.dumps(described, indent=1, allow_nan=False))
     else:
         for finding in findings:
             print_line((finding_text(finding), _STYLES.get(finding.severity, "")))

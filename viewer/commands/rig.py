@@ -27,6 +27,7 @@ from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._transferred_clips import add_clip_argument, read_clips, write_clips
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.export._vrm.meta import checked_meta
@@ -198,6 +199,8 @@ def run(arguments: argparse.Namespace) -> int:
     if output is not None:
         with all_or_none(files):
             written = [*write_rigged(rigged, output, meta), *write_clips(rigged, clips)]
+        for note in written:
+            note_found(note)
         print("\n".join(map(str, written)), file=stream)
     if arguments.view:
         _show(rigged, target)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic
 from viewer.phrases import printable
 
-__all__ = ["Record", "note_found", "note_output", "note_values", "recorded"]
+__all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", "recorded"]
 
 
 @dataclass
@@ -25,13 +26,13 @@ class Record:
         ``severity`` and ``message``.
     values : dict
         Results as JSON data.
-    outputs : list of str
-        Written files, each once.
+    outputs : dict of str
+        Written files, in order, as keys.
     """
 
     diagnostics: list[dict[str, Any]] = field(default_factory=list)
     values: dict[str, Any] = field(default_factory=dict)
-    outputs: list[str] = field(default_factory=list)
+    outputs: dict[str, None] = field(default_factory=dict)
 
 
 # Not a context variable: videos are encoded, and so written, by threads of their own.
@@ -48,6 +49,11 @@ def recorded() -> Iterator[Record]:
         yield record
     finally:
         _current = outer
+
+
+def is_recorded() -> bool:
+    """Return whether a run is being recorded."""
+    return _current is not None
 
 
 def note_found(found: Diagnostic | str) -> bool:
@@ -68,7 +74,11 @@ def note_values(values: Mapping[str, Any]) -> None:
         _current.values |= values
 
 
-def note_output(path: object) -> None:
-    """Record a written file."""
-    if _current is not None and str(path) not in _current.outputs:
-        _current.outputs.append(str(path))
+def note_output(path: Path, instead_of: Path | None = None) -> None:
+    """Record a written file, or a folder instead of the files in its temporary folder."""
+    if _current is None:
+        return
+    if instead_of is not None:
+        others = (one for one in _current.outputs if not Path(one).is_relative_to(instead_of))
+        _current.outputs = dict.fromkeys(others)
+    _current.outputs[str(path)] = None

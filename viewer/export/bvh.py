@@ -220,7 +220,7 @@ class _Writer:
             self.animation.frame_rate,
             (positions, angles),
             self.options.digits,
-        ).encode("ascii")
+        )
 
     def losses(
         self, path: Path, text: bytes, reference: int, span: tuple[int, int]

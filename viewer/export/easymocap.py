@@ -23,6 +23,7 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
 from viewer.export._family_frames import (
     FamilyFrames,
@@ -36,6 +37,8 @@ from viewer.export._gaps import kept_gaps, kept_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
+from viewer.formats._text.decimals import fixed
+from viewer.formats._text.number_text import row_texts
 from viewer.interrupts import hold, poll
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
@@ -47,6 +50,7 @@ __all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
+_BLOCK = 256  # frames whose numbers are formatted at once
 _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
@@ -198,15 +202,24 @@ class _Records:
         if body.has_expression:
             self.parts.append(("expression", _used(body.expression, count)))
 
+        self._first, self._texts = 0, list[list[str]]()
+
     def text(self, frame: int) -> str:
         """Return one record as JSON."""
+        if not self._first <= frame < self._first + _BLOCK or not self._texts:
+            self._first = frame - frame % _BLOCK
+            block = slice(self._first, self._first + _BLOCK)
+            self._texts = [_row_texts(rows[block]) for _, rows in self.parts]
         lines = [self.head]
-        for key, rows in self.parts:
-            # Adding 0 makes -0.0000000 a plain 0.
-            numbers = np.round(rows[frame], _DIGITS) + 0.0
-            row = ", ".join([f"{number:.{_DIGITS}f}" for number in numbers.tolist()])
+        for (key, _), texts in zip(self.parts, self._texts, strict=True):
+            row = texts[frame - self._first]
             lines.append(f'        "{key}": [\n          [{row}]\n        ]')
         return ",\n".join(lines) + "\n    }"
+
+
+def _row_texts(rows: Floats) -> list[str]:
+    parts = row_texts(rows, lambda numbers: fixed(numbers, _DIGITS), b", ")
+    return b"".join(parts).decode("ascii").splitlines()
 
 
 def _used(rows: Floats, count: int) -> Floats:
@@ -240,6 +253,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
             if old.exists():
                 old.replace(target)
             raise
+        note_output(target, instead_of=fresh)
     except BaseException as problem:  # also Ctrl-C: no partial output may be left behind
         if made is not None:
             shutil.rmtree(made, ignore_errors=True)

@@ -6,6 +6,8 @@ Vertices keep their numbering: along seams faces refer to several ``vt`` for one
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,9 @@ from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
 from viewer.export._motion_paths import numbered_paths
 from viewer.export._obj_materials import PLAIN, library_losses, material_library
-from viewer.formats import all_or_none, save_bytes, save_text
+from viewer.formats import all_or_none, save_bytes, save_parts
+from viewer.formats._text.decimals import integers, significant
+from viewer.formats._text.number_text import row_texts
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh
@@ -39,20 +43,22 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
     beside = material_library(mesh, path)
     unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
-    parts = [f"# {name}: {actor.figure.up} up{unit}\n"]
-    if beside:
-        parts.append(f"mtllib {list(beside)[-1].name}\n")
-    parts += [f"o {name}\n", _rows("v", _colored(positions, mesh.colors))]
-    if mesh.uvs is not None:
-        parts.append(_rows("vt", mesh.uvs))
-    parts.append(_rows("vn", normals))
-    parts += _faces(mesh, bool(beside))
+    head = f"# {name}: {actor.figure.up} up{unit}\n"
+    head += f"mtllib {list(beside)[-1].name}\n" if beside else ""
+    head += f"o {name}\n"
+    parts = chain(
+        [head.encode("utf-8", "surrogateescape")],
+        _rows("v", _colored(positions, mesh.colors)),
+        () if mesh.uvs is None else _rows("vt", mesh.uvs),
+        _rows("vn", normals),
+        _faces(mesh, bool(beside)),
+    )
     # Files that are not missing already have the same content.
     missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
             save_bytes(file, beside[file])
-        save_text(path, "".join(parts))
+        save_parts(path, parts)
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
     lost = library_losses(mesh)
@@ -96,28 +102,25 @@ def _colored(positions: Floats, colors: Floats | None) -> Floats:
     return np.hstack([positions, encode_srgb(colors[:, :3]), np.clip(opacity, 0.0, 1.0)])
 
 
-def _rows(keyword: str, rows: Floats) -> str:
-    # One format string for all rows is many times faster than one call per row.
-    line = f"{keyword}{' %.9g' * rows.shape[1]}\n"
-    return line * len(rows) % tuple((rows + 0.0).ravel().tolist())
+def _rows(keyword: str, rows: Floats) -> Iterator[bytes]:
+    # Adding 0 makes -0 positive.
+    start = f"{keyword} ".encode()
+    return row_texts(rows + 0.0, lambda numbers: significant(numbers, 9), start=start)
 
 
-def _faces(mesh: Mesh, with_materials: bool) -> list[str]:
-    """Return the lines of triangles, with ``usemtl`` before each run of a material."""
+def _faces(mesh: Mesh, with_materials: bool) -> Iterator[bytes]:
+    """Yield the lines of triangles, with ``usemtl`` before each run of a material."""
     corners = [mesh.triangles + 1]
     if mesh.uvs is not None:
         uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
         corners.append(uv + 1)
     corners.append(mesh.triangles + 1)
-    separator = "/" if mesh.uvs is not None else "//"
-    line = "f" + f" {separator.join(['%d'] * len(corners))}" * 3 + "\n"
+    within = [b"/" if mesh.uvs is not None else b"//"] * (len(corners) - 1)
+    between = [*within, b" ", *within, b" ", *within]
     table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, 3 * len(corners))
     edges = np.flatnonzero(np.diff(mesh.material_indices)) + 1
-    parts = []
     for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
         index = int(mesh.material_indices[first]) if mesh.n_triangles else -1
         if with_materials:
-            parts.append(f"usemtl {f'material{index}' if index >= 0 else PLAIN}\n")
-        rows = table[first:last]
-        parts.append(line * len(rows) % tuple(rows.ravel().tolist()))
-    return parts
+            yield f"usemtl {f'material{index}' if index >= 0 else PLAIN}\n".encode()
+        yield from row_texts(table[first:last], integers, between, start=b"f ")

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, UnsupportedFormatError
+from viewer.formats._borrowed import HOMES
 from viewer.formats._file_bytes import unreadable
 from viewer.formats._format import Format
+from viewer.formats._kept import kept_or_read
 from viewer.formats._source import MAX_SIZE, Source
 
 if TYPE_CHECKING:
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
         keeping_written,
         save_arrays,
         save_bytes,
+        save_parts,
         save_text,
     )
     from viewer.media.targets import check_folder_target, check_targets
@@ -75,28 +78,10 @@ __all__ = [
     "save_arrays",
     "save_bytes",
     "save_image",
+    "save_parts",
     "save_text",
     "write",
 ]
-
-_HOMES = {
-    "all_or_none": "viewer.media.saving",
-    "check_folder_target": "viewer.media.targets",
-    "check_targets": "viewer.media.targets",
-    "file_stem": "viewer.media.file_names",
-    "folder_name": "viewer.media.file_names",
-    "free_path": "viewer.media.saving",
-    "is_picture": "viewer.media.image",
-    "keeping_written": "viewer.media.saving",
-    "opened_text": "viewer.media.file_names",
-    "read_picture": "viewer.formats._mesh.texture",
-    "referenced_path": "viewer.formats._references",
-    "save_arrays": "viewer.media.saving",
-    "save_bytes": "viewer.media.saving",
-    "save_image": "viewer.media.image",
-    "save_text": "viewer.media.saving",
-}
-"""Modules of names that are imported on first use, as few commands need them to start."""
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
@@ -204,9 +189,9 @@ FORMATS = {
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_HOMES[name]), name)
+    return getattr(import_module(HOMES[name]), name)
 
 
 def detect(source: Source) -> str:
@@ -284,7 +269,9 @@ def _detect_folder(source: Source) -> str:
     for key, kind in FORMATS.items():
         if names.intersection(kind.files):
             return key
-    if _is_video_folder(source, names):
+    from viewer.formats._video_mocap.tools import folder_tool
+
+    if folder_tool(source, names) is not None:
         return "video_mocap"
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
@@ -307,15 +294,9 @@ def _detect_archive(source: Source) -> str:
     return archive_format(source, FORMATS)
 
 
-def _is_video_folder(source: Source, names: set[str]) -> bool:
-    from viewer.formats._video_mocap.tools import folder_tool
-
-    return folder_tool(source, names) is not None
-
-
 def read(source: Source) -> Content:
     """Read a file of any format; see the format modules for the errors that they raise."""
-    return import_module(f"{__name__}.{detect(source)}").read(source)
+    return kept_or_read(source, lambda one: import_module(f"{__name__}.{detect(one)}").read(one))
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:

@@ -18,7 +18,8 @@ applies to the triangles sections after it. Weights are used as stored.
 from __future__ import annotations
 
 import re
-from itertools import pairwise
+from collections.abc import Iterable
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
@@ -38,10 +39,13 @@ from viewer.formats._skin.checks import (
     unbound_skin,
 )
 from viewer.formats._skin.sections import Sections, read_sections
+from viewer.formats._skin.weights_text import weights_lines
 from viewer.formats._source import Source
+from viewer.formats._text.decimals import integers, shortest
+from viewer.formats._text.number_text import row_texts
 from viewer.formats._text.numbers import LARGEST
 from viewer.media.image import save_image
-from viewer.media.saving import as_words, save_text
+from viewer.media.saving import as_words, save_parts
 from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
@@ -194,17 +198,17 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     mesh, sources = without_seams(figure.mesh)
     skin = None if figure.skin is None else skin_rows(figure.skin, sources)
     _check_writable(figure.name, mesh, skin)
-    parts = [_table("positions", mesh.positions), _table("normals", mesh.normals)]
+    parts = [*_table("positions", mesh.positions), *_table("normals", mesh.normals)]
     if mesh.uvs is not None:
-        parts.append(_table("texcoords", mesh.uvs))
+        parts += _table("texcoords", mesh.uvs)
     if skin is not None:
-        parts.append(_weights_text(skin))
-    parts.extend(_triangle_runs(mesh))
+        parts += _section("skinweights", skin.n_vertices, weights_lines(skin))
+    parts += _triangle_runs(mesh)
     if skin is not None:
-        parts.append(_bindings_text(skin))
+        parts.append([_bindings_text(skin)])
     for material in mesh.materials:
         _save_texture(material, Path(path).parent)
-    save_text(path, "".join(parts))
+    save_parts(path, chain.from_iterable(parts))
     notes = []
     if len(sources) != figure.mesh.n_vertices:
         counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}
@@ -238,39 +242,35 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
         raise UnsupportedFormatError(f".skin cannot store numbers beyond {LARGEST:.3g}")
 
 
-def _table(name: str, rows: Floats | Ints) -> str:
-    lines = [f"  {' '.join(map(repr, row))}\n" for row in rows.tolist()]
-    return f"{name} {len(rows)} {{\n{''.join(lines)}}}\n"
+def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
+    return _section(name, len(rows), row_texts(rows, shortest, start=b"  "))
 
 
-def _weights_text(skin: Skin) -> str:
-    pairs = [f"{j} {w!r}" for j, w in zip(skin.joints.tolist(), skin.weights.tolist(), strict=True)]
-    starts = skin.starts.tolist()
-    lines = [
-        f"  {' '.join([str(end - start), *pairs[start:end]])}\n" for start, end in pairwise(starts)
-    ]
-    return f"skinweights {skin.n_vertices} {{\n{''.join(lines)}}}\n"
+def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[bytes]]:
+    """Return the text of a section in parts, which are composed only when they are written."""
+    return [[f"{name} {count} {{\n".encode()], lines, [b"}\n"]]
 
 
-def _triangle_runs(mesh: Mesh) -> list[str]:
+def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
     """Return the triangles sections, each after its material, as assigned by the reader."""
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
-    parts: list[str] = []
+    parts: list[Iterable[bytes]] = []
     written = 0
     for first, last in zip([0, *edges], [*edges, len(indices)], strict=True):
         material = int(indices[first])
         if written and material != written - 1 and material < written:
             raise UnsupportedFormatError(".skin cannot return to an earlier material")
         for index in range(written, material + 1):
-            parts.append(_material_text(mesh.materials[index]))
+            parts.append([_material_text(mesh.materials[index])])
             written = index + 1
-        parts.append(_table("triangles", mesh.triangles[first:last]))
-    parts.extend(map(_material_text, mesh.materials[written:]))
+        rows = mesh.triangles[first:last]
+        parts += _section("triangles", len(rows), row_texts(rows, integers, start=b"  "))
+    parts.append(map(_material_text, mesh.materials[written:]))
     return parts
 
 
-def _material_text(material: Material) -> str:
+def _material_text(material: Material) -> bytes:
     name, texture = as_words(material.name), _as_rest_of_line(material.texture)
     if name is None or not KEYWORDS.isdisjoint(name) or texture != material.texture:
         raise UnsupportedFormatError(
@@ -278,7 +278,8 @@ def _material_text(material: Material) -> str:
             f'with the texture "{printable(material.texture)}"'
         )
     head = " ".join(filter(None, ["material", material.name, "{\n"]))
-    return head + (f"  texture {material.texture}\n" if material.texture else "") + "}\n"
+    text = head + (f"  texture {material.texture}\n" if material.texture else "") + "}\n"
+    return text.encode("utf-8", "surrogateescape")
 
 
 def _as_rest_of_line(texture: str | None) -> str | None:
@@ -290,11 +291,11 @@ def _as_rest_of_line(texture: str | None) -> str | None:
     return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
 
 
-def _bindings_text(skin: Skin) -> str:
+def _bindings_text(skin: Skin) -> bytes:
     bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # +0.0 turns -0.0 into 0.0
     # The rows of the text are the matrix's columns.
     blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
-    return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n"
+    return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n".encode()
 
 
 def _matrix_text(rows: Floats) -> str:

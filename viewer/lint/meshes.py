@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._topology import Edges, edges_of, orientations, welded
 from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, triangle_areas
 

@@ -7,10 +7,10 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._poses import some_poses
-from viewer.lint._topology import components, welded
 from viewer.lint.bindings import are_singular
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh
 from viewer.rig.skeleton import joint_labels
 from viewer.rig.skin import (

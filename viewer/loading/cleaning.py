@@ -72,6 +72,9 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
             continue
         actor.clip, said = _cleaned(scene, actor, clip, wanted)
         notes += said
+        if actor.drive is not None:
+            again = partial(_cleaned_again, scene, actor, wanted)
+            actor.drive = replace(actor.drive, finish=again)
     time = _start(scene.actors) if scene.time is None else scene.time
     for actor in scene.actors:
         pose_actor(actor, time)
@@ -83,8 +86,14 @@ def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
 def _cleaned_in(in_space: Callable[[str], Scene], wanted: CleanUp, space: str) -> Scene:
     """Return a scene in another space, cleaned up in the same way."""
     scene = in_space(space)
-    clean_up(scene, wanted)
+    scene.diagnostics = (*scene.diagnostics, *clean_up(scene, wanted))
     return scene
+
+
+def _cleaned_again(scene: Scene, actor: Actor, wanted: CleanUp, clip: SampledClip) -> SampledClip:
+    """Return a motion that was retargeted again, cleaned up in the same way."""
+    found = _cleaned(scene, replace(actor, clip=clip), clip, wanted)[0]
+    return found if isinstance(found, SampledClip) else clip
 
 
 def _start(actors: Iterable[Actor]) -> float:

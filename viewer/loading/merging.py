@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, frame_range
+from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.person import person_label
@@ -17,6 +18,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scalars import length_text
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.shape import rest_joints
@@ -64,9 +66,17 @@ def merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
             if isinstance(kept.clip, Captured) and isinstance(other.clip, Captured):
                 notes += _merge(kept, kept.clip, other, other.clip)
             scene.actors.remove(other)
-        if kept is not None:
+        if kept is not None and kept.person != people[0]:
+            notes.append(_renumbered(kept, people[0]))
             kept.person = people[0]
     return notes
+
+
+def _renumbered(actor: Actor, person: int) -> Diagnostic:
+    """Return a note about a body or keypoints that the first person did not have."""
+    part = Phrase("part-points" if isinstance(actor.clip, PointClip) else "part-body")
+    values = {"part": part, "other": person_label(actor.person or 0), "kept": person_label(person)}
+    return Diagnostic("X006.renumbered", values=values)
 
 
 def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list[Diagnostic]:
@@ -78,6 +88,7 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
     both = common_frames(first, second)
     apart = _apart(kept, first, other, second, both)
     kept.clip = joined_tracks(first, second)
+    kept.drive = _joined_drives(kept.drive, other.drive)
     timing = first.timing
     names["n"] = int(second.timing.present.sum())
     notes = [Diagnostic("X006.merged", values=names)]
@@ -91,6 +102,16 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
         values = {"frames": spans, "distance": length_text(kept.figure, apart)}
         notes.append(Diagnostic("X006.overlap", values={**names, "n": len(both), **values}))
     return notes
+
+
+def _joined_drives(first: Drive | None, second: Drive | None) -> Drive | None:
+    """Return what drives a person with two tracks; None if one of them is not driven."""
+    if first is None or second is None:
+        return None
+    motion = first.motion
+    clip = joined_tracks(motion.clip, second.motion.clip)
+    assert isinstance(clip, SampledClip)  # as both are
+    return replace(first, motion=replace(motion, clip=clip))
 
 
 def _apart(

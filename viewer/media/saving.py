@@ -9,16 +9,18 @@ import stat
 from collections.abc import Iterable, Iterator, Mapping
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
 from viewer.media.unfinished import note_unfinished
 from viewer.phrases import printable
+from viewer.progress import report
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
@@ -29,6 +31,7 @@ __all__ = [
     "keeping_written",
     "save_arrays",
     "save_bytes",
+    "save_parts",
     "save_text",
 ]
 
@@ -128,23 +131,34 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     OutputError
         If it cannot be written; the message gives the path and the system's reason.
     """
+    save_parts(path, [data])
+
+
+def save_parts(path: str | Path, parts: Iterable[bytes]) -> None:
+    """Write a file part by part, so that its content need not exist at once; see ``save_bytes``.
+
+    Errors of the iterable leave the file unchanged.
+    """
     hold()  # a signal that arrives after the rename must not turn success into failure
     poll()
     path = Path(path)
     kept = _written.get()
+    if kept is not None or is_stdout(path):
+        parts = [b"".join(parts)]
     if kept is not None:
-        kept[path] = data
+        (kept[path],) = parts
     if is_stdout(path):
-        write_stdout(path, data)
+        write_stdout(path, *parts)
         return
     try:
         mode = _mode(path)
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(None, "is a folder")
         if not stat.S_ISREG(mode):
-            _write_through(path, data)  # not resolved: /dev/stdout may lead to a nameless pipe
+            _write_through(path, parts)  # not resolved: /dev/stdout may lead to a nameless pipe
         else:
-            _replace(path.resolve(), data, stat.S_IMODE(mode))
+            _replace(path.resolve(), parts, stat.S_IMODE(mode))
+            note_output(path)
     except (OSError, ValueError, RuntimeError) as problem:
         reason = getattr(problem, "strerror", None) or problem
         raise OutputError(f"{printable(path, 300)}: {reason}") from None
@@ -213,6 +227,7 @@ class Replacement:
             self.discard()
             raise self.error(problem) from None
         self.temporary = None
+        note_output(self.path)
         return size
 
     def discard(self) -> None:
@@ -310,14 +325,14 @@ def _mode(target: Path) -> int:
         return stat.S_IFREG | (0o666 & ~mask)
 
 
-def _write_through(target: Path, data: bytes) -> None:
+def _write_through(target: Path, parts: Iterable[bytes]) -> None:
     # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
     # forever, so signals must be able to interrupt it.
     with raising(), target.open("wb") as stream:
-        stream.write(data)
+        _write_parts(stream, parts)
 
 
-def _replace(target: Path, data: bytes, permissions: int) -> None:
+def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
     import tempfile
 
     _require_folder(target)
@@ -325,7 +340,7 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
-            stream.write(data)
+            _write_parts(stream, parts)
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
@@ -335,6 +350,15 @@ def _replace(target: Path, data: bytes, permissions: int) -> None:
         with contextlib.suppress(OSError):
             Path(name).unlink()
         raise
+
+
+def _write_parts(stream: BinaryIO, parts: Iterable[bytes]) -> None:
+    written = 0
+    for part in parts:
+        poll()
+        stream.write(part)
+        written += len(part)
+        report(written, 0)
 
 
 def _require_folder(target: Path) -> None:

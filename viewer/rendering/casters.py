@@ -9,10 +9,11 @@ from functools import partial
 import moderngl
 import numpy as np
 
-from viewer.rendering.bounds import Bounds, stretch
+from viewer.rendering.bounds import spheres_of
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.joint_spheres import stretch
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
@@ -99,10 +100,10 @@ class Casters:
                 found = max(found, float(scale) * size)
         return found
 
-    def spheres(self, bounds: Bounds) -> list[Floats]:
+    def spheres(self) -> list[Floats]:
         """Return bounding spheres of each drawn actor: (N, 4) centres and radii, scene space."""
         drawn = [actor for actor in self.actors if actor.is_drawn]
-        found = [bounds.spheres(actor, self.options) for actor in drawn]
+        found = [spheres_of(actor, self.options) for actor in drawn]
         return [spheres for spheres in found if len(spheres) and np.isfinite(spheres).all()]
 
 

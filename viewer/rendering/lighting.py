@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from viewer.rendering.bounds import Bounds
 from viewer.rendering.effects import Effects, Shadow
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ground_pass import ground_axes
@@ -45,7 +44,6 @@ class Lighting:
 
     def __init__(self, context: moderngl.Context, programs: Programs) -> None:
         self.context, self.programs = context, programs
-        self.bounds = Bounds()
         self._spheres: Floats | None = None
         self._contact: Contact | None = None
         self._size = 0.0  # size of the largest figure, scene units
@@ -83,7 +81,7 @@ class Lighting:
         options = casters.options
         if options.quality == "draft":
             return
-        of_actors = casters.spheres(self.bounds)
+        of_actors = casters.spheres()
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)

@@ -26,22 +26,23 @@ _RIGID = 1e-5
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Pointer doubling: every pass multiplies each joint's matrix by that of the ancestor to which it
-    points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n) passes (Hillis
-    and Steele 1986).
+    Pointer doubling for one pose: every pass multiplies each joint's matrix by that of the ancestor
+    to which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
+    passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by joint, which
+    takes a single product for each.
 
     Parameters
     ----------
     parents : (J,)
         Index of each joint's parent, smaller than its own; -1 for a root.
-    local : (J, 4, 4)
-        Joint-to-parent matrices.
+    local : (J, 4, 4) or (J, F, n, n)
+        Joint-to-parent matrices; of many poses, these can also be rotations alone.
     root : (4, 4), optional
         Placement of the whole figure in the world; identity if omitted.
 
     Returns
     -------
-    (J, 4, 4)
+    (J, 4, 4) or (J, F, n, n)
         Joint-to-world matrices, lengths in the unit of ``local``.
 
     >>> local = np.stack([np.eye(4)] * 2)
@@ -50,6 +51,11 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     3.0
     """
     world = local.copy()
+    if local.ndim > 3:
+        for joint, parent in enumerate(parents.tolist()):
+            if parent >= 0:
+                np.matmul(world[parent], local[joint], out=world[joint])
+        return world if root is None else root @ world
     ancestors = parents.copy()
     below = np.flatnonzero(ancestors >= 0)
     while len(below):

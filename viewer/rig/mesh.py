@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Mesh",
     "PartView",
+    "area_vectors",
     "bounding_box",
     "box_size",
     "first_person_parts",
@@ -210,7 +211,7 @@ def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
     (T,)
         Areas, squared units.
     """
-    return 0.5 * np.linalg.norm(_area_vectors(positions, triangles), axis=1)
+    return 0.5 * np.linalg.norm(area_vectors(positions, triangles), axis=1)
 
 
 def volume(positions: Floats, triangles: Ints) -> float:
@@ -317,7 +318,7 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
     >>> vertex_normals(square, np.array([[0, 1, 2]]))[0].tolist()
     [0.0, 0.0, 1.0]
     """
-    vectors = _area_vectors(positions, triangles)
+    vectors = area_vectors(positions, triangles)
     corners = triangles.ravel()
     columns = [
         np.bincount(corners, np.repeat(vectors[:, axis], 3), minlength=len(positions))
@@ -353,8 +354,21 @@ def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
     return visible
 
 
-def _area_vectors(positions: Floats, triangles: Ints) -> Floats:
-    """Return (b - a) x (c - a) of each triangle: along its normal, twice its area long."""
+def area_vectors(positions: Floats, triangles: Ints) -> Floats:
+    """Return (b - a) x (c - a) of each triangle: along its normal, twice its area long.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Figure units.
+    triangles : (T, 3)
+        Vertex indices.
+
+    Returns
+    -------
+    (T, 3)
+        Squared units.
+    """
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return np.cross(b - a, c - a)
 

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 import viewer
 from viewer.app.core.messages import Message, MessageLog, message_line
-from viewer.app.overlays import n_newest
+from viewer.app.overlays import hint_rect, n_newest
 from viewer.diagnostics import Diagnostic
 
 
@@ -190,6 +190,11 @@ def test_progress_messages_and_legend_never_overlap(drive, rig, size, has_legend
     for number, rect in enumerate(shown):
         assert not any(_overlap(rect, other) for other in shown[number + 1 :])
     hand.state.job = None
+    # The note shares the lower edge with the hints and the axis gizmo only if there is room.
+    notes, hint = shown[-1], hint_rect(hand.state)
+    assert not _overlap(notes, hint) and notes[2] <= sum(hand.state.view_rect[:3:2])
+    gizmo = hand.state.item_rects.get("axis gizmo")
+    assert gizmo is None or size[0] < 900 or not _overlap(notes, gizmo)
 
 
 def test_messages_that_do_not_fit_are_only_counted(drive, rig, texts):

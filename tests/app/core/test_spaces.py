@@ -74,7 +74,9 @@ def test_captures_that_are_being_read_end_with_the_switch(contents):
 
 def test_the_other_space_is_cleaned_up_too(scene):
     clean_up(scene, CleanUp(frames=(1, 5)))
-    assert scene.in_space("camera").actors[0].clip.timing.n_frames == 4
+    other = scene.in_space("camera")
+    assert other.actors[0].clip.timing.n_frames == 4
+    assert "X006.trimmed" in [note.key for note in other.diagnostics]
 
 
 def test_the_panel_switches_and_keeps_time_selection_look_and_camera(drive, scene):

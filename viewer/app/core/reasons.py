@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from viewer.app.core.state import AppState
 from viewer.rig.motion.evaluation import JointMotion
+from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = [
+    "no_drive",
     "no_job_room",
     "no_mesh",
     "no_motion",
@@ -45,11 +47,21 @@ def no_panel(state: AppState, needs: str) -> str:
         return ""
     if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
         return no_motion(state)
+    if needs == "drive":
+        return no_drive(state)
     if needs == "parts":
         return no_parts(state)
     if needs in ("", "actors") or getattr(state.actor.figure, needs) not in (None, ()):
         return ""
     return f"this figure has no {needs.replace('_', ' ')}"
+
+
+def no_drive(state: AppState) -> str:
+    """Return why the chosen actor has no match of joints."""
+    actor = state.actor
+    if actor.drive is not None and isinstance(actor.clip, SampledClip):
+        return ""
+    return "no motion of another skeleton drives this figure"
 
 
 def no_parts(state: AppState) -> str:

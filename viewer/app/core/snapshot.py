@@ -9,6 +9,7 @@ import numpy as np
 
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.pose import Pose, PoseKey, pose_key, pose_of
+from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor, Motion, Scene, Swinging
 
 __all__ = [
@@ -37,6 +38,7 @@ class Look:
     hidden_parts: frozenset[int]
     animation: int
     springs: Swinging | None
+    drive: Drive | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +87,7 @@ def look_of(actor: Actor) -> Look:
     placement = actor.placement.tobytes()
     hidden, number = actor.hidden_parts, actor.animation
     look = actor.clip, actor.offset, actor.visible, actor.color, placement, hidden, number
-    return Look(*look, actor.springs)
+    return Look(*look, actor.springs, actor.drive)
 
 
 def _looks(actor: Actor, look: Look) -> bool:
@@ -99,6 +101,7 @@ def _looks(actor: Actor, look: Look) -> bool:
         and actor.hidden_parts == look.hidden_parts
         and actor.animation == look.animation
         and actor.springs is look.springs
+        and actor.drive is look.drive
         and actor.placement.tobytes() == look.placement
     )
 
@@ -139,6 +142,7 @@ def restore_motion(snapshot: Snapshot, scene: Scene) -> None:
     for actor, pose, look in zip(scene.actors, snapshot.poses, snapshot.looks, strict=True):
         actor.pose = restored_pose(pose)
         actor.clip, actor.offset, actor.animation = look.clip, look.offset, look.animation
+        actor.drive = look.drive
 
 
 def restore_display(snapshot: Snapshot, options: DisplayOptions) -> None:

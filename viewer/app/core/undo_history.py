@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from viewer.app.core.snapshot import (
+    Look,
     Snapshot,
     have_same_motion,
     is_current,
@@ -142,11 +143,11 @@ class History:
         }
         known |= {id(actor) for one in (self._seen, self._before) if one for actor in one.actors}
         rows = [row for row, actor in enumerate(whole.actors) if id(actor) not in known]
-        clips = {id(actor): actor.clip for actor in whole.actors}
+        grown = {id(actor): actor for actor in whole.actors}
 
         def extended(one: Snapshot) -> Snapshot:
             looks = (
-                replace(look, clip=_grown(look.clip, clips.get(id(actor))))
+                _extended(look, grown.get(id(actor)))
                 for actor, look in zip(one.actors, one.looks, strict=True)
             )
             return replace(
@@ -263,6 +264,14 @@ class History:
         """Return whether a feature's value has changed; losing its value is not an edit."""
         kept = self._kept()
         return kept is not None and (self._seen is None or kept is not self._seen.kept)
+
+
+def _extended(look: Look, actor: Actor | None) -> Look:
+    """Return an earlier step's look with the clip and drive that have grown since then."""
+    if actor is None:
+        return look
+    # Joints cannot be matched by hand while the motion grows.
+    return replace(look, clip=_grown(look.clip, actor.clip), drive=actor.drive)
 
 
 def _grown(old: Motion | None, new: Motion | None) -> Motion | None:

@@ -12,10 +12,11 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.app.core.widgets import Rect
 from viewer.app.view.camera_actions import fly_to
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 
-__all__ = ["AxisGizmo", "draw_axis_gizmo", "holds_gizmo", "is_over_gizmo"]
+__all__ = ["AxisGizmo", "draw_axis_gizmo", "gizmo_rect", "holds_gizmo", "is_over_gizmo"]
 
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
@@ -85,14 +86,11 @@ def _go_on(state: AppState, gizmo: AxisGizmo) -> None:
 
 def draw_axis_gizmo(state: AppState) -> None:
     """Draw the axes as seen by the camera; axes that point towards the eye are drawn last."""
-    center = _center(state)
-    if center is None:
+    center, rect = _center(state), gizmo_rect(state)
+    if center is None or rect is None:
         return
     (x, y), unit = center, _unit()
-    state.item_rects["axis gizmo"] = (
-        *(x - _RADIUS * unit, y - _RADIUS * unit),
-        *(x + _RADIUS * unit, y + _RADIUS * unit),
-    )
+    state.item_rects["axis gizmo"] = rect
     pen, is_over = imgui.get_background_draw_list(), _is_free(state) and is_over_gizmo(state)
     if is_over:
         pen.add_circle_filled((x, y), _RADIUS * unit, imgui.get_color_u32((1.0, 1.0, 1.0, 0.16)))
@@ -102,6 +100,15 @@ def draw_axis_gizmo(state: AppState) -> None:
         _draw_end(end, (x, y), unit, hot is not None and hot[:2] == end[:2])
     if hot is not None:
         imgui.set_tooltip(f"{_named(state, hot).capitalize()} view; drag orbits")
+
+
+def gizmo_rect(state: AppState) -> Rect | None:
+    """Return the rectangle of the gizmo, window coordinates; None if it is not shown."""
+    center = _center(state)
+    if center is None:
+        return None
+    (x, y), reach = center, _RADIUS * _unit()
+    return x - reach, y - reach, x + reach, y + reach
 
 
 def _draw_end(end: _End, center: tuple[float, float], unit: float, is_hot: bool) -> None:

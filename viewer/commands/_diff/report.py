@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -121,9 +120,11 @@ def _cells(row: Compared, tolerance: float | None) -> list[str]:
     return [*cells, ", ".join(result)]
 
 
-def json_text(reference: str, rows: Sequence[Compared], tolerance: float | None) -> str:
-    """Return the whole report as JSON; lengths in the reference's unit, angles in radians."""
-    content = {
+def json_data(
+    reference: str, rows: Sequence[Compared], tolerance: float | None
+) -> dict[str, object]:
+    """Return the whole report as JSON data; lengths in the reference's unit, angles in radians."""
+    return {
         "reference": reference,
         "tolerance": tolerance,
         "comparisons": [
@@ -139,7 +140,6 @@ def json_text(reference: str, rows: Sequence[Compared], tolerance: float | None)
             for row in rows
         ],
     }
-    return json.dumps(content, indent=2, ensure_ascii=False)
 
 
 def _actor(name: str, difference: Difference) -> dict[str, object]:

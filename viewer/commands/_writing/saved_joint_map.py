@@ -37,7 +37,7 @@ def saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[No
     if arguments.save_joint_map is None:
         yield
         return
-    from viewer.formats._joint_map import joint_map_text
+    from viewer.formats._text.joint_map import joint_map_text
     from viewer.media.saving import save_text
     from viewer.rig.retargeting.driven_clip import full_map
 

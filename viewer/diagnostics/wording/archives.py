@@ -1,9 +1,11 @@
-"""Messages about archives (pickles, ``.npz``, ``.npy``), the arrays in them, and text tables."""
+"""Messages about archives (pickles, ``.npz``, ``.npy``, submissions) and arrays in files."""
 
 _KIND = "expected a pickle, .npz or .npy file, found "
 _NOT_ALLOWED = ", which is not allowed; nothing was executed"
 _FINITE = "{item:text}: expected finite numbers, found {found:g}{at:+ at {}}"
 _LIMIT = "{item:text}: expected numbers within ±{limit:.2g}, found {found:g}{at:+ at {}}"
+_SUBMISSION = "expected a folder or a zip archive, found "
+_UNUSED = "; --expect names the files to use"
 
 MESSAGES = {
     "F002.table-empty": "expected rows of {columns} numbers, found {found:text}",
@@ -46,6 +48,30 @@ MESSAGES = {
     "F002.torch-kind": "expected a torch file of tensors, found a compiled module "
     "(`torch.jit.save`), which is a program",
     "F006.pickle-rest": "ignored {n:#byte} after the end of the pickle",
+    # Submissions that are graded: folders and zip archives
+    "F001.submission": "{reason:text}",
+    "F001.submission-size": "expected at most {most} bytes of files, found {found}",
+    "F001.submission-count": "expected at most {most:#file}, found {found}",
+    "F002.submission-kind": _SUBMISSION + "a {suffix:text} file",
+    "F002.submission-zip": _SUBMISSION + "a damaged one ({reason:text})",
+    "F002.submission-ratio": "expected a compression ratio of at most {most}, found {found} bytes "
+    "in {size}",
+    "F002.submission-encrypted": "{item:text}: expected a file without a password, found an "
+    "encrypted one",
+    "F002.submission-method": "{item:text}: expected a stored or deflated file, found compression "
+    "method {method}",
+    "F002.submission-outside": "{item:text}: expected a path inside the archive, found one that "
+    "leads outside",
+    "F002.submission-link": "{item:text}: expected a file, found a symbolic link",
+    "F002.submission-twice": "{item:text}: expected a single file with this path, found {found}",
+    "F002.submission-nested": "expected files to compare, found archives in {depth} archives",
+    "F002.submission-missing": "expected {expected:#file} matching {pattern:text}, found "
+    "{names:list}",
+    "F002.submission-several": "expected {expected:#file} matching {pattern:text}, found "
+    "{names:list}" + _UNUSED,
+    "F002.submission-empty": "expected files to compare, found {names:list}",
+    "F002.submission-folders": "expected one folder with files to compare, found {names:list}"
+    + _UNUSED,
 }
 
 PHRASES = {

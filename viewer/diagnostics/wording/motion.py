@@ -81,6 +81,7 @@ MESSAGES = {
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",
     "X006.merged": "{other}: {n:#frame} joined to {kept}",
+    "X006.renumbered": "{part} of {other} assigned to {kept}",
     "X006.overlap": "{other} and {kept} are both present in {n:#frame} ({frames:list}), {distance} "
     "apart: those of {kept} are used",
     "X006.keys": "{figure:text}: its motion has keys instead of captured frames and is unchanged",
@@ -108,6 +109,8 @@ PHRASES = {
     "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
     "moved-joints": "joints",
     "moved-points": "points",
+    "part-body": "body",
+    "part-points": "keypoints",
     "raised": "raised",
     "lowered": "lowered",
     "joint-in-frame": "{joint:text}, frame {frame}",

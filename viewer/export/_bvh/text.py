@@ -10,6 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.formats._text.decimals import fixed
+from viewer.formats._text.number_text import row_texts
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
@@ -27,7 +29,7 @@ def bvh_text(
     rate: float,
     rows: tuple[Floats, Floats],
     digits: int,
-) -> str:
+) -> bytes:
     """Return the text of a whole file.
 
     ``names``: unique names of letters, digits and underscores.
@@ -42,13 +44,13 @@ def bvh_text(
     """
     order = depth_first(parents)
     lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)
-    values = _columns(order, moves, rows, digits)
-    line = " ".join([f"%.{digits}f"] * values.shape[1])
+    values = _columns(order, moves, rows)
     seconds = 1.0 / rate
     decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
     lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {seconds:.{decimals}f}"]
-    lines += [line % tuple(row) for row in values.tolist()]
-    return "\n".join(lines) + "\n"
+    head = "\n".join(lines) + "\n"
+    frames = row_texts(values, lambda numbers: fixed(numbers, digits))
+    return b"".join([head.encode("ascii"), *frames])
 
 
 def _hierarchy(
@@ -97,16 +99,12 @@ def _vector(values: Floats, digits: int) -> str:
     return " ".join(f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0)
 
 
-def _columns(order: Ints, moves: Bools, rows: tuple[Floats, Floats], digits: int) -> Floats:
-    """Return the numbers of every frame, joints in the order of the file: (F, C)."""
+def _columns(order: Ints, moves: Bools, rows: tuple[Floats, Floats]) -> Floats:
+    """Return the numbers of every frame, not rounded, joints in the order of the file: (F, C)."""
     positions, angles = rows
     parts = []
     for joint in order:
         if joint == order[0] or moves[joint]:
             parts.append(positions[:, joint])
         parts.append(angles[:, joint])
-    # Adding 0 makes -0 positive.
-    values: Floats = np.concatenate(parts, axis=1)
-    np.round(values, digits, out=values)
-    values += 0.0
-    return values
+    return np.concatenate(parts, axis=1)

@@ -17,6 +17,7 @@ __all__ = [
     "close_gap",
     "digits_only",
     "eight_digits",
+    "eight_letters",
     "first_of",
     "letters_after",
     "not_digits",
@@ -111,3 +112,14 @@ def eight_digits(words: Words) -> Words:
     left = (x & mask) * _U(0x000F424000000064)
     right = ((x >> _U(16)) & mask) * _U(0x0000271000000001)
     return (left + right) >> _U(32)
+
+
+def eight_letters(values: Words) -> Words:
+    """Return the digits of integers below 10^8, with leading zeros."""
+    # Pairs of digits in two steps: four and four, then two and two, all in one word.
+    upper = values // _U(10_000)
+    fours = upper | ((values - upper * _U(10_000)) << _U(32))
+    upper = ((fours * _U(5243)) >> _U(19)) & _U(0x0000007F0000007F)
+    pairs = upper | ((fours - upper * _U(100)) << _U(16))
+    upper = ((pairs * _U(103)) >> _U(10)) & _U(0x000F000F000F000F)
+    return (upper | ((pairs - upper * _U(10)) << _U(8))) + ZEROS

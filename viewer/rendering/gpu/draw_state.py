@@ -7,7 +7,14 @@ from contextlib import contextmanager
 
 import moderngl
 
-__all__ = ["opacities", "sides", "without_colors", "without_depth_test", "without_depth_writes"]
+__all__ = [
+    "clipped",
+    "opacities",
+    "sides",
+    "without_colors",
+    "without_depth_test",
+    "without_depth_writes",
+]
 
 
 @contextmanager
@@ -44,6 +51,16 @@ def without_depth_test(context: moderngl.Context) -> Iterator[None]:
         yield
     finally:
         context.enable(moderngl.DEPTH_TEST)
+
+
+@contextmanager
+def clipped(context: moderngl.Context, region: tuple[int, int, int, int]) -> Iterator[None]:
+    """Draw only in a region: left, bottom, width and height in pixels."""
+    context.scissor = region
+    try:
+        yield
+    finally:
+        context.scissor = None
 
 
 @contextmanager

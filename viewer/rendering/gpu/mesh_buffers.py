@@ -14,6 +14,7 @@ from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_su
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.shell import Shell, shell_of
 from viewer.rig.mesh import Mesh, bounding_box, split_seams, visible_vertices
 from viewer.rig.skinning import Skinning, skin_used
 
@@ -68,6 +69,7 @@ class MeshBuffers:
         self._shown: tuple[frozenset[int], moderngl.Buffer] | None = None
         self._offsets: moderngl.Texture | None = None
         self._product: np.ndarray | None = None
+        self._shell: tuple[Shell | None] | None = None
         with self._owner.guard():
             self._upload(mesh, uv_indices, notes)
 
@@ -159,6 +161,17 @@ class MeshBuffers:
                 self._shown[1].write(float32(values))
                 self._shown = hidden_parts, self._shown[1]
         return self._shown[1]
+
+    @property
+    def shell(self) -> Shell | None:
+        """The closed surface that the opaque mesh is; None if its back faces may be visible."""
+        if self._shell is None:
+            mesh, skin = self.figure.require_mesh(), self.figure.skin
+            is_opaque = all(material.alpha_mode == "opaque" for material in mesh.materials)
+            # With negative weights, vertices leave the spheres that bound the surface.
+            is_bounded = skin is None or not (skin.weights < 0.0).any()
+            self._shell = (shell_of(mesh, skin) if is_opaque and is_bounded else None,)
+        return self._shell[0]
 
     @property
     def is_physical(self) -> bool:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import moderngl
 
+from viewer.rendering.gpu.back_faces import Region
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
@@ -101,7 +102,19 @@ class MeshPass:
         indices = self._indices(mesh, placement, view, options, blended)
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
-        draw_runs(array, indices, options, blended=blended, is_mirrored=is_mirrored)
+        backs = None if blended else self._back_faces(mesh, placement, view, options)
+        draw_runs(
+            array, indices, options, blended=blended, is_mirrored=is_mirrored, back_faces=backs
+        )
+
+    def _back_faces(
+        self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
+    ) -> tuple[Region, ...] | None:
+        """Return where back faces can be seen; None for everywhere, as with hidden parts."""
+        if mesh.hidden_parts or options.hidden_parts or options.reduced:
+            return None
+        model_view = view.matrix @ placement
+        return mesh.back_faces.regions(model_view, view.projection, self.context.viewport)
 
     def _indices(
         self,

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import moderngl
 
-from viewer.rendering.gpu.draw_state import sides
+from viewer.rendering.gpu.back_faces import Region
+from viewer.rendering.gpu.draw_state import clipped, sides
 from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.surfaces import SAMPLERS
@@ -29,10 +30,12 @@ def draw_runs(
     instances: int = 1,
     blended: bool = False,
     is_mirrored: bool = False,
+    back_faces: Sequence[Region] | None = None,
 ) -> None:
     """Draw all opaque or all blended triangles, one material at a time.
 
-    Of blended triangles that are not sorted, the back faces are drawn first.
+    Of blended triangles that are not sorted, the back faces are drawn first. Those of opaque ones
+    are only drawn in the regions ``back_faces``, if given.
     """
     two_passes = blended and isinstance(indices, IndexSet)
     plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
@@ -42,10 +45,16 @@ def draw_runs(
         set_uniforms(array.program, plain)
         run.surface.use(array.program, options.texture)
         is_open = run.surface.double_sided
-        with sides(array.ctx, options.cull, is_open, two_passes, is_mirrored) as orders:
+        is_culled = options.cull or back_faces is not None
+        with sides(array.ctx, is_culled, is_open, two_passes, is_mirrored) as orders:
             for order in orders:
                 array.ctx.cull_face = order
                 _render(array, run, instances)
+            if back_faces and is_open and not options.cull:
+                array.ctx.cull_face = "front"
+                for region in back_faces:
+                    with clipped(array.ctx, region):
+                        _render(array, run, instances)
 
 
 def draw_shapes(

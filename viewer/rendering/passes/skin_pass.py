@@ -10,6 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.rendering.gpu.back_faces import BackFaces
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
@@ -60,6 +61,8 @@ class PosedMesh:
         A row for every split vertex: position (relative to ``center``) and unit normal.
     center : (3,)
         Origin of the positions in figure space; part of the model matrix.
+    back_faces : BackFaces
+        Where back faces of the surface can be seen.
     scalars : ScalarBuffer
         Values of a scalar quantity, computed when one is shown.
     hidden_parts : frozenset of int
@@ -82,6 +85,7 @@ class PosedMesh:
         with self._owner.guard():
             self._palette = self._owner.keep(matrix_texture(context, self._n_joints))
         self._rigid: moderngl.Texture | None = None
+        self.back_faces = BackFaces(mesh)
         self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
@@ -114,6 +118,8 @@ class PosedMesh:
         if attached and pose is not None:
             self.upload(pose, how)
         self._run(self.mesh.skin(how), how, bool(attached))
+        shape = shaped(self.mesh.figure, pose.shape_weights) if attached and pose else None
+        self.back_faces.update(shape or self.mesh.figure, pose if attached else None, how)
         self._key = key
         self.n_updates += 1
 

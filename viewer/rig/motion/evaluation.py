@@ -359,11 +359,10 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
     local[..., :3, 3] = np.swapaxes(offsets, 0, 1)
     world = np.swapaxes(forward_kinematics(skeleton.parents, local), 0, 1)
-    place = np.zeros((count, 1, 4, 4))
-    place[:, 0, [0, 1, 2], [0, 1, 2]] = frames.figure_scales[:, None]
-    place[:, 0, :3, 3] = frames.figure_translations
-    place[..., 3, 3] = 1.0
-    return place @ world
+    if (frames.figure_scales != 1.0).any():
+        world[..., :3, :] *= frames.figure_scales[:, None, None, None]
+    world[..., :3, 3] += frames.figure_translations[:, None]
+    return world
 
 
 def rest_translations_of(figure: Figure, shape_weights: Floats) -> Floats:

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import (
+    axis_rotations,
     nearest_rotations,
     quaternion_to_matrix,
     rotation_vector_to_matrix,
@@ -17,7 +18,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.retargeting.joint_matches import Matches
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["RestPose", "alignment", "is_same_rest", "rest_of"]
+__all__ = ["RestPose", "alignment", "is_same_rest", "rest_of", "up_rotation"]
 
 # Cosine of the maximum angle between the bones of equal rest poses.
 _SAME = np.cos(np.radians(20.0))
@@ -48,6 +49,13 @@ class RestPose:
     points: Floats
     rotations: Floats
     up: Floats
+
+
+def up_rotation(source: str, target: str) -> Floats:
+    """Return the rotation from one up axis to another, ``"y"`` or ``"z"``: (3, 3)."""
+    if source == target:
+        return np.eye(3)
+    return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
 
 
 def rest_of(skeleton: Skeleton, to_common: Floats, up: str) -> RestPose:

@@ -22,7 +22,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import conjugate, multiply
-from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -31,7 +31,13 @@ from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
 from viewer.rig.retargeting.path_scale import path_scale
-from viewer.rig.retargeting.rest_poses import RestPose, alignment, is_same_rest, rest_of
+from viewer.rig.retargeting.rest_poses import (
+    RestPose,
+    alignment,
+    is_same_rest,
+    rest_of,
+    up_rotation,
+)
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
 from viewer.rig.skeleton import Skeleton, joint_label
 
@@ -206,17 +212,10 @@ def _job(
 ) -> _Job:
     """Return the inputs of a retargeting; ``to``: the figure's skeleton and up axis."""
     target, up = to
-    to_target = _up_rotation(motion.figure.up, up)
+    to_target = up_rotation(motion.figure.up, up)
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)
     is_same = matches.is_hierarchy and is_same_rest(*rests, matches, target.parents)
     return _Job(motion.clip, source, target, rests, matches, to_target, is_same)
-
-
-def _up_rotation(source: str, target: str) -> Floats:
-    """Return the rotation from one up axis to the other: (3, 3)."""
-    if source == target:
-        return np.eye(3)
-    return axis_rotations(0, np.asarray(np.pi / 2 if target == "z" else -np.pi / 2))
 
 
 def _source_rotations(job: _Job) -> Floats:

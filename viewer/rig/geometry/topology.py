@@ -15,13 +15,13 @@ Indices = NDArray[np.int64]
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
-    """Return triangles with coincident vertices merged, so that seams count as closed: (T, 3).
+    """Return triangles with coincident vertices merged, so that seams count as closed.
 
     Parameters
     ----------
     positions : (V, 3)
         Vertices at exactly equal positions are represented by the first of them.
-    triangles : (T, 3)
+    triangles : (T, 3), or any other shape
         Vertex indices.
     """
     # Sorting rows as three keys is several times faster than np.unique over rows.

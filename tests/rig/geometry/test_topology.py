@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.lint._topology import components, edges_of, orientations, welded
+from viewer.rig.geometry.topology import components, edges_of, orientations, welded
 
 
 def walked(count: int, pairs: np.ndarray) -> list[int]:

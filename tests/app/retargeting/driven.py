@@ -1,0 +1,22 @@
+"""A scene whose figure is driven by a capture with an elbow of unknown name and a tail."""
+
+from __future__ import annotations
+
+from rig.retargeting.two_people import BODY, HIK, figure_of, moving
+
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.scene import Actor, Scene
+
+NAMES = {"RightForeArm": "rElbow_x"}
+
+
+def driven_scene() -> Scene:
+    table = {
+        NAMES.get(name, name): (NAMES.get(parent, parent), at) for name, (parent, at) in HIK.items()
+    }
+    table["tail"] = "Hips", (0, 95, -30)
+    figure = figure_of(BODY, "body")
+    drive = Drive(moving(figure_of(table, "capture"), angle=0.5))
+    clip, _ = driven_clip(drive, figure)
+    return Scene([Actor(figure, clip=clip, drive=drive)])

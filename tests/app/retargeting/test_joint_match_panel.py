@@ -1,0 +1,137 @@
+"""The Joint match panel: edits are retargeted at once, undone, saved and loaded."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from app.retargeting.driven import driven_scene
+from imgui_bundle import imgui
+
+from viewer.app.core.reasons import no_panel
+from viewer.app.files.state import Files
+from viewer.app.retargeting.match_actions import (
+    ask_for_map,
+    ask_where_to_save,
+    is_automatic,
+    match_automatically,
+    match_joint,
+    no_edit,
+)
+from viewer.app.retargeting.state import JointMatch, shown_match
+from viewer.formats import Source
+from viewer.formats._text.joint_map import read_joint_map
+from viewer.rig.retargeting.driven_clip import driven_clip
+
+SIZE = (1000, 900)
+
+
+@pytest.fixture
+def panel(drive):
+    hand = drive(scene=driven_scene(), size=SIZE)
+    hand.show_panel("Joint match")
+    hand.step(3)
+    return hand
+
+
+def partner(hand, label):
+    """Return the label of the joint that drives a joint, and how it was matched."""
+    shown = shown_match(hand.state)
+    joint = shown.target.labels.index(label)
+    found = int(shown.partners[joint])
+    return shown.source.labels[found] if found >= 0 else "", shown.origins[joint]
+
+
+def test_a_chosen_joint_drives_the_figure_at_once_and_undo_restores_it(panel):
+    hand, actor = panel, panel.state.actor
+    elbow = actor.figure.skeleton.names.index("right_elbow")
+    hand.state.clock.seek(0.1)
+    hand.step(2)
+    before, pose = actor.clip, actor.pose.rotations.copy()
+    assert partner(hand, "right_elbow") == ("", "")
+    assert no_edit(hand.state) == no_panel(hand.state, "drive") == ""
+    assert is_automatic(hand.state) == "the match is automatic"
+    hand.click("Only unmatched")
+    hand.click("source of right_elbow")
+    hand.step(2)
+    hand.type("elbow")
+    hand.step(2)
+    hand.click("source rElbow_x")
+    hand.step(3)
+    assert partner(hand, "right_elbow") == ("rElbow_x", "map")
+    assert partner(hand, "left_elbow") == ("LeftForeArm", "name")
+    assert hand.says("right_elbow follows rElbow_x")
+    wanted, _ = driven_clip(actor.drive, actor.figure)
+    assert np.array_equal(actor.clip.rotations, wanted.rotations)
+    hand.key("z", "ctrl")
+    hand.step(3)
+    assert actor.clip is before and actor.drive.joint_map is None
+    np.testing.assert_array_equal(actor.pose.rotations, pose)
+    hand.key("y", "ctrl")
+    hand.step(3)
+    assert partner(hand, "right_elbow") == ("rElbow_x", "map")
+    hand.click("Automatic")
+    hand.step(2)
+    assert partner(hand, "right_elbow") == ("", "") and is_automatic(hand.state)
+    assert not np.allclose(wanted.rotations[:, elbow], actor.clip.rotations[:, elbow])
+
+
+def test_one_joint_may_drive_two_and_a_joint_may_stay_at_rest(panel):
+    state = panel.state
+    shown = shown_match(state)
+    joint, arm = (shown.target.labels.index(name) for name in ("right_elbow", "left_elbow"))
+    match_joint(state, joint, int(shown.partners[arm]))
+    assert partner(panel, "right_elbow")[0] == partner(panel, "left_elbow")[0] == "LeftForeArm"
+    match_joint(state, arm, -1)
+    assert partner(panel, "left_elbow") == ("", "map")
+    clip = state.actor.clip
+    np.testing.assert_allclose(clip.rotations[:, arm], [[0, 0, 0, 1]] * 5, atol=1e-12)
+
+
+def test_hovering_marks_the_pair_in_table_and_drawing(panel):
+    view = panel.state.of(JointMatch)
+    shown = shown_match(panel.state)
+    knee, leg = shown.target.labels.index("left_knee"), shown.source.labels.index("LeftLeg")
+    panel.move("joint left_knee")
+    panel.step(2)
+    assert view.hovered == ({knee}, {leg})
+    # The wrists, 0.84 apart, are 1.5 letters from the sides; the head is 1.44 above the ankles.
+    x0, y0, x1, y1 = panel.state.item_rects["preview"]
+    letter, half = imgui.get_font_size(), 0.5 * (x1 - x0)
+    scale = (half - 3.0 * letter) / 0.84
+    head = shown.target.labels.index("head")
+    panel.move((x0 + 0.5 * half, 0.5 * (y0 + y1) + 0.6 * letter - 0.5 * 1.44 * scale))
+    panel.step()
+    assert view.hovered == ({head}, {shown.source.labels.index("Head")})
+    panel.press()
+    panel.let_go()
+    assert panel.state.selected_joint == head
+
+
+def test_saved_maps_can_be_loaded(panel, tmp_path):
+    state = panel.state
+    shown = shown_match(state)
+    own = state.actor.clip
+    match_joint(
+        state, shown.target.labels.index("right_elbow"), shown.source.labels.index("rElbow_x")
+    )
+    edited = state.actor.clip
+    path = tmp_path / "map.txt"
+    ask_where_to_save(state)
+    state.of(Files).dialog.done(state, [path])
+    assert ("right_elbow", "rElbow_x") in read_joint_map(Source.open(path)).pairs
+    match_automatically(state)
+    assert np.array_equal(state.actor.clip.rotations, own.rotations)
+    ask_for_map(state)
+    dialog = state.of(Files).dialog
+    dialog.done(state, [path])
+    assert np.array_equal(state.actor.clip.rotations, edited.rotations)
+    path.write_text("right_elbow = rElbw_x\n")
+    kept = state.actor.clip
+    dialog.done(state, [path])
+    assert "map.txt:1: " in state.error and "did you mean rElbow_x?" in state.error
+    assert state.actor.clip is kept
+
+
+def test_figures_that_nothing_drives_have_no_panel(hand):
+    assert no_edit(hand.state) == "no motion of another skeleton drives this figure"
+    assert "Joint match" not in hand.state.item_rects

@@ -1,0 +1,90 @@
+"""Closed surfaces: which meshes hide their inside, and where they are open."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from viewer.rig.geometry.shell import shell_of
+from viewer.rig.mesh import Mesh
+from viewer.rig.skin import skin_from_lists
+
+# A cube from 0 to 1: corner 4 x + 2 y + z.
+CORNERS = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
+SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
+TRIANGLES = np.array([t for a, b, c, d in SQUARES for t in ((a, b, c), (a, c, d))])
+
+
+def cube(triangles=TRIANGLES, positions=CORNERS) -> Mesh:
+    return Mesh(positions, np.tile([0.0, 0.0, 1.0], (len(positions), 1)), triangles)
+
+
+def fine_cube(n=8) -> Mesh:
+    """Return a cube whose sides have n x n cells each, with vertices of their own."""
+    steps = np.linspace(0.0, 1.0, n + 1)
+    u, v = (grid.ravel()[:, None] for grid in np.meshgrid(steps, steps, indexing="ij"))
+    points, triangles = [], []
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    for number, (a, b, _, d) in enumerate(SQUARES):
+        points.append(CORNERS[a] + u * (CORNERS[b] - CORNERS[a]) + v * (CORNERS[d] - CORNERS[a]))
+        first = corner + number * (n + 1) ** 2
+        right, up = first + n + 1, first + 1
+        triangles += [np.stack([first, right, up], 1), np.stack([right, right + 1, up], 1)]
+    return cube(np.concatenate(triangles), np.concatenate(points))
+
+
+def test_a_cube_is_closed() -> None:
+    shell = shell_of(cube(), None)
+    assert shell is not None
+    assert len(shell.borders) == len(shell.copies) == 0
+
+
+@pytest.mark.parametrize(
+    "triangles",
+    [
+        TRIANGLES[:, ::-1],  # faces inwards
+        np.concatenate([TRIANGLES[:1, ::-1], TRIANGLES[1:]]),  # one triangle is reversed
+        np.concatenate([TRIANGLES, [[0, 1, 6]]]),  # an edge of three triangles
+        TRIANGLES[2:],  # an opening too large for the sign of the volume
+        TRIANGLES[:0],
+    ],
+    ids=["inwards", "inconsistent", "three at an edge", "open", "empty"],
+)
+def test_other_meshes_are_not(triangles) -> None:
+    assert shell_of(cube(triangles), None) is None
+
+
+def test_a_part_that_faces_inwards_spoils_the_whole() -> None:
+    both = np.concatenate([TRIANGLES, TRIANGLES[:, ::-1] + 8])
+    assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is None
+    both[12:] = TRIANGLES + 8
+    assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is not None
+
+
+def test_a_small_opening_has_its_corners_as_border() -> None:
+    mesh = fine_cube()
+    opened = cube(mesh.triangles[1:], mesh.positions)
+    shell = shell_of(opened, None)
+    assert shell is not None
+    missing = {tuple(point) for point in mesh.positions[mesh.triangles[0]].tolist()}
+    assert {tuple(point) for point in mesh.positions[shell.borders].tolist()} == missing
+
+
+def test_seams_are_closed_while_their_vertices_move_together() -> None:
+    mesh = fine_cube(2)
+    # 8 corners of 3 vertices and 12 middles of 2: 28 copies.
+    shell = shell_of(mesh, None)
+    assert shell is not None and len(shell.copies) == 28
+    assert shell.is_closed(2.0 * mesh.positions)
+    moved = mesh.positions.copy()
+    moved[shell.copies[0]] += 0.1
+    assert not shell.is_closed(moved)
+
+
+def test_seams_with_other_weights_are_open() -> None:
+    mesh = fine_cube(2)
+    pairs = [[(0, 0.5), (1, 0.5)] for _ in mesh.positions]
+    inverse_bind = np.tile(np.eye(4), (2, 1, 1))
+    assert shell_of(mesh, skin_from_lists(pairs, inverse_bind)) is not None
+    pairs[0] = [(0, 1.0)]
+    assert shell_of(mesh, skin_from_lists(pairs, inverse_bind)) is None

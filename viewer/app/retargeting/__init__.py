@@ -1,0 +1,1 @@
+"""Match of joints between a figure and the motion of another skeleton that drives it."""

@@ -1,0 +1,162 @@
+"""Edits of the match of joints: the motion is retargeted at once, and undo restores it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from viewer.app.core.reasons import no_drive
+from viewer.app.core.state import AppState
+from viewer.app.files.file_choice import FileDialog, folder_of
+from viewer.app.files.saving import save_files
+from viewer.app.files.state import Files
+from viewer.errors import ViewerError
+from viewer.formats import Source, file_stem
+from viewer.formats._text.joint_map import read_joint_map, write_joint_map
+from viewer.phrases import printable
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.driven_clip import driven_clip, full_map
+from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rig.scene import Actor
+from viewer.rig.skeleton import joint_label
+
+__all__ = [
+    "ask_for_map",
+    "ask_where_to_save",
+    "is_automatic",
+    "match_automatically",
+    "match_joint",
+    "no_edit",
+]
+
+_SUFFIXES = (".txt",)
+
+
+def no_edit(state: AppState) -> str:
+    """Return why the match of joints cannot be edited; empty if it can."""
+    why = no_drive(state)
+    if not why and state.of(Files).stream is not None:
+        why = "wait until the capture has been read"
+    return why
+
+
+def is_automatic(state: AppState) -> str:
+    """Return why the match cannot be reset; empty if it can."""
+    drive = state.actor.drive
+    why = no_edit(state)
+    return why or ("" if drive is not None and drive.joint_map else "the match is automatic")
+
+
+def match_joint(state: AppState, joint: int, partner: int) -> None:
+    """Let another joint of the motion drive a joint of the chosen figure.
+
+    Parameters
+    ----------
+    state : AppState
+        State with a driven actor.
+    joint : int
+        Joint of the figure.
+    partner : int
+        Joint of the motion; -1 to keep the figure's joint at rest.
+    """
+    actor = state.actor
+    if actor.drive is None:
+        return
+    source = actor.drive.motion.figure.require_skeleton()
+    label = joint_label(actor.figure.require_skeleton(), joint)
+    chosen = joint_label(source, partner) if partner >= 0 else ""
+    known = full_map(actor.drive, actor.figure)
+    pairs = tuple((mine, chosen if mine == label else theirs) for mine, theirs in known.pairs)
+    if _apply(state, JointMap(pairs)):
+        does = f"follows {printable(chosen, 60)}" if chosen else "stays at rest"
+        state.say_status(f"{printable(label, 60)} {does}")
+
+
+def match_automatically(state: AppState) -> None:
+    """Match all joints of the chosen figure automatically."""
+    if is_automatic(state):
+        state.say_status(is_automatic(state))
+    elif _apply(state, None):
+        state.say_status("Joints matched automatically")
+
+
+def ask_for_map(state: AppState) -> None:
+    """Open the dialog that loads a joint map."""
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths), _load, "open", "Load joint map", _SUFFIXES
+    )
+
+
+def ask_where_to_save(state: AppState) -> None:
+    """Open the dialog that saves the match as a joint map."""
+    name = f"{file_stem(state.actor.figure.name)}_joints{_SUFFIXES[0]}"
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths), _save, "save", "Save joint map", _SUFFIXES, name
+    )
+
+
+def _load(state: AppState, paths: list[Path]) -> None:
+    """Apply a joint map file to the chosen figure."""
+    if no_edit(state):
+        state.say_status(no_edit(state))
+        return
+    try:
+        joint_map = read_joint_map(Source.open(paths[0]))
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+    if _apply(state, joint_map):
+        state.say(f"Joints matched by {printable(paths[0], 200)}")
+
+
+def _save(state: AppState, paths: list[Path]) -> None:
+    """Write the match of the chosen figure."""
+    actor = state.actor
+    drive = actor.drive
+    if drive is None:
+        state.say_status(no_drive(state))
+        return
+    titles = drive.motion.figure.name, actor.figure.name
+
+    def act() -> None:
+        write_joint_map(full_map(drive, actor.figure), paths[0], titles)
+
+    save_files(state, act, paths)
+
+
+def _apply(state: AppState, joint_map: JointMap | None) -> bool:
+    """Retarget the chosen actor's motion, and those of all people of its capture."""
+    first = state.actor
+    together = [actor for actor in state.scene.actors if _is_together(actor, first)]
+    try:
+        changed = [_retargeted(actor, joint_map) for actor in together]
+    except ViewerError as problem:
+        state.error = str(problem)
+        return False
+    for actor, found in zip(together, changed, strict=True):
+        actor.clip, actor.drive = found.clip, found.drive
+        state.clock.pose(actor, again=True)
+    return True
+
+
+def _is_together(actor: Actor, first: Actor) -> bool:
+    """Return whether an actor is the first one or another person of the same capture."""
+    if actor is first:
+        return True
+    if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):
+        return False
+    is_same = actor.figure is first.figure and actor.title == first.title
+    return is_same and actor.drive.joint_map is first.drive.joint_map
+
+
+def _retargeted(actor: Actor, joint_map: JointMap | None) -> Actor:
+    """Return a copy of an actor whose motion is retargeted with another match of joints."""
+    assert actor.drive is not None and isinstance(actor.clip, SampledClip)  # by ``no_edit``
+    drive = replace(actor.drive, joint_map=joint_map)
+    clip = driven_clip(drive, actor.figure)[0]
+    if drive.finish is not None:
+        clip = drive.finish(clip)
+    return replace(
+        actor, drive=drive, clip=with_rate(clip, actor.clip.timing.frame_rate), pose=actor.pose
+    )

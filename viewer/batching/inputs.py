@@ -1,0 +1,250 @@
+"""Inputs of a batch: patterns, folders, lists of files, in natural order and without duplicates."""
+
+from __future__ import annotations
+
+import glob
+import os
+import re
+import sys
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewer.errors import ViewerError
+from viewer.formats import FORMATS, SUFFIXES
+from viewer.phrases import counted, printable
+
+__all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]
+
+_AMBIGUOUS = (".txt", ".json")  # notes and settings more often than poses
+_WILD = re.compile(r"[*?[]")
+_DIGITS = re.compile(r"([0-9]+)")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the arguments of a batch stand for.
+
+    Attributes
+    ----------
+    paths : tuple of str
+        Files, and folders that are one input each, sorted; spelled as they were given.
+    base : str
+        Absolute path of the folder that contains everything that was named. It depends on the
+        arguments only, not on the files that a pattern happens to match.
+    folders : frozenset of str
+        Those of the paths that are folders.
+    notes : tuple of str
+        Messages about duplicates and skipped files.
+    """
+
+    paths: tuple[str, ...]
+    base: str
+    folders: frozenset[str] = frozenset()
+    notes: tuple[str, ...] = ()
+
+
+def find_inputs(
+    words: Iterable[str],
+    lists: Iterable[str] = (),
+    suffixes: Collection[str] = (),
+    keeps_folders: bool = False,
+) -> Inputs:
+    """Find the inputs of a batch.
+
+    Parameters
+    ----------
+    words : iterable of str
+        Files, folders, patterns such as ``data/**/*.npz`` (a name that exists is not a pattern),
+        ``@list.txt`` for a list, and ``-`` for a list on standard input.
+    lists : iterable of str
+        Files with one path per line, or separated by zero bytes, as ``find -print0`` does; ``-``
+        for standard input.
+    suffixes : collection of str
+        Suffixes of the files taken from a folder; by default, those that identify a format.
+    keeps_folders : bool
+        Whether every folder is an input. Otherwise its files are, except for recordings and
+        models that consist of a folder.
+
+    Raises
+    ------
+    ViewerError
+        If there is no input, a file or list is missing, or a pattern or folder yields nothing.
+    """
+    wanted = {suffix.lower() for suffix in suffixes} or {*SUFFIXES} - {*_AMBIGUOUS}
+    search = _Search(wanted, keeps_folders)
+    for name in lists:
+        search.add_list(name)
+    for word in words:
+        if word == "-":
+            search.add_list(word)
+        elif word.startswith("@") and not os.path.lexists(word):
+            search.add_list(word[1:])
+        elif os.path.lexists(word) or not _WILD.search(word):
+            search.add_named(word)
+        else:
+            search.add_pattern(word)
+    if not search.roots:
+        raise ViewerError("expected files, folders or patterns, found none")
+    return search.result()
+
+
+def natural_key(path: str) -> tuple[list[list[str | int]], str]:
+    """Return a sort key that orders names part by part, and numbers in them by value.
+
+    >>> sorted(["a/walk10", "a/walk9", "a-b/walk1"], key=natural_key)
+    ['a/walk9', 'a/walk10', 'a-b/walk1']
+    """
+    parts: list[list[str | int]] = []
+    for part in path.replace(os.sep, "/").split("/"):
+        # Splitting puts digits at odd places, so that numbers are compared with numbers only.
+        pieces = _DIGITS.split(part.casefold())
+        parts.append([int(piece) if index % 2 else piece for index, piece in enumerate(pieces)])
+    return parts, path
+
+
+def is_recording(folder: str | Path) -> bool:
+    """Return whether a folder as a whole is one recording or model, recognised by its files."""
+    try:
+        names = os.listdir(folder)
+    except OSError:
+        return False
+    if any(not {*kind.files}.isdisjoint(names) for kind in FORMATS.values()):
+        return True
+    frames = [name for name in names if not name.startswith(".")]
+    return bool(frames) and all(re.fullmatch(r"\d+\.json", name) for name in frames)
+
+
+class _Search:
+    """The paths found so far."""
+
+    def __init__(self, suffixes: set[str], keeps_folders: bool) -> None:
+        self.suffixes, self.keeps_folders = suffixes, keeps_folders
+        self.roots: list[str] = []  # folders that contain what was named
+        self._found: dict[tuple[str, str], str] = {}
+        self._real: dict[str, str] = {}  # real paths of folders
+        self._folders: set[str] = set()
+        self._n_repeated = 0
+        self._n_skipped = 0
+
+    def add_named(self, path: str) -> None:
+        """Add a file, or a folder and what is in it."""
+        if not os.path.exists(path):
+            raise ViewerError(f"{printable(path, 300)}: no such file or folder")
+        is_folder = os.path.isdir(path)
+        if not is_folder or self._is_input(path):
+            self.roots.append(os.path.dirname(os.path.abspath(path)))
+            self._add(path, is_folder)
+            return
+        self.roots.append(os.path.abspath(path))
+        before = self._n_seen
+        for each, is_folder in self._inside(path, set()):
+            self._add(each, is_folder)
+        if self._n_seen == before:
+            raise ViewerError(
+                f"{printable(path, 300)}: no file in this folder has a suffix of a known format; "
+                "name others by a pattern"
+            )
+
+    def add_list(self, name: str) -> None:
+        """Add the paths in a file, or on standard input."""
+        for path in _listed(name):
+            self.add_named(path)
+
+    def add_pattern(self, pattern: str) -> None:
+        """Add the files that match a pattern, and the folders that are inputs."""
+        head = pattern[: _WILD.search(pattern).start()]  # type: ignore[union-attr]
+        self.roots.append(os.path.abspath(os.path.dirname(head)))
+        before = self._n_seen
+        for path in glob.iglob(pattern, recursive=True):
+            is_folder = os.path.isdir(path)
+            if not is_folder or self._is_input(path):
+                self._add(path, is_folder)
+        if self._n_seen == before:
+            raise ViewerError(f"{printable(pattern, 300)}: no file matches this pattern")
+
+    def result(self) -> Inputs:
+        """Return everything, sorted."""
+        notes = []
+        if self._n_repeated:
+            notes.append(f"{counted(self._n_repeated, 'path')} named more than once, used once")
+        if self._n_skipped:
+            text = counted(self._n_skipped, "file")
+            notes.append(f"{text} in folders skipped: the suffix belongs to no format")
+        paths = sorted(self._found.values(), key=natural_key)
+        return Inputs(tuple(paths), _common(self.roots), frozenset(self._folders), tuple(notes))
+
+    @property
+    def _n_seen(self) -> int:
+        return len(self._found) + self._n_repeated
+
+    def _is_input(self, folder: str) -> bool:
+        return self.keeps_folders or is_recording(folder)
+
+    def _add(self, path: str, is_folder: bool = False) -> None:
+        path = os.path.normpath(path)
+        folder, name = os.path.split(path)
+        if folder not in self._real:
+            # Links to folders may form loops; files are known by the names of their links.
+            self._real[folder] = os.path.realpath(folder or ".")
+        key = (self._real[folder], name)
+        if key in self._found:
+            self._n_repeated += 1
+        else:
+            self._found[key] = path
+            if is_folder:
+                self._folders.add(path)
+
+    def _inside(self, folder: str, visited: set[str]) -> Iterator[tuple[str, bool]]:
+        """Yield files and recordings in a folder and its subfolders, except hidden ones.
+
+        With each, whether it is a folder.
+        """
+        real = os.path.realpath(folder)
+        if real in visited:
+            return
+        visited.add(real)
+        try:
+            entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
+        except OSError as problem:
+            raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
+        for entry in entries:
+            if entry.name.startswith("."):
+                continue
+            if entry.is_dir():
+                if is_recording(entry.path):
+                    yield entry.path, True
+                else:
+                    yield from self._inside(entry.path, visited)
+            elif os.path.splitext(entry.name)[1].lower() in self.suffixes:
+                yield entry.path, False
+            else:
+                self._n_skipped += 1
+
+
+def _listed(name: str) -> list[str]:
+    """Return the paths in a file, or on standard input for ``-``."""
+    shown = "standard input" if name == "-" else printable(name, 300)
+    try:
+        if name == "-":
+            if sys.stdin is None:
+                raise ViewerError("standard input is closed: expected a list of paths")
+            data = sys.stdin.buffer.read()
+        else:
+            data = Path(name).read_bytes()
+    except OSError as problem:
+        raise ViewerError(f"{shown}: {problem.strerror or problem}") from None
+    separator = b"\0" if b"\0" in data else b"\n"
+    lines = [os.fsdecode(line.rstrip(b"\r")) for line in data.split(separator)]
+    paths = [line for line in lines if line.strip()]
+    if not paths:
+        raise ViewerError(f"{shown}: expected one path per line, found none")
+    return paths
+
+
+def _common(folders: Sequence[str]) -> str:
+    """Return the deepest folder that contains all of some absolute folders."""
+    try:
+        return os.path.commonpath({*folders})
+    except ValueError:  # on several drives
+        return ""

@@ -1,0 +1,70 @@
+"""Keys of items: hashes of their inputs, options and program, by which finished ones are known."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from hashlib import blake2b
+
+from viewer.batching.items import Item
+
+__all__ = ["item_key"]
+
+_CHUNK = 1 << 20
+_SIZE = 16  # bytes of a key
+_remembered: dict[tuple[str, int, int], bytes] = {}
+
+
+def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
+    """Return the key of an item, which changes if its result may change.
+
+    Files that an input refers to, such as textures, are not part of it.
+
+    Parameters
+    ----------
+    item : Item
+        The item; the content of its files counts, not their place, and the output's name.
+    settings : str
+        Everything else that the result depends on: job, options, version of the program.
+    shared : iterable of str
+        Files that all items read; each is read once per process.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read.
+    """
+    total = blake2b(digest_size=_SIZE)
+    where = item.output or item.name
+    for text in (settings, where):
+        total.update(os.fsencode(text) + b"\0")
+    for path in item.files:
+        total.update(_digest(path))
+    for path in shared:
+        status = os.stat(path)
+        known = (path, status.st_size, status.st_mtime_ns)
+        if known not in _remembered:
+            _remembered[known] = _digest(path)
+        total.update(_remembered[known])
+    return total.hexdigest()
+
+
+def _digest(path: str) -> bytes:
+    """Return the hash of a file, of a folder's files and their names, or of an archive's member."""
+    total = blake2b(digest_size=_SIZE)
+    if os.path.isdir(path):
+        for folder, folders, files in os.walk(path):
+            folders.sort()
+            for name in sorted(files):
+                inner = os.path.join(folder, name)
+                total.update(os.fsencode(os.path.relpath(inner, path)) + b"\0" + _digest(inner))
+        return total.digest()
+    member = ""
+    while not os.path.exists(path) and os.path.dirname(path) not in ("", path):
+        path, last = os.path.split(path)
+        member = f"{last}/{member}"
+    total.update(os.fsencode(member))
+    with open(path, "rb", buffering=0) as stream:
+        while chunk := stream.read(_CHUNK):
+            total.update(chunk)
+    return total.digest()

@@ -1,0 +1,206 @@
+"""Output names of a batch, from a template; clashes are found before anything starts."""
+
+from __future__ import annotations
+
+import os
+import unicodedata
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from string import Formatter
+
+from viewer.batching.inputs import Inputs
+from viewer.batching.items import Item
+from viewer.errors import ViewerError
+from viewer.near_names import did_you_mean
+from viewer.phrases import counted, listed, printable
+
+__all__ = ["FIELDS", "check_outputs", "has_fields", "items_of", "template_of"]
+
+FIELDS = {
+    "parent": "the input's folder, relative to the folder that all inputs share",
+    "folder": "the input's folder, as it was given",
+    "stem": "the input's name without its suffix",
+    "name": "the input's name",
+    "suffix": "the input's suffix without its dot",
+    "index": "the input's number, from 0",
+}
+"""Fields of templates."""
+
+_LEFT = ("frame",)  # fields of the commands, for numbered images and meshes
+_LONGEST = 300  # characters of a name in a message
+
+
+def template_of(output: str, suffix: str) -> str:
+    """Return the template of the output names.
+
+    Parameters
+    ----------
+    output : str
+        A template, or a folder, in which the folders of the inputs are repeated.
+    suffix : str
+        Suffix of the files in such a folder, such as ``bvh``; ``folder`` for outputs that are
+        folders; empty if ``output`` must be a template.
+
+    Raises
+    ------
+    ViewerError
+        If a field is unknown, or neither fields nor suffix are given.
+    """
+    if _fields(output):
+        if suffix:
+            raise ViewerError(
+                f"--to: expected a folder for -o, found the template {printable(output, _LONGEST)}"
+            )
+        return output
+    if not suffix:
+        raise ViewerError(
+            f"-o {printable(output, _LONGEST)}: expected --to SUFFIX for the files in this folder, "
+            "or a template such as {parent}/{stem}.bvh"
+        )
+    last = "" if suffix == "folder" else f".{suffix.lstrip('.')}"
+    folder = output.replace("{", "{{").replace("}", "}}")
+    return os.path.join(folder, "{parent}", "{stem}" + last)
+
+
+def has_fields(output: str) -> bool:
+    """Return whether an output is a template rather than a folder."""
+    return bool(_fields(output))
+
+
+def _fields(template: str) -> list[str]:
+    """Return the fields of a template; raise ViewerError for unknown ones."""
+    try:
+        found = [
+            (name, spec or "")
+            for _, name, spec, _ in Formatter().parse(template)
+            if name is not None
+        ]
+    except ValueError as problem:
+        raise ViewerError(f"-o {printable(template, _LONGEST)}: {problem}") from None
+    for name, spec in found:
+        if name not in (*FIELDS, *_LEFT):
+            near = did_you_mean(name, FIELDS) or f"there are {', '.join(FIELDS)}"
+            raise ViewerError(f"-o: no field is called {{{printable(name, 40)}}}; {near}")
+        if spec and name not in ("index", *_LEFT):
+            raise ViewerError(
+                f"-o: expected {{{name}}} without a format, found {printable(spec, 40)}"
+            )
+    return [name for name, _ in found]
+
+
+def items_of(inputs: Inputs, template: str = "") -> list[Item]:
+    """Return the items of a batch, in the order of the inputs.
+
+    Parameters
+    ----------
+    inputs : Inputs
+        The inputs.
+    template : str
+        Template of the output names; empty if nothing is written.
+    """
+    pieces = list(Formatter().parse(template))
+    items = []
+    for index, path in enumerate(inputs.paths):
+        name = _below(path, inputs.base)
+        output = _filled(pieces, index, path, name, path in inputs.folders) if template else ""
+        items.append(Item(index, (path,), output, name))
+    return items
+
+
+def _below(path: str, base: str) -> str:
+    """Return a path relative to the shared folder."""
+    full = os.path.abspath(path)
+    if base and full.startswith(os.path.join(base, "")):
+        return full[len(base) :].lstrip(os.sep).replace(os.sep, "/")
+    return os.path.splitdrive(full)[1].lstrip(os.sep).replace(os.sep, "/")
+
+
+def _filled(
+    pieces: Sequence[tuple[str, str | None, str | None, str | None]],
+    index: int,
+    path: str,
+    name: str,
+    is_folder: bool,
+) -> str:
+    parent, last = os.path.split(name)
+    # A folder's name has no suffix, whatever dots it contains.
+    stem, suffix = (last, "") if is_folder else os.path.splitext(last)
+    values: dict[str, str | int] = {
+        "parent": parent or ".",
+        "folder": os.path.dirname(path) or ".",
+        "stem": stem,
+        "name": last,
+        "suffix": suffix[1:],
+        "index": index,
+    }
+    text = ""
+    for literal, field, spec, _ in pieces:
+        text += literal
+        if field in _LEFT:
+            text += f"{{{field}:{spec}}}" if spec else f"{{{field}}}"
+        elif field is not None:
+            text += format(values[field], spec or "")
+    return os.path.normpath(text)
+
+
+def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> None:
+    """Check that no two items have the same output and no output is an input.
+
+    Names that differ in upper and lower case only are the same file on some systems, and the
+    results are likely to be copied to one of them.
+
+    Parameters
+    ----------
+    items : sequence of Item
+        All items, also those of other shards.
+    more_inputs : iterable of str
+        Files that all items read.
+
+    Raises
+    ------
+    ViewerError
+        The message lists the outputs and their inputs.
+    """
+    owners: dict[str, Item] = {}
+    clashes = []
+    for item in items:
+        other = owners.setdefault(_identity(item.output), item) if item.output else item
+        if other is not item:
+            clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
+    if clashes:
+        raise ViewerError(
+            f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; use "
+            "{parent}, {name} or {index} in the template"
+        )
+    files = [file for item in items for file in item.files] + list(more_inputs)
+    real = _RealPaths()
+    inputs = {real.of(file) for file in files}
+    replaced = [
+        _shown(item.output) for item in items if item.output and real.of(item.output) in inputs
+    ]
+    if replaced:
+        verb = "is an input" if len(replaced) == 1 else "are inputs"
+        raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
+
+
+def _identity(path: str) -> str:
+    return unicodedata.normalize("NFC", os.path.abspath(path)).casefold()
+
+
+class _RealPaths:
+    """Real paths, for which each folder is resolved once."""
+
+    def __init__(self) -> None:
+        self._folders: dict[str, str] = {}
+
+    def of(self, path: str) -> str:
+        if os.path.islink(path):
+            return os.path.realpath(path)
+        folder, name = os.path.split(path)
+        if folder not in self._folders:
+            self._folders[folder] = os.path.realpath(folder or ".")
+        return os.path.join(self._folders[folder], name)
+
+
+def _shown(path: str | Path) -> str:
+    return printable(path, _LONGEST)

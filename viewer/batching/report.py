@@ -1,0 +1,203 @@
+"""Reports of a batch: ``report.jsonl``, one line per item, and the summary.
+
+A line is appended as soon as its item has finished, so a report is also the list of what need not
+be done again. Several processes may append to the same file, on one machine or on several. A line
+that a killed process has not finished is skipped when the report is read.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from viewer.batching.items import Item, Result
+from viewer.errors import OutputError, ViewerError
+from viewer.phrases import printable
+
+__all__ = ["Report", "ReportFile", "read_results"]
+
+_NAMES = {field.name for field in fields(Result)} - {"item"}
+
+
+@dataclass
+class Report:
+    """The results of a batch.
+
+    Attributes
+    ----------
+    results : list of Result
+        In the order in which the items finished.
+    seconds : float
+        Wall time of the batch.
+    n_items : int
+        Number of items, also of those that were not started before the batch was interrupted.
+    signal : int
+        Number of the signal that interrupted it; 0 if none did.
+    path : Path or None
+        The report's file.
+    """
+
+    results: list[Result] = field(default_factory=list)
+    seconds: float = 0.0
+    n_items: int = 0
+    signal: int = 0
+    path: Path | None = None
+
+    @property
+    def counts(self) -> Counter[str]:
+        """Number of results by status."""
+        return Counter(result.status for result in self.results)
+
+    @property
+    def failures(self) -> list[Result]:
+        """Results of the items that are neither done nor unchanged, in the order of the inputs."""
+        bad = (one for one in self.results if one.status not in ("done", "unchanged"))
+        return sorted(bad, key=lambda result: result.item.index)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all items are done or unchanged, without findings or differences."""
+        is_clean = all(
+            result.status in ("done", "unchanged") and result.exit_code == 0
+            for result in self.results
+        )
+        return is_clean and len(self.results) == self.n_items
+
+
+class ReportFile:
+    """A report that is being written.
+
+    Parameters
+    ----------
+    path : Path
+        The file; its folder is created if necessary.
+    replaces : bool
+        Whether an old report is discarded. Otherwise, lines are appended to it.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+
+    def __init__(self, path: Path, replaces: bool = False) -> None:
+        self.path = path
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | (os.O_TRUNC if replaces else 0)
+            self._handle = os.open(path, flags, 0o666)
+        except OSError as problem:
+            raise self._error(problem) from None
+
+    def add(self, result: Result) -> None:
+        """Append a line; a killed process loses none that was added before."""
+        line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
+        try:
+            with _locked(self._handle):
+                if self._ends_within_line():
+                    line = b"\n" + line
+                while line:
+                    line = line[os.write(self._handle, line) :]
+        except OSError as problem:
+            raise self._error(problem) from None
+
+    def close(self) -> None:
+        """Close the file."""
+        os.close(self._handle)
+
+    def __enter__(self) -> ReportFile:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        problem: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _ends_within_line(self) -> bool:
+        size = os.fstat(self._handle).st_size
+        if size == 0:
+            return False
+        os.lseek(self._handle, size - 1, os.SEEK_SET)
+        return os.read(self._handle, 1) != b"\n"
+
+    def _error(self, problem: OSError) -> OutputError:
+        return OutputError(f"{printable(self.path, 300)}: {problem.strerror or problem}")
+
+
+@contextlib.contextmanager
+def _locked(handle: int) -> Iterator[None]:
+    """Lock a file against other processes, also of other machines where the system can do so."""
+    try:
+        from fcntl import LOCK_EX, LOCK_UN, lockf
+    except ImportError:  # Windows
+        yield
+        return
+    is_locked = True
+    try:
+        lockf(handle, LOCK_EX)
+    except OSError:  # a file system without locks; appended lines are still written as a whole
+        is_locked = False
+    try:
+        yield
+    finally:
+        if is_locked:
+            lockf(handle, LOCK_UN)
+
+
+def _line(result: Result) -> str:
+    """Return a result as one line of JSON; the item's fields come first."""
+    item = asdict(result.item)
+    rest = {name: getattr(result, name) for name in _NAMES}
+    ordered = {one.name: rest[one.name] for one in fields(Result) if one.name in rest}
+    ordered["seconds"] = round(result.seconds, 6)
+    return json.dumps(item | ordered, default=str, separators=(",", ":"))
+
+
+def read_results(path: Path) -> list[Result]:
+    """Read a report; of an item that was run several times, the last result counts.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Raises
+    ------
+    ViewerError
+        If it cannot be read, or is no report.
+    """
+    results: dict[tuple[str, str], Result] = {}
+    n_lines = 0
+    try:
+        with path.open(encoding="utf-8", errors="replace") as stream:
+            for line in stream:
+                n_lines += 1
+                result = _result(line)
+                if result is not None:
+                    results[result.item.name, result.item.output] = result
+    except OSError as problem:
+        raise ViewerError(f"{printable(path, 300)}: {problem.strerror or problem}") from None
+    if n_lines > 1 and not results:
+        raise ViewerError(f"{printable(path, 300)}: expected the report of a batch")
+    return list(results.values())
+
+
+def _result(line: str) -> Result | None:
+    """Return the result in a line; None if the line was cut off."""
+    try:
+        found: dict[str, Any] = json.loads(line)
+        item = Item(found["index"], tuple(found["files"]), found["output"], found["name"])
+        rest = {name: found[name] for name in _NAMES}
+    except (ValueError, KeyError, TypeError):
+        return None
+    return Result(item, **(rest | {"outputs": tuple(rest["outputs"])}))

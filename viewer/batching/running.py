@@ -1,0 +1,199 @@
+"""Run of a batch: its engine, its report, what is done already, and interruption."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import time
+from collections.abc import Callable, Generator, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, cast
+
+from viewer.batching.engines import Job, Limits, load_engine
+from viewer.batching.items import Item, Result
+from viewer.batching.keys import item_key
+from viewer.batching.report import Report, ReportFile, read_results
+from viewer.errors import ViewerError
+from viewer.interrupts import postponed, watched
+from viewer.phrases import printable
+
+__all__ = ["KeyedJob", "Settings", "related_reports", "run_batch", "shard_of"]
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a batch is run.
+
+    Attributes
+    ----------
+    engine : str
+        A key of ``ENGINES``.
+    limits : Limits
+        Processes, time and memory.
+    report : Path or None
+        The report to write; None for none.
+    existing : str
+        What to do with a report that exists: ``refuse`` it, ``replace`` it, ``append`` to it, or
+        ``resume``: append, and skip the items that it or the report of another shard lists as done.
+    identity : str
+        Job, options and version of the program, as a part of the items' keys.
+    shared : tuple of str
+        Files that all items read.
+    """
+
+    engine: str = "sequential"
+    limits: Limits = field(default_factory=Limits)
+    report: Path | None = None
+    existing: Literal["refuse", "replace", "append", "resume"] = "refuse"
+    identity: str = ""
+    shared: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class KeyedJob:
+    """A job that skips finished items.
+
+    Attributes
+    ----------
+    job : Job
+        The job of the other items.
+    identity, shared
+        As in ``Settings``.
+    finished : frozenset of str
+        Keys of finished items.
+    """
+
+    job: Job
+    identity: str
+    shared: tuple[str, ...]
+    finished: frozenset[str]
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item, unless it is finished."""
+        try:
+            key = item_key(item, self.identity, self.shared)
+        except OSError:  # the job names the file and says what is wrong with it
+            return self.job(item)
+        if key in self.finished:
+            return Result(item, "unchanged", key=key)
+        return replace(self.job(item), key=key)
+
+
+def shard_of(items: Sequence[Item], text: str) -> list[Item]:
+    """Return the items of one of several shards: every N-th item, beginning with the I-th.
+
+    Parameters
+    ----------
+    items : sequence of Item
+        All items, in the same order for all shards.
+    text : str
+        ``I/N``, with I from 0 to N - 1.
+
+    Raises
+    ------
+    ViewerError
+        If the text is not of this form.
+    """
+    first, _, count = text.partition("/")
+    if not (first.isdecimal() and count.isdecimal() and 0 < int(count) <= 10**9):
+        raise ViewerError(f"--shard: expected I/N, such as 0/8, found {printable(text, 40)}")
+    if int(first) >= int(count):
+        raise ViewerError(
+            f"--shard: expected numbers from 0/{count} to {int(count) - 1}/{count}, found {text}; "
+            f"in a SLURM array: --array=0-{int(count) - 1}"
+        )
+    return list(items[int(first) :: int(count)])
+
+
+def related_reports(path: Path) -> list[Path]:
+    """Return a report and those of the shards next to it that exist."""
+    stem = path.stem.partition(".")[0]
+    shards = sorted(path.parent.glob(f"{stem}*.jsonl")) if path.parent.is_dir() else []
+    return [one for one in dict.fromkeys([path, *shards]) if one.is_file()]
+
+
+def run_batch(
+    items: Sequence[Item],
+    job: Job,
+    settings: Settings,
+    on_result: Callable[[Result], None] | None = None,
+) -> Report:
+    """Run the items of a batch; a failed item never stops the others.
+
+    The first signal ends the batch when the items that run are finished; a second one cancels them.
+
+    Parameters
+    ----------
+    items : sequence of Item
+        The items.
+    job : Job
+        Called once per item, and again if its worker failed.
+    settings : Settings
+        Engine, limits and report.
+    on_result : callable, optional
+        Called with each result as soon as its item has finished.
+
+    Raises
+    ------
+    Interrupted
+        If a second signal cancels the batch; the report has what was finished.
+    ViewerError
+        If the batch cannot start.
+    OutputError
+        If the report cannot be written.
+    """
+    start = time.perf_counter()
+    earlier = _earlier(settings)
+    keyed: Job = job
+    if settings.report is not None:
+        keyed = KeyedJob(job, settings.identity, settings.shared, frozenset(earlier))
+    report = Report(n_items=len(items), path=settings.report)
+    with contextlib.ExitStack() as stack:
+        file = None
+        if settings.report is not None:
+            replaces = settings.existing == "replace"
+            file = stack.enter_context(ReportFile(settings.report, replaces))
+        stack.enter_context(watched())
+        signals = stack.enter_context(postponed())
+        limits = replace(settings.limits, is_stopping=lambda: bool(signals.number))
+        results = load_engine(settings.engine).run(iter(items), keyed, limits)
+        stack.callback(cast("Generator[Result]", results).close)
+        for result in results:
+            if result.status == "unchanged":
+                result = replace(earlier[result.key], item=result.item, status="unchanged")
+            elif file is not None:
+                file.add(result)
+            report.results.append(result)
+            if on_result is not None:
+                on_result(result)
+        report.signal = signals.number
+    report.seconds = time.perf_counter() - start
+    return report
+
+
+def _earlier(settings: Settings) -> dict[str, Result]:
+    """Return the results of finished items by key."""
+    if settings.report is None:
+        return {}
+    if settings.existing != "resume":
+        if settings.existing == "refuse" and _has_content(settings.report):
+            raise ViewerError(
+                f"{printable(settings.report, 300)}: already exists (--resume continues the batch, "
+                "--force starts it again)"
+            )
+        return {}
+    found = (one for path in related_reports(settings.report) for one in read_results(path))
+    return {one.key: one for one in found if one.status == "done" and one.key and _is_there(one)}
+
+
+def _has_content(path: Path) -> bool:
+    try:
+        return path.stat().st_size > 0
+    except OSError:
+        return False
+
+
+def _is_there(result: Result) -> bool:
+    """Return whether everything that an item has written still exists."""
+    return all(os.path.lexists(path) for path in result.outputs)

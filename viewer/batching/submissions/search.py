@@ -1,0 +1,60 @@
+"""Search for submissions: the folders and archives in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewer.batching.submissions.choosing import is_junk, suffix_of
+from viewer.formats import SUFFIXES
+
+__all__ = ["ARCHIVES", "Found", "find_submissions"]
+
+ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz")
+"""Suffixes of archives; of these, zip archives are opened, and the others are reported."""
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Submissions, and the files that are none.
+
+    Attributes
+    ----------
+    submissions : tuple of Path
+        Folders and archives.
+    ignored : tuple of Path
+        Other files next to them.
+    """
+
+    submissions: tuple[Path, ...]
+    ignored: tuple[Path, ...] = ()
+
+
+def find_submissions(paths: Sequence[str | Path]) -> Found:
+    """Return the submissions that paths refer to, in the order of the paths, then by name.
+
+    Parameters
+    ----------
+    paths : sequence of str or Path
+        Several paths are a submission each. A single folder is one if it directly contains
+        readable files; otherwise it contains one submission in each of its folders and archives.
+    """
+    given = [Path(path) for path in paths]
+    entries = _entries(given[0]) if len(given) == 1 else []
+    inside = [one for one in entries if one.is_dir() or suffix_of(one.name) in ARCHIVES]
+    if not inside or any(_is_rig_file(entry) for entry in entries):
+        return Found(tuple(dict.fromkeys(given)))
+    return Found(tuple(inside), tuple(one for one in entries if one not in inside))
+
+
+def _entries(folder: Path) -> list[Path]:
+    if not folder.is_dir():
+        return []
+    return sorted(one for one in folder.iterdir() if not is_junk(one.name))
+
+
+def _is_rig_file(file: Path) -> bool:
+    # Tables of grades are often next to the submissions.
+    suffix = suffix_of(file.name)
+    return file.is_file() and suffix in SUFFIXES and suffix not in (".txt", ".json")

@@ -1,0 +1,144 @@
+"""Zip archives from other people: names and sizes are checked before anything is unpacked."""
+
+from __future__ import annotations
+
+import shutil
+import stat
+import zipfile
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath, PureWindowsPath
+from typing import Any
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.formats import Source
+from viewer.formats._archive.stored_file import StoredFile
+from viewer.formats._archive.zip_directory import DAMAGE, MAX_RATIO, SMALL
+from viewer.phrases import printable
+
+__all__ = ["MOST_BYTES", "MOST_FILES", "Archive", "open_archive"]
+
+MOST_BYTES = 2 << 30
+"""Bytes of all files that are unpacked from one archive."""
+
+MOST_FILES = 5_000
+"""Files that are unpacked from one archive."""
+
+_ENCRYPTED = 0x41  # flag bits 0 and 6
+_DAMAGE = (*DAMAGE, NotImplementedError)
+
+
+@dataclass(frozen=True, slots=True)
+class Archive:
+    """An open zip archive.
+
+    Attributes
+    ----------
+    shown : Path
+        Path in messages: of the archive, below that of the archive that contains it.
+    size : int
+        Bytes of its file.
+    archive : ZipFile
+        The archive.
+    members : dict of str to ZipInfo
+        Files by path with slashes, without folders.
+    """
+
+    shown: Path
+    size: int
+    archive: zipfile.ZipFile
+    members: dict[str, zipfile.ZipInfo]
+
+    def unpack(self, names: Iterable[str], folder: Path) -> int:
+        """Write members to a folder, which must be empty; return their size in bytes.
+
+        Raises
+        ------
+        FormatError
+            If one of them is a link, encrypted or damaged, or they are too large.
+        """
+        members = {name: self.members[name] for name in names}
+        self._check(members)
+        try:
+            for name, member in members.items():
+                target = folder.joinpath(*name.split("/"))
+                target.parent.mkdir(parents=True, exist_ok=True)
+                with self.archive.open(member) as packed, target.open("xb") as file:
+                    shutil.copyfileobj(packed, file, 1 << 20)
+        except _DAMAGE as problem:
+            raise self._fault("F002.submission-zip", reason=_reason(problem)) from None
+        return sum(member.file_size for member in members.values())
+
+    def _check(self, members: dict[str, zipfile.ZipInfo]) -> None:
+        for name, member in members.items():
+            item = printable(name, 80)
+            if member.flag_bits & _ENCRYPTED:
+                raise self._fault("F002.submission-encrypted", item=item)
+            if stat.S_ISLNK(member.external_attr >> 16):
+                raise self._fault("F002.submission-link", item=item)
+            if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+                method = member.compress_type
+                raise self._fault("F002.submission-method", item=item, method=method)
+        # zipfile never returns more bytes of a member than its directory states.
+        total = sum(member.file_size for member in members.values())
+        if len(members) > MOST_FILES:
+            raise self._fault("F001.submission-count", most=MOST_FILES, found=len(members))
+        if total > MOST_BYTES:
+            raise self._fault("F001.submission-size", most=MOST_BYTES, found=total)
+        if total > max(SMALL, MAX_RATIO * self.size):
+            raise self._fault("F002.submission-ratio", most=MAX_RATIO, found=total, size=self.size)
+
+    def _fault(self, key: str, **values: Any) -> FormatError:
+        return FormatError(Diagnostic(key, self.shown, values=values))
+
+
+@contextmanager
+def open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> Iterator[Archive]:
+    """Open a zip archive whose paths all stay inside it.
+
+    Parameters
+    ----------
+    path, shown : Path
+        The file, and its path in messages.
+    is_junk : function
+        Whether a path is ignored.
+
+    Raises
+    ------
+    FormatError
+        If it is damaged, a path leads outside, or two files have the same path.
+    """
+    try:
+        storage = StoredFile(Source(path))
+        with storage.open() as file, zipfile.ZipFile(file) as archive:
+            infos = [info for info in archive.infolist() if not info.is_dir()]
+            pairs = [(_path_of(info, shown), info) for info in infos]
+            pairs = [(name, info) for name, info in pairs if not is_junk(name)]
+            for name, count in Counter(name for name, _ in pairs).items():
+                if count > 1:
+                    values = {"item": printable(name, 80), "found": count}
+                    raise FormatError(Diagnostic("F002.submission-twice", shown, values=values))
+            yield Archive(shown, storage.size, archive, dict(pairs))
+    except _DAMAGE as problem:
+        values = {"reason": _reason(problem)}
+        raise FormatError(Diagnostic("F002.submission-zip", shown, values=values)) from None
+
+
+def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
+    """Return a member's path; programs for Windows also write backslashes.
+
+    Raises FormatError if it leads outside the archive.
+    """
+    parts = PurePosixPath(info.filename.replace("\\", "/")).parts
+    windows = PureWindowsPath(info.filename)
+    if not parts or parts[0] == "/" or ".." in parts or windows.drive or windows.root:
+        values = {"item": printable(info.filename, 80)}
+        raise FormatError(Diagnostic("F002.submission-outside", shown, values=values))
+    return "/".join(parts)
+
+
+def _reason(problem: Exception) -> str:
+    return printable(getattr(problem, "strerror", None) or problem, 100)

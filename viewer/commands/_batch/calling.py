@@ -1,0 +1,174 @@
+"""Batches from Python."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from hashlib import blake2b
+from typing import TYPE_CHECKING, Any
+
+from viewer.batching.attempts import FunctionJob
+from viewer.batching.items import Item, Result
+from viewer.batching.running import run_batch
+from viewer.commands._batch.jobs import JOBS, CommandJob, job_parser
+from viewer.commands._batch.options import RETRIES
+from viewer.commands._batch.planning import Plan, Request, plan_of
+from viewer.commands._batch.requests import request_of
+from viewer.errors import ViewerError
+from viewer.interrupts import Interrupted
+from viewer.near_names import did_you_mean
+from viewer.phrases import printable
+from viewer.version import VERSION
+
+if TYPE_CHECKING:
+    from viewer.batching.engines import Job
+    from viewer.batching.report import Report
+
+__all__ = ["batch"]
+
+_Paths = str | os.PathLike[str] | Iterable[str | os.PathLike[str]]
+
+
+def batch(
+    paths: _Paths,
+    job: str | Callable[[Item], Any],
+    out: str | os.PathLike[str] = "",
+    *,
+    to: str = "",
+    options: Sequence[str] = (),
+    shared: Sequence[str | os.PathLike[str]] = (),
+    workers: int | None = None,
+    cluster: str = "",
+    shard: str = "",
+    resume: bool = False,
+    force: bool = False,
+    retries: int = RETRIES,
+    timeout: float | None = None,
+    memory: int | None = None,
+    report: str | os.PathLike[str] = "",
+    on_result: Callable[[Result], None] | None = None,
+) -> Report:
+    """Run a job for each of many files; a failed one never stops the others.
+
+    Worker processes are new interpreters: a script that uses them needs the line
+    ``if __name__ == "__main__":`` before its own work, and a function must be importable.
+
+    Parameters
+    ----------
+    paths : str, path or iterable of them
+        Files, folders, patterns such as ``data/**/*.npz``, and ``@list.txt``.
+    job : str or callable
+        A command (``convert``, ``render``, ``lint``, ``diff``, ``rig``, ``info``), or a function
+        that is called with each ``Item`` (``files``, ``output``, ``name``). A dict that it returns
+        is the ``values`` of the result; an exception makes the item a failed one.
+    out : str or path
+        A folder, in which the folders of the inputs are repeated, or a template, such as
+        ``out/{parent}/{stem}.bvh``.
+    to : str
+        Suffix of the outputs in a folder.
+    options : sequence of str
+        Options of the command, as on the command line; for ``diff``, the reference comes first.
+    shared : sequence of str or path
+        Files that are opened with every input. For a function, files that it reads.
+    workers : int, optional
+        Number of worker processes; 0 for this process. By default 0 for few inputs, otherwise one
+        per core.
+    cluster : str
+        ``local``, the address of a Dask scheduler, or ``slurm``; empty for this machine.
+    shard : str
+        ``I/N``: only every N-th input from the I-th.
+    resume : bool
+        Whether inputs are skipped that the report lists as done with the same content, options and
+        version of the program.
+    force : bool
+        Whether existing files may be replaced.
+    retries : int
+        How often an input is run again after its worker failed.
+    timeout : float, optional
+        Seconds per attempt, 600 by default; 0 for no limit. Only worker processes have one.
+    memory : int, optional
+        Bytes that a worker may use.
+    report : str or path
+        File for one line of JSON per input; by default ``report.jsonl`` in ``out``.
+    on_result : callable, optional
+        Called with each result.
+
+    Returns
+    -------
+    Report
+        Results, numbers by status, failures.
+
+    Raises
+    ------
+    ViewerError
+        If the batch cannot start: nothing matches, outputs clash or exist, a package is missing.
+    KeyboardInterrupt
+        After Ctrl-C, when the items that run are finished; a second one cancels them.
+    """
+    names = [paths] if isinstance(paths, str | os.PathLike) else paths
+    request = Request(
+        paths=[os.fspath(name) for name in names],
+        output=os.fspath(out),
+        to=to,
+        shared=[os.fspath(file) for file in shared],
+        workers=workers,
+        cluster=cluster,
+        shard=shard,
+        resume=resume,
+        force=force,
+        retries=retries,
+        timeout=timeout,
+        memory=memory,
+        report=os.fspath(report),
+    )
+    one: Job
+    if callable(job):
+        one, request = FunctionJob(job), replace(request, identity=_identity(job))
+    else:
+        one, request = _command(job, request, options)
+    return _run(plan_of(request), one, on_result)
+
+
+def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Report:
+    """Run a batch, and pass a signal on to the caller at its end."""
+    try:
+        found = run_batch(plan.items, job, plan.settings, on_result)
+    except Interrupted as stop:
+        # The caller's own handler decides, as if the signal had arrived only now.
+        signal.raise_signal(stop.number)
+        raise KeyboardInterrupt from None
+    if found.signal:
+        signal.raise_signal(found.signal)
+    return found
+
+
+def _identity(function: Callable[[Item], Any]) -> str:
+    """Return a function's name and a hash of its code, which changes with its body."""
+    code = getattr(function, "__code__", None)
+    body = b"" if code is None else code.co_code + repr(code.co_consts).encode()
+    name = getattr(function, "__qualname__", type(function).__qualname__)
+    return f"{function.__module__}.{name} {blake2b(body, digest_size=8).hexdigest()} {VERSION}"
+
+
+def _command(job: str, request: Request, options: Sequence[str]) -> tuple[CommandJob, Request]:
+    """Return a command as a job, and the request with what its options add."""
+    if job not in JOBS:
+        near = did_you_mean(job, JOBS) or f"there are {', '.join(JOBS)}"
+        raise ViewerError(f'no job is called "{printable(job, 60)}"; {near}')
+    parser = job_parser(job)
+    words = [job, *options]
+    words += [word for file in request.shared for word in ("--with", file)]
+    words += ["--output", request.output] if request.output else []
+    words += ["--resume"] * request.resume + ["--force"] * request.force
+    parser.check_options(words)
+    arguments = parser.parse_intermixed_args(words)
+    arguments.files = request.paths
+    if request.to:
+        arguments.to = request.to
+    found, command = request_of(arguments)
+    added = {
+        name: getattr(found, name) for name in ("to", "identity", "shared", "few", "keeps_folders")
+    }
+    return command, replace(request, **added)

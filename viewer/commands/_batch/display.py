@@ -1,0 +1,114 @@
+"""Progress and summary of a batch."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from collections.abc import Sequence
+
+from viewer.batching.items import Item, Result
+from viewer.batching.report import Report
+from viewer.commands._printing import table_lines
+from viewer.commands._progress import Progress
+from viewer.phrases import counted, printable
+
+__all__ = ["Display", "summary_lines"]
+
+_MINUTE = 60.0  # seconds between lines if there is no terminal
+_MOST = 20  # failures listed
+
+
+class Display:
+    """Progress of a batch: a bar in a terminal, otherwise a line per minute.
+
+    ``title``: name of the work.
+    ``items``: those of the batch.
+    ``prints``: whether the text of items is printed, in their order.
+    """
+
+    def __init__(self, title: str, items: Sequence[Item], prints: bool) -> None:
+        self._title, self.total = title, len(items)
+        self._progress = Progress(title, self.total)
+        self._start = self._said = time.monotonic()
+        self._n_done = self._n_failed = self._n_unchanged = 0
+        self._texts: dict[int, str] = {}  # of items that others must be printed before
+        self._order = deque(item.index for item in items if prints)
+
+    def show(self, result: Result) -> None:
+        """Count a result."""
+        self._n_done += 1
+        self._n_unchanged += result.status == "unchanged"
+        self._n_failed += result.status not in ("done", "unchanged")
+        now = time.monotonic()
+        rate = (self._n_done - self._n_unchanged) / max(now - self._start, 1e-3)
+        failed = f", {self._n_failed} failed" if self._n_failed else ""
+        if not (self._order and sys.stdout.isatty()):  # text in the same terminal
+            self._progress.title = f"{self._title}, {rate:.3g}/s{failed}"
+            self._progress.show(self._n_done)
+        if not sys.stderr.isatty() and now > self._said + _MINUTE:
+            self._said = now
+            left = duration((self.total - self._n_done) / max(rate, 1e-9))
+            text = f"{self._n_done} of {self.total}, {rate:.3g}/s, {left} left{failed}"
+            print(text, file=sys.stderr)
+        if self._order:
+            self._print(result)
+
+    def _print(self, result: Result) -> None:
+        text = result.text.rstrip("\n")
+        name = printable(result.item.name, 300)
+        self._texts[result.item.index] = f"{name}:\n{text}" if text and self.total > 1 else text
+        while self._order and self._order[0] in self._texts:
+            if found := self._texts.pop(self._order.popleft()):
+                print(found)
+
+    def __enter__(self) -> Display:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._progress.__exit__()
+
+
+def duration(seconds: float) -> str:
+    """Return a duration in its largest units.
+
+    >>> duration(3.21), duration(125), duration(7260)
+    ('3.2 s', '2 min 5 s', '2 h 1 min')
+    """
+    if seconds < 60.0:
+        return f"{seconds:.1f} s"
+    minutes, rest = divmod(round(seconds), 60)
+    if minutes < 60:
+        return f"{minutes} min {rest} s"
+    return f"{minutes // 60} h {minutes % 60} min"
+
+
+def summary_lines(report: Report) -> list[str]:
+    """Return the numbers of items by status, and the first failures as a table."""
+    rate = len(report.results) / max(report.seconds, 1e-3)
+    head = f"{counted(len(report.results), 'item')} in {duration(report.seconds)} ({rate:.3g}/s)"
+    parts = [f"{count} {status}" for status, count in sorted(report.counts.items())]
+    found = sum(
+        one.status in ("done", "unchanged") and one.exit_code == 1 for one in report.results
+    )
+    if found:
+        parts.append(f"{found} with findings or differences")
+    retried = sum(one.attempts > 1 for one in report.results)
+    if retried:
+        parts.append(f"{retried} run again")
+    lines = [f"{head}: {', '.join(parts)}" if parts else head]
+    failures = report.failures
+    if failures:
+        rows = [
+            [printable(one.item.name, 100), one.status, printable(one.message, 300)]
+            for one in failures[:_MOST]
+        ]
+        lines += table_lines(rows)
+        if len(failures) > _MOST:
+            lines.append(f"and {len(failures) - _MOST} more")
+    left = report.n_items - len(report.results)
+    if left:
+        lines.append(f"interrupted: {counted(left, 'item')} left; --resume continues")
+    if report.path is not None:
+        lines.append(f"report: {printable(report.path, 300)}")
+    return lines

@@ -1,0 +1,140 @@
+"""Commands as jobs of a batch: one parser and one namespace for all items."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib import import_module
+from pathlib import Path
+
+from viewer.batching.attempts import attempt
+from viewer.batching.items import Item, Result
+from viewer.commands._batch.options import add_batch_arguments
+from viewer.commands._usage import Parser
+from viewer.formats._kept import keeping_figures
+from viewer.loading import bundled_body, bundled_files
+from viewer.phrases import printable
+
+__all__ = ["JOBS", "CommandJob", "JobKind", "add_job_arguments", "job_parser"]
+
+
+@dataclass(frozen=True)
+class JobKind:
+    """Properties of a command as a job.
+
+    ``title``: description.
+    ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
+    ``writes``: ``always``, ``maybe`` or ``never``.
+    ``prints``: whether its text is the result, and printed.
+    ``few``: largest number of items for which no worker process is started.
+    ``is_folder_input``: whether each folder is an input.
+    """
+
+    title: str
+    suffix: str = ""
+    writes: str = "never"
+    prints: bool = False
+    few: int = 16
+    is_folder_input: bool = False
+
+
+JOBS = {
+    "convert": JobKind("convert many files", writes="always"),
+    "render": JobKind("render an image or video of each of many files", "png", "always", few=4),
+    "lint": JobKind("check many files", prints=True),
+    "diff": JobKind(
+        "compare many files or folders with one reference",
+        *("png", "maybe"),
+        prints=True,
+        is_folder_input=True,
+    ),
+    "rig": JobKind("transfer a rig to many meshes", "glb", "always", few=1),
+    "info": JobKind("describe many files", prints=True),
+}
+
+
+def job_parser(job: str) -> Parser:
+    """Return the parser of a job: the options of its command, and those of the batch.
+
+    ``job``: a key of ``JOBS``.
+    """
+    parser = Parser(prog=f"viewer batch {job}", description=JOBS[job].title)
+    parser.add_argument("job", choices=[job], help=argparse.SUPPRESS)
+    add_job_arguments(parser, job)
+    kind = JOBS[job]
+    known = {action.dest for action in parser._actions}
+    add_batch_arguments(parser, kind.suffix, kind.writes, "common" in known)
+    if "force" not in known:
+        parser.add_argument("--force", action="store_true", help="replace an existing report")
+    output = {"always": "-o OUT ", "maybe": "[-o OUT] ", "never": ""}[kind.writes]
+    first = "REFERENCE " if job == "diff" else ""
+    parser.usage = f"%(prog)s {first}PATHS {output}[options]"
+    return parser
+
+
+def add_job_arguments(parser: argparse.ArgumentParser, job: str) -> None:
+    """Add the arguments of a command; its files become the paths of the batch.
+
+    ``parser``: an empty parser, or one with the name of the job.
+    ``job``: a key of ``JOBS``.
+    """
+    import_module(f"viewer.commands.{job}").add_arguments(parser)
+    for action in parser._actions:  # argparse has no public name for this table
+        if action.dest == "files":
+            action.nargs, action.metavar, action.required = "*", "PATHS", False
+            action.help = (
+                "files, folders, patterns in quotes ('data/**/*.npz'), @list.txt, or - for a list "
+                "on standard input"
+            )
+        elif action.dest == "output":
+            action.required, action.metavar = False, "OUT"
+            action.help = (
+                "a folder, which repeats the folders of the inputs, or a template: "
+                "'out/{parent}/{stem}.bvh'; also {folder}, {name}, {suffix}, {index:05}"
+            )
+
+
+@dataclass(frozen=True)
+class CommandJob:
+    """A command as a job.
+
+    ``command``: a key of ``JOBS``.
+    ``arguments``: its arguments, without files and output.
+    ``fixed``: files that are opened with every item.
+    ``shared``: files that all items read, also those that options name.
+    """
+
+    command: str
+    arguments: argparse.Namespace
+    fixed: tuple[str, ...] = ()
+    shared: tuple[str, ...] = ()
+
+    @cached_property
+    def _shared(self) -> list[Path]:
+        return [*map(Path, self.shared), bundled_body(), *bundled_files()]
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item in this process."""
+        with keeping_figures(self._shared):
+            result = attempt(item, self._run)
+        if result.status == "failed" and not result.message:
+            # Commands that report on several files print what is wrong with one of them.
+            lines: Sequence[str] = result.text.strip().splitlines() or [""]
+            result = replace(result, message=printable(lines[-1].strip(), 500))
+        return result
+
+    def _run(self, item: Item) -> int:
+        given = {
+            name: [*value] if isinstance(value, list) else value
+            for name, value in vars(self.arguments).items()
+        }
+        arguments = argparse.Namespace(**given)
+        arguments.files = [*self.fixed, *item.files]
+        if "output" in given:
+            arguments.output = item.output or None
+        if item.output:
+            Path(item.output).parent.mkdir(parents=True, exist_ok=True)
+        code: int = import_module(f"viewer.commands.{self.command}").run(arguments)
+        return code

@@ -1,0 +1,164 @@
+"""Plan of a batch: its items, job and settings, checked before anything starts."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from viewer.batching.engines import Limits
+from viewer.batching.inputs import find_inputs
+from viewer.batching.items import Item
+from viewer.batching.naming import check_outputs, has_fields, items_of, template_of
+from viewer.batching.running import Settings, shard_of
+from viewer.commands._batch.options import RETRIES, TIMEOUT
+from viewer.errors import OutputError, ViewerError
+from viewer.phrases import counted, listed, printable
+
+__all__ = ["Plan", "Request", "plan_of"]
+
+_SMALL = 50e6  # bytes of all inputs; above that, even few are run by workers
+_LISTED = 10  # names in a message
+
+
+@dataclass(frozen=True)
+class Request:
+    """What the user asks for; the options of the same names describe it.
+
+    ``identity``: job, options and version, as a part of the items' keys.
+    ``shared``: files that all items read.
+    ``few``: largest number of items for which no worker process is started.
+    ``memory``: bytes that a worker may use; None for no limit.
+    """
+
+    paths: Sequence[str]
+    lists: Sequence[str] = ()
+    output: str = ""
+    to: str = ""
+    keeps_folders: bool = False
+    identity: str = ""
+    shared: Sequence[str] = ()
+    few: int = 16
+    workers: int | None = None
+    cluster: str = ""
+    shard: str = ""
+    resume: bool = False
+    force: bool = False
+    retries: int = RETRIES
+    timeout: float | None = None
+    memory: int | None = None
+    report: str = ""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The items of a batch, or of its shard, and how they are run.
+
+    ``notes``: messages about inputs and processes.
+    """
+
+    items: Sequence[Item]
+    settings: Settings
+    notes: tuple[str, ...] = ()
+
+
+def plan_of(request: Request) -> Plan:
+    """Return a plan.
+
+    Raises ViewerError if an input is missing, options contradict each other, or a file would be
+    written twice or replaced.
+    """
+    inputs = find_inputs(request.paths, request.lists, keeps_folders=request.keeps_folders)
+    template = template_of(request.output, request.to) if request.output else ""
+    items = items_of(inputs, template)
+    check_outputs(items, request.shared)
+    if request.shard:
+        items = shard_of(items, request.shard)
+    report = _report_of(request)
+    if request.resume and report is None:
+        raise ViewerError("--resume: expected --report FILE, or a folder for the outputs")
+    if not (request.force or request.resume):
+        _check_free(items)
+    engine, limits, note = _processes(request, items)
+    settings = Settings(
+        engine, limits, report, _existing(request), request.identity, tuple(request.shared)
+    )
+    return Plan(items, settings, (*inputs.notes, *note))
+
+
+def _report_of(request: Request) -> Path | None:
+    """Return the report's path: next to the outputs, unless another one is given."""
+    if request.report:
+        return Path(request.report)
+    folder = request.output
+    if has_fields(folder):
+        folder = os.path.dirname(folder.partition("{")[0])
+    if not folder:
+        return None
+    part = f".{request.shard.replace('/', '-of-')}" if request.shard else ""
+    return Path(folder, f"report{part}.jsonl")
+
+
+def _existing(request: Request) -> Literal["refuse", "replace", "append", "resume"]:
+    """Return what is done with a report that exists."""
+    if request.resume:
+        return "resume"
+    if request.shard and request.report:
+        return "append"  # other shards write to the same file
+    return "replace" if request.force else "refuse"
+
+
+def _check_free(items: Sequence[Item]) -> None:
+    """Refuse to replace outputs; those of numbered files are checked item by item."""
+    taken = [item.output for item in items if item.output and os.path.lexists(item.output)]
+    if taken:
+        verb = "exists" if len(taken) == 1 else "exist"
+        names = listed([printable(path, 300) for path in taken], _LISTED)
+        raise OutputError(
+            f"{counted(len(taken), 'output')} already {verb}: {names} (--resume continues the "
+            "batch, --force replaces them)"
+        )
+
+
+def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, list[str]]:
+    """Return the engine, its limits and a message.
+
+    Few small inputs are run in this process, because starting workers takes about a second.
+    """
+    timeout = TIMEOUT if request.timeout is None else request.timeout or None
+    if timeout is not None and timeout < 0.0:
+        raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
+    limits = Limits(request.workers or 1, request.retries, timeout, request.memory, request.cluster)
+    if request.cluster:
+        return "dask_cluster", limits, []
+    is_limited = request.timeout is not None or request.memory is not None
+    workers = request.workers
+    if workers is None:
+        is_few = len(items) <= request.few and _size(items) < _SMALL
+        workers = 0 if is_few and not is_limited else _cores()
+        if workers and not is_limited and importlib.util.find_spec("pebble") is None:
+            note = "without pebble, one process runs everything (pip install pebble)"
+            return "sequential", limits, [note]
+    elif workers == 0 and is_limited:
+        raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
+    if workers == 0:
+        return "sequential", limits, []
+    limits = Limits(max(1, min(workers, len(items))), request.retries, timeout, request.memory)
+    return "processes", limits, []
+
+
+def _size(items: Sequence[Item]) -> int:
+    """Return the number of bytes of files; folders count as none."""
+    return sum(
+        os.path.getsize(file) for item in items for file in item.files if os.path.isfile(file)
+    )
+
+
+def _cores() -> int:
+    """Return the number of cores that this process may use, as batch systems assign them."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -1,0 +1,105 @@
+"""Requests for a batch of commands, from the parsed command line."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Iterator
+
+from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
+from viewer.commands._batch.planning import Request
+from viewer.commands._diff.inputs import input_files
+from viewer.commands._scene import parse_bytes
+from viewer.commands._usage import Parser
+from viewer.errors import ViewerError
+from viewer.models import resolve, save_model_folder
+from viewer.phrases import printable
+from viewer.version import VERSION
+
+__all__ = ["request_of"]
+
+_NOT_RESULTS = ("files", "output", "force", "model_path", "json")
+"""Arguments on which the content of the outputs does not depend."""
+
+
+def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
+    """Return the request and the job of a command line.
+
+    ``arguments``: from a parser of ``job_parser``.
+    Raises ViewerError if an option is missing or wrong.
+    """
+    name = arguments.job
+    kind = JOBS[name]
+    output = getattr(arguments, "output", None) or ""
+    if kind.writes == "always" and not output:
+        raise ViewerError(
+            f"expected -o OUT, a folder or a template, found none ({name} writes files)"
+        )
+    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
+    for file in fixed:
+        if not os.path.exists(file):
+            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
+    command = _command_arguments(arguments)
+    if arguments.resume and hasattr(command, "force"):
+        # Outputs of items that the report does not list were written by a run that was killed.
+        command.force = True
+    memory = (
+        parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
+    )
+    request = Request(
+        paths=arguments.files,
+        lists=arguments.from_list,
+        output=output,
+        to=_suffix(arguments, kind.suffix),
+        keeps_folders=kind.is_folder_input,
+        identity=_identity(name, command),
+        shared=tuple(dict.fromkeys([*fixed, *_files_in(command)])),
+        few=kind.few,
+        workers=arguments.workers,
+        shard=arguments.shard,
+        resume=arguments.resume,
+        force=arguments.force,
+        retries=arguments.retries,
+        timeout=arguments.timeout,
+        memory=memory,
+        report=arguments.report or "",
+    )
+    return request, CommandJob(name, command, tuple(fixed), tuple(request.shared))
+
+
+def _suffix(arguments: argparse.Namespace, default: str) -> str:
+    """Return the suffix of the outputs in a folder; a template has its own."""
+    given: str = getattr(arguments, "to", "")
+    return given or ("" if "{" in (getattr(arguments, "output", None) or "") else default)
+
+
+def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
+    """Return the arguments of the job's command."""
+    parser = Parser(prog=f"viewer {arguments.job}")
+    add_job_arguments(parser, arguments.job)
+    names = {action.dest for action in parser._actions if action.dest != "help"}
+    names |= parser._defaults.keys()
+    command = argparse.Namespace(**{name: getattr(arguments, name) for name in names})
+    if getattr(command, "model_path", None) is not None:
+        save_model_folder(command.model_path)  # once, not for each item
+        command.model_path = None
+    return command
+
+
+def _identity(job: str, command: argparse.Namespace) -> str:
+    """Return job, options and version as text that is equal if the results are."""
+    options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
+    return json.dumps([job, VERSION, options], sort_keys=True, default=str)
+
+
+def _files_in(command: argparse.Namespace) -> Iterator[str]:
+    """Yield the files that options name, such as that of ``--model``."""
+    for name, value in sorted(vars(command).items()):
+        if name in _NOT_RESULTS:
+            continue
+        for text in value if isinstance(value, list) else [value]:
+            if name == "reference":
+                yield from map(str, input_files(text))
+            elif isinstance(text, str) and os.path.isfile(resolve(text)):
+                yield str(resolve(text))

@@ -1,0 +1,85 @@
+"""Many files through one command: workers, report, resumption, shards."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from viewer.commands._batch.display import Display, summary_lines
+from viewer.commands._batch.jobs import JOBS, job_parser
+from viewer.commands._batch.options import add_batch_arguments
+from viewer.commands._batch.planning import plan_of
+from viewer.commands._batch.requests import request_of
+from viewer.commands._scene import print_warnings
+from viewer.commands._usage import Parser
+from viewer.errors import ViewerError
+from viewer.near_names import did_you_mean
+from viewer.phrases import printable
+
+__all__ = ["add_arguments", "parser_of", "run"]
+
+_FAILED = 1  # exit code
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments that all jobs share."""
+    names = ", ".join(JOBS)
+    parser.usage = "%(prog)s JOB PATHS [-o OUT] [options of the job] [options]"
+    parser.add_argument(
+        "job",
+        nargs="?",
+        metavar="JOB",
+        help=f"{names}; viewer batch JOB --help lists its options too",
+    )
+    parser.add_argument(
+        "files",
+        nargs="*",
+        metavar="PATHS",
+        help="files, folders, patterns in quotes ('data/**/*.npz'), @list.txt, or - for a list on "
+        "standard input",
+    )
+    parser.add_argument(
+        "-o",
+        "--output",
+        metavar="OUT",
+        help="a folder, which repeats the folders of the inputs, or a template: "
+        "'out/{parent}/{stem}.bvh'; also {folder}, {name}, {suffix}, {index:05}",
+    )
+    parser.add_argument("--force", action="store_true", help="replace existing files")
+    add_batch_arguments(parser)
+
+
+def parser_of(words: Sequence[str]) -> Parser | None:
+    """Return the parser of a job with the options of its command; None if no job is named.
+
+    ``words``: the arguments.
+    Raises ViewerError for a word that is no job.
+    """
+    word = next(iter(words), "-")
+    if word in JOBS:
+        return job_parser(word)
+    if word.startswith("-"):
+        return None
+    near = did_you_mean(word, JOBS)
+    raise ViewerError(
+        f'expected a job, one of {", ".join(JOBS)}, found "{printable(word, 60)}"'
+        f"{f'; {near}' if near else ''}"
+    )
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the batch; return 1 if an item failed, or has findings or differences."""
+    from viewer.batching.running import run_batch
+
+    if arguments.job is None:
+        raise ViewerError(f"expected a job, one of {', '.join(JOBS)}, found none")
+    request, job = request_of(arguments)
+    plan = plan_of(request)
+    print_warnings(plan.notes)
+    prints = JOBS[arguments.job].prints
+    with Display(arguments.job, plan.items, prints) as display:
+        report = run_batch(plan.items, job, plan.settings, display.show)
+    print("\n".join(summary_lines(report)))
+    if report.signal:
+        return 128 + report.signal
+    return 0 if report.is_complete else _FAILED

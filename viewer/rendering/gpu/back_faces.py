@@ -1,0 +1,131 @@
+"""Where the back faces of an actor's surface can be seen, so that hidden ones are not drawn.
+
+Half the triangles of a closed surface face away from the eye, and those in front of them hide
+them. Drawing them takes almost half of a frame on software drivers, which shade hidden samples
+too. An open surface, or a camera inside the figure, shows them; small openings show them in the
+part of the image that they cover.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.joint_spheres import box_spheres, skin_spheres
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.shell import Shell
+from viewer.rig.inspection.single_vertices import rest_vertices
+from viewer.rig.kinematics import posed_skeleton
+from viewer.rig.mesh import bounding_box
+from viewer.rig.pose import Pose
+from viewer.rig.skinning import Skinning, skinned
+
+__all__ = ["BackFaces", "Region"]
+
+Region = tuple[int, int, int, int]
+"""Left, bottom, width and height in pixels, from the lower left corner."""
+
+_MARGIN = 2  # pixels around openings, for the rounding of the rasterizer
+_LARGEST = 0.25  # of the image: with larger openings, drawing twice gains nothing
+
+
+class BackFaces:
+    """The visible back faces of one actor.
+
+    Parameters
+    ----------
+    mesh : MeshBuffers
+        The actor's mesh.
+    """
+
+    def __init__(self, mesh: MeshBuffers) -> None:
+        self._mesh = mesh
+        self._spheres: Floats | None = None
+        self._borders: Floats = np.zeros((0, 3))
+
+    def update(self, figure: Figure, pose: Pose | None, how: Skinning) -> None:
+        """Adopt a pose.
+
+        Parameters
+        ----------
+        figure : Figure
+            Figure with its shape applied.
+        pose : Pose or None
+            DOFs in lengths and radians; None for the bind pose.
+        how : Skinning
+            Method and influences.
+        """
+        shell = self._mesh.shell
+        self._spheres = None
+        if shell is None or not _is_together(shell, figure, how):
+            return
+        if pose is None:
+            positions = figure.require_mesh().positions
+            self._spheres = box_spheres(bounding_box(positions))
+            self._borders = positions[shell.borders]
+        elif _has_one_side(figure, pose):
+            self._spheres = skin_spheres(figure, pose)
+            self._borders = _posed_vertices(figure, pose, how, shell)
+
+    def regions(
+        self, model_view: Floats, projection: Floats, viewport: Region
+    ) -> tuple[Region, ...] | None:
+        """Return the regions of the image where back faces can be seen; None for all of it.
+
+        Parameters
+        ----------
+        model_view : (4, 4)
+            Figure to camera space.
+        projection : (4, 4)
+            Camera to clip space.
+        viewport : (int, int, int, int)
+            Region of the framebuffer that is drawn to.
+        """
+        spheres = self._spheres
+        if spheres is None:
+            return None
+        matrix = projection @ model_view
+        near = matrix[2] + matrix[3]
+        distances = spheres[:, :3] @ near[:3] + near[3] - spheres[:, 3] * np.linalg.norm(near[:3])
+        if not distances.min(initial=np.inf) > 0.0:
+            return None  # the near plane may cut the surface open
+        if not len(self._borders):
+            return ()
+        clip = self._borders @ matrix[[0, 1, 3], :3].T + matrix[[0, 1, 3], 3]
+        left, bottom, width, height = viewport
+        pixels = (0.5 + 0.5 * clip[:, :2] / clip[:, 2:]) * (width, height)
+        low = np.clip(pixels.min(axis=0) - _MARGIN, 0, (width, height))
+        high = np.clip(pixels.max(axis=0) + _MARGIN, 0, (width, height))
+        x, y = (math.floor(edge) for edge in low.tolist())
+        across, up = (math.ceil(edge) for edge in high.tolist())
+        area = (across - x) * (up - y)
+        if area > _LARGEST * width * height:
+            return None
+        return ((left + x, bottom + y, across - x, up - y),) if area else ()
+
+
+def _is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
+    """Return whether coincident vertices are still together before skinning."""
+    if not len(shell.copies):
+        return True
+    corrected = how.correctives and figure.correctives is not None
+    return not corrected and shell.is_closed(figure.require_mesh().positions)
+
+
+def _has_one_side(figure: Figure, pose: Pose) -> bool:
+    """Return whether all joints reflect, or none does, and no joint flattens."""
+    palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
+    volumes = np.linalg.det(palette[:, :3, :3])
+    return bool((volumes > 0.0).all() or (volumes < 0.0).all())
+
+
+def _posed_vertices(figure: Figure, pose: Pose, how: Skinning, shell: Shell) -> Floats:
+    if not len(shell.borders):
+        return np.zeros((0, 3))
+    mesh, skin = figure.require_mesh(), figure.require_skin()
+    palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
+    rest = rest_vertices(figure, pose, shell.borders, how.correctives)
+    return skinned(mesh, skin, rest, palette, how, shell.borders)[0]

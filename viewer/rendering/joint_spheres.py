@@ -1,0 +1,86 @@
+"""Spheres about the joints of a posed figure that contain its skinned vertices."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.kinematics import posed_skeleton
+from viewer.rig.memo import Memo
+from viewer.rig.pose import Pose
+from viewer.rig.skin import Skin, bind_positions, owners
+
+__all__ = ["box_spheres", "skin_spheres", "stretch"]
+
+_MARGIN = 1.03  # margin for pose correctives and for skinning methods that do not blend linearly
+
+_reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
+
+
+def skin_spheres(figure: Figure, pose: Pose) -> Floats:
+    """Return spheres around the vertices of a figure, from its joints alone.
+
+    A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
+    it lies in the convex hull of spheres about the joints that reach to their farthest vertices.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with mesh, skeleton and skin, already shaped.
+    pose : Pose
+        DOFs in lengths and radians; its placement is not applied.
+
+    Returns
+    -------
+    (N, 4)
+        Centre and radius of each joint with influence, figure space.
+    """
+    skin = figure.require_skin()
+    centers, radii = _reaches.get(figure, (), lambda: _reaches_of(figure, skin))
+    palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
+    used = radii >= 0.0
+    if not used.all():
+        palette, centers, radii = palette[used], centers[used], radii[used]
+    moved = (palette[:, :3, :3] @ centers[..., None])[..., 0] + palette[:, :3, 3]
+    return np.column_stack([moved, _MARGIN * radii * stretch(palette)])
+
+
+def stretch(matrices: Floats) -> Floats:
+    """Return an upper bound of how much matrices lengthen vectors; exact for rotations.
+
+    The spectral norm is at most the root of the largest row sum of M^T M.
+
+    Parameters
+    ----------
+    matrices : (..., 4, 4)
+        Affine matrices.
+
+    Returns
+    -------
+    (...)
+        Factors.
+    """
+    linear = matrices[..., :3, :3]
+    products = np.abs(np.swapaxes(linear, -1, -2) @ linear)
+    return np.sqrt(products.sum(axis=-1).max(axis=-1))
+
+
+def _reaches_of(figure: Figure, skin: Skin) -> tuple[Floats, Floats]:
+    """Return each joint's bind position, (J, 3), and the distance of its farthest vertex, (J,).
+
+    The distance is -1 for joints without influence.
+    """
+    centers, positions = bind_positions(skin), figure.require_mesh().positions
+    used = skin.weights != 0.0
+    joints = skin.joints[used]
+    away = np.linalg.norm(positions[owners(skin)[used]] - centers[joints], axis=1)
+    radii = np.full(len(centers), -1.0)
+    np.maximum.at(radii, joints, away)
+    return centers, radii
+
+
+def box_spheres(box: Floats) -> Floats:
+    """Return the corners of a box, (2, 3), as spheres of radius 0: (8, 4)."""
+    corners = np.array(np.meshgrid(*box.T, indexing="ij")).reshape(3, -1).T
+    return np.pad(corners, ((0, 0), (0, 1)))

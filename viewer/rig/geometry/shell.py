@@ -1,0 +1,133 @@
+"""Surfaces that enclose a volume, except for small openings: their inside is hidden.
+
+A ray from outside meets the front of such a surface before its back, unless it enters through an
+opening. Only where skinning turns the surface inside out does it meet the back first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.geometry.topology import components, welded
+from viewer.rig.mesh import Mesh, area_vectors
+from viewer.rig.skin import Skin, skin_rows
+
+__all__ = ["Shell", "shell_of"]
+
+_MOST_TRIANGLES = 500_000  # larger meshes take longer to examine than is gained
+_MOST_OPEN = 256  # edges of openings; they are projected in every image
+# Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
+_CLOSED = 0.25
+_HOLLOW = 1e-6  # volume relative to area^1.5 that is rounding: of two sheets that coincide
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shell:
+    """A closed surface whose triangles are counter-clockwise from outside.
+
+    Attributes
+    ----------
+    borders : (B,) int32
+        Vertices around its openings.
+    copies, originals : (N,) int32
+        Vertices that are at the same position, in pairs; closed as long as they stay together.
+    """
+
+    borders: Ints
+    copies: Ints
+    originals: Ints
+
+    def is_closed(self, positions: Floats) -> bool:
+        """Return whether coincident vertices are still together at positions (V, 3)."""
+        return np.array_equal(positions[self.copies], positions[self.originals])
+
+
+def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
+    """Return the shell that a mesh is; None for any other surface.
+
+    Parameters
+    ----------
+    mesh : Mesh
+        In the bind pose.
+    skin : Skin or None
+        Vertices at the same position must have the same influences.
+
+    Returns
+    -------
+    Shell or None
+        None if edges belong to more than two triangles, if neighbours face opposite sides, if a
+        connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
+    """
+    if not 0 < mesh.n_triangles <= _MOST_TRIANGLES:
+        return None
+    every = np.arange(mesh.n_vertices, dtype=np.int32)
+    same = welded(mesh.positions, every)
+    copies = np.flatnonzero(same != every).astype(np.int32)
+    originals = same[copies].astype(np.int32)
+    if skin is not None and not _move_together(skin, copies, originals):
+        return None
+    corners = same[mesh.triangles]
+    a, b, c = corners.T
+    corners = corners[(a != b) & (b != c) & (c != a)]
+    found = _neighbours(corners)
+    if found is None:
+        return None
+    pairs, is_open = found
+    if is_open.sum() > _MOST_OPEN or not _face_outwards(mesh.positions, corners, pairs, is_open):
+        return None
+    borders = np.unique(corners.ravel()[is_open]).astype(np.int32)
+    return Shell(borders, copies, originals)
+
+
+def _move_together(skin: Skin, copies: Ints, originals: Ints) -> bool:
+    first, second = skin_rows(skin, copies), skin_rows(skin, originals)
+    return (
+        np.array_equal(first.starts, second.starts)
+        and np.array_equal(first.joints, second.joints)
+        and np.array_equal(first.weights, second.weights)
+    )
+
+
+def _neighbours(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools] | None:
+    """Return pairs of adjacent triangles and which of the 3 T edges have no second triangle.
+
+    None if an edge has more than two triangles or two that traverse it in the same direction.
+    """
+    start, end = corners.ravel(), np.roll(corners, -1, axis=1).ravel()
+    keys = np.minimum(start, end) * (int(start.max(initial=0)) + 1) + np.maximum(start, end)
+    order = np.argsort(keys)
+    ordered = keys[order]
+    twice = ordered[1:] == ordered[:-1]
+    if (twice[1:] & twice[:-1]).any():
+        return None
+    pairs = np.stack([order[:-1][twice], order[1:][twice]], axis=1)
+    forward = start < end
+    if (forward[pairs[:, 0]] == forward[pairs[:, 1]]).any():
+        return None
+    is_open = np.ones(len(keys), dtype=np.bool_)
+    is_open[pairs.ravel()] = False
+    return pairs // 3, is_open
+
+
+def _face_outwards(
+    positions: Floats, corners: NDArray[np.int64], pairs: NDArray[np.int64], is_open: Bools
+) -> bool:
+    """Return whether every connected part encloses a positive volume."""
+    count = len(corners)
+    labels = components(count, pairs)
+    # The mean as the shared corner of all tetrahedra: a small opening hardly changes the sum.
+    centered = positions - positions.mean(axis=0)
+    doubled = area_vectors(centered, corners.astype(np.int32))
+    sums = np.einsum("ta,ta->t", centered[corners[:, 0]], doubled)
+    volumes = np.bincount(labels, sums / 6.0, count)
+    areas = np.bincount(labels, 0.5 * np.sqrt(np.einsum("ta,ta->t", doubled, doubled)), count)
+    sizes = np.bincount(labels, minlength=count)
+    open_edges = np.bincount(np.repeat(labels, 3)[is_open], minlength=count)
+    parts = sizes > 0
+    is_outward = volumes[parts] > _HOLLOW * areas[parts] ** 1.5
+    is_closed = open_edges[parts] ** 2 <= _CLOSED * sizes[parts]
+    return bool((is_outward & is_closed).all())
