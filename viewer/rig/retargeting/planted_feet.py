@@ -41,8 +41,8 @@ _EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its leng
 _EASE = 0.3  # seconds over which a correction begins and ends outside contacts
 # Cosine of the angle between the sole and the ground: nothing is held up to the first value, and
 # everything from the second one on.
-_ON_SOLE = (0.3, 0.7)
-_ON_SIDE = (0.1, 0.3)
+_ON_SOLE = (-0.1, 0.3)
+_ON_SIDE = (-0.1, 0.1)
 _ALIKE = 1e-4  # relative to the body
 _ROUNDING = 1e-6  # relative to the body
 _SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
