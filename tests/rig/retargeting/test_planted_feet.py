@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 from rig.retargeting.rest_twins import NAMES, PERSON, Y, along_x, t_pose, written
 from rig.retargeting.two_people import figure_of, places
@@ -19,6 +18,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.planted_feet import plant_feet
 from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.shape import rest_joints
 
 SIDES = ("Left", "Right")
 PLATEAU = 8  # frames of a stance during which the foot already rolls off or still lands
@@ -52,6 +52,11 @@ def planted(figure: Figure = OTHER, axes: Floats | None = None, **how: float):
     motion = written(t_pose() if axes is None else axes, *walk(**how), rate=RATE)
     found = retargeted(motion, figure, source_rest="auto")
     return found, *plant_feet(found, figure)
+
+
+def parents(figure: Figure) -> list[str]:
+    names = figure.skeleton.names
+    return ["" if parent < 0 else names[parent] for parent in figure.skeleton.parents]
 
 
 def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floats]:
@@ -127,8 +132,29 @@ def test_the_rest_pose_of_the_file_does_not_matter() -> None:
         assert_allclose(first[name], second[name], atol=0.5)  # cm: the rest pose is estimated
 
 
-@pytest.mark.parametrize("up", ["y", "z"])
-def test_a_figure_with_the_proportions_of_the_source_is_unchanged(up) -> None:
+def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
+    over = axis_rotations(0, np.asarray(np.pi / 2))
+    joints = zip(parents(OTHER), rest_joints(OTHER), strict=True)
+    table = dict(zip(OTHER.skeleton.names, joints, strict=True))
+    figure = figure_of(table, "z", over, up="z")
+    upright, found = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    for name in TOES:
+        assert_allclose(found[name], upright[name] @ over.T, atol=1e-9)
+
+
+def test_a_root_with_a_scale_is_understood() -> None:
+    skeleton = OTHER.skeleton
+    moved, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
+    moved[0] *= 0.01
+    scales[0] = 0.01
+    small = replace(skeleton, rest_translations=moved, rest_scales=scales)
+    figure = replace(OTHER, skeleton=small)
+    first, second = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    for name in TOES:
+        assert_allclose(100.0 * second[name], first[name], atol=1e-9)
+
+
+def test_a_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
     twin = figure_of({f"{n}_": (p and f"{p}_", q) for n, (p, q) in PERSON.items()}, "same")
     found, clip, changes = planted(twin)
     assert changes is None and clip is found.clip
