@@ -1,4 +1,4 @@
-"""The option for the feet of figures that a motion drives."""
+"""Feet of figures that a file drives, and the option for them."""
 
 from __future__ import annotations
 
