@@ -9,13 +9,14 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.foot_lock import legs_of
 from viewer.rig.cleanup.frame_rows import runs_of
-from viewer.rig.cleanup.leg_ik import Leg
+from viewer.rig.cleanup.leg_ik import Leg, reach
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
 from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.chain_worlds import Chains, chain_worlds, chains_to
+from viewer.rig.retargeting.rest_poses import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.retargeting.source_contacts import FootPath
 from viewer.rig.scene import figure_pose
@@ -24,6 +25,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
+_ALIKE = 1e-4  # relative to the body
 _STEEP = 0.9  # sine of the steepest foot of somebody who stands
 
 
@@ -35,11 +37,12 @@ class LegPair:
     ----------
     leg : Leg
         Joints of the figure.
-    ankle, toe : int
-        Joints of the source; equal if its foot has no ball.
+    hip, ankle, toe : int
+        Joints of the source; ankle and toe are equal if its foot has no ball.
     """
 
     leg: Leg
+    hip: int
     ankle: int
     toe: int
 
@@ -92,6 +95,15 @@ class DrivenLegs:
         normals = np.einsum("nlab,lb->nla", ankles, self.level)
         return normals @ up / np.linalg.norm(normals, axis=2)
 
+    def straightness(self, worlds: Floats) -> Floats:
+        """Return the distance from hip to ankle as a fraction of each leg's length: (N, L)."""
+        result = np.empty((len(worlds), len(self.legs)))
+        for number, leg in enumerate(self.legs):
+            hips, knees, ankles = (worlds[:, j, :3, 3] for j in (leg.hip, leg.knee, leg.ankle))
+            distance = np.linalg.norm(ankles - hips, axis=1)
+            result[:, number] = distance / reach(hips, knees, ankles)
+        return result
+
     def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
         """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""
         ankles = [worlds[:, leg.ankle, :3, 3] for leg in self.legs]
@@ -116,14 +128,14 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
 
 
 def leg_pairs(found: Retargeted, skeleton: Skeleton) -> list[LegPair]:
-    """Return the legs of the figure whose ankles are driven, left before right."""
+    """Return the legs of the figure whose hips and ankles are driven, left before right."""
     source = found.source.figure.require_skeleton()
     toes = {leg.ankle: leg.toe for leg in legs_of(source)}
     pairs = []
     for leg in legs_of(skeleton):
-        ankle = int(found.matches.partners[leg.ankle])
-        if ankle >= 0:
-            pairs.append(LegPair(leg, ankle, toes.get(ankle, ankle)))
+        hip, ankle = (int(found.matches.partners[joint]) for joint in (leg.hip, leg.ankle))
+        if min(hip, ankle) >= 0:
+            pairs.append(LegPair(leg, hip, ankle, toes.get(ankle, ankle)))
     return pairs
 
 
@@ -185,6 +197,37 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
     return 2.0 * float(max(lengths))
 
 
+def has_source_proportions(
+    found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
+) -> bool:
+    """Return whether the legs of a figure are as long as those of the source, as scaled.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    pairs : list of LegPair
+        The legs.
+    size : float
+        About the height of the figure.
+    """
+    partners = found.matches.partners
+    target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
+    joints = [
+        joint
+        for pair in pairs
+        for joint in (pair.leg.hip, pair.leg.knee, pair.leg.ankle, pair.leg.toe)
+        if partners[joint] >= 0
+    ]
+    bones = []
+    for skeleton, chosen in ((target, joints), (source, partners[joints])):
+        points = rest_of(skeleton, np.eye(3), "y").points[chosen]
+        bones.append(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    return bool(np.abs(bones[0] - found.scale * bones[1]).max() < _ALIKE * size)
+
+
 def foot_paths(
     found: Retargeted,
     clip: SampledClip,
@@ -209,21 +252,25 @@ def foot_paths(
         The up axis.
     """
     skeleton = found.source.figure.require_skeleton()
-    chains = chains_to(skeleton, [joint for pair in pairs for joint in (pair.ankle, pair.toe)])
+    chains = chains_to(
+        skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
+    )
     rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
     still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
     rest = chain_worlds(still, chains, *rests)[0]
     world = chain_worlds(clip, chains, *rests)
     axes, result = found.scale * found.to_target, []
     for pair, own in zip(pairs, vectors, strict=True):
-        ankle, toe = (int(chains.place[joint]) for joint in (pair.ankle, pair.toe))
+        ends = (pair.hip, pair.ankle, pair.toe)
+        hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
+        above = world[:, hip, :3, 3] @ axes.T
         place = world[:, ankle, :3, 3] @ axes.T
         upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
         height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
         length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
         if not 0.0 < height < _STEEP * length:
-            result.append(FootPath(place + own[0], place + own[1]))
+            result.append(FootPath(place + own[0], place + own[1], above))
             continue
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
-        result.append(FootPath(world[:, toe, :3, 3] @ axes.T, heel @ axes.T))
+        result.append(FootPath(world[:, toe, :3, 3] @ axes.T, heel @ axes.T, above))
     return result

@@ -2,8 +2,9 @@
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
 moves slowly and is no higher than the other point of the foot; both with hysteresis. A foot stands
-only if, at some time in the contact, it is the lowest foot: a foot that is held still in the air is
-not. So the ground need not be flat: every contact has its own height, as on stairs.
+only if, at some time in the contact, it is the lowest foot, not one that is held still in the air,
+and if it is below its hip, not beside it as that of somebody who lies. So the ground need not be
+flat: every contact has its own height, as on stairs.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"
 _SLOW, _FAST = 0.08, 0.2  # per second: a contact begins, and ends
 _LOW, _HIGH = 0.015, 0.025  # above the lower point of the foot: a contact begins, and ends
 _LOWEST = 0.02  # a foot this far above the other one may be the lowest
+_UPRIGHT = 0.3  # sine of the slope from the heel to the hip of somebody who does not lie
 _SHORTEST = 0.1  # seconds
 _LEVEL = 0.015  # heights this close are one level
 _GROUND = (-0.015, 0.06)  # heights of feet that stand on a ground at height 0
@@ -40,10 +42,13 @@ class FootPath:
     ----------
     toe, heel : (N, 3)
         Positions of the ball and of a point below the ankle; equal if there is no ball.
+    hip : (N, 3)
+        Positions of the hip.
     """
 
     toe: Floats
     heel: Floats
+    hip: Floats
 
     def lowest(self, up: Floats) -> Floats:
         """Return the height of the lower one of both points: (N,)."""
@@ -109,6 +114,9 @@ def foot_contacts(
                 if b - a < _shortest(rate) or not is_lowest[rows].any():
                     continue
                 slow = hold[a:b] >= 1.0
+                legs = (foot.hip[rows] - foot.heel[rows])[slow]
+                if np.median(legs @ up - _UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+                    continue
                 height = float(np.median(lows[number, rows][slow]))
                 tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
                 found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
