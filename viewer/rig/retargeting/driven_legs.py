@@ -16,12 +16,12 @@ from viewer.rig.motion.evaluation import rest_translations_of
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.chain_worlds import Chains, chain_worlds, chains_to
+from viewer.rig.retargeting.leg_chains import animal_legs
 from viewer.rig.retargeting.rest_poses import rest_of
 from viewer.rig.retargeting.retarget import Retargeted
 from viewer.rig.retargeting.source_contacts import FootPath
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import shaped
-from viewer.rig.skeleton import Skeleton
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
@@ -39,12 +39,15 @@ class LegPair:
         Joints of the figure.
     hip, ankle, toe : int
         Joints of the source; ankle and toe are equal if its foot has no ball.
+    is_digitigrade : bool
+        Whether the foot stands on its toes, as that of an animal, and never on its heel.
     """
 
     leg: Leg
     hip: int
     ankle: int
     toe: int
+    is_digitigrade: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,6 +68,8 @@ class DrivenLegs:
         The direction that points up in a standing foot, in the ankle's space.
     rests : (2, J, 3)
         Rest translations and scales of the skeleton.
+    extensions : (L,)
+        Distance from hip to ankle in the rest pose, as a fraction of the leg's length.
     size : float
         About the height of the body.
     clearance : float
@@ -77,6 +82,7 @@ class DrivenLegs:
     heels: Floats
     level: Floats
     rests: Floats
+    extensions: Floats
     size: float
     clearance: float
 
@@ -96,13 +102,8 @@ class DrivenLegs:
         return normals @ up / np.linalg.norm(normals, axis=2)
 
     def straightness(self, worlds: Floats) -> Floats:
-        """Return the distance from hip to ankle as a fraction of each leg's length: (N, L)."""
-        result = np.empty((len(worlds), len(self.legs)))
-        for number, leg in enumerate(self.legs):
-            hips, knees, ankles = (worlds[:, j, :3, 3] for j in (leg.hip, leg.knee, leg.ankle))
-            distance = np.linalg.norm(ankles - hips, axis=1)
-            result[:, number] = distance / reach(hips, knees, ankles)
-        return result
+        """Return the distance from hip to ankle relative to that in the rest pose: (N, L)."""
+        return _extensions(worlds, self.legs) / self.extensions
 
     def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
         """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""
@@ -127,15 +128,19 @@ def spans_of(timing: Timing) -> list[tuple[int, int]]:
     return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
 
 
-def leg_pairs(found: Retargeted, skeleton: Skeleton) -> list[LegPair]:
+def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
     """Return the legs of the figure whose hips and ankles are driven, left before right."""
-    source = found.source.figure.require_skeleton()
+    source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
+    partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
+    animal = animal_legs(skeleton.parents, rest_of(skeleton, np.eye(3), figure.up).points, up)
     toes = {leg.ankle: leg.toe for leg in legs_of(source)}
     pairs = []
-    for leg in legs_of(skeleton):
-        hip, ankle = (int(found.matches.partners[joint]) for joint in (leg.hip, leg.ankle))
-        if min(hip, ankle) >= 0:
-            pairs.append(LegPair(leg, hip, ankle, toes.get(ankle, ankle)))
+    for leg in animal or legs_of(skeleton):
+        hip, ankle, toe = (int(partners[joint]) for joint in (leg.hip, leg.ankle, leg.toe))
+        if min(hip, ankle) < 0:
+            continue
+        chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
+        pairs.append(LegPair(leg, hip, ankle, chosen, bool(animal)))
     return pairs
 
 
@@ -181,9 +186,19 @@ def driven_legs(
     heels = np.einsum("lab,lb->la", inverse, np.append(below, np.ones((len(own), 1)), axis=1))
     level = np.einsum("lab,b->la", inverse[:, :3, :3], up)
     toes = world[[leg.toe for leg in own], :3, 3] @ up
-    return DrivenLegs(
-        chains, own, moved, heels, level, rests, _size(world, own), float(toes.mean() - floor)
-    )
+    extensions, size = _extensions(world[None], own)[0], _size(world, own)
+    clearance = float(toes.mean() - floor)
+    return DrivenLegs(chains, own, moved, heels, level, rests, extensions, size, clearance)
+
+
+def _extensions(worlds: Floats, legs: tuple[Leg, ...]) -> Floats:
+    """Return the distances from hips to ankles as fractions of the legs' lengths: (N, L)."""
+    result = np.empty((len(worlds), len(legs)))
+    for number, leg in enumerate(legs):
+        hips, knees, ankles = (worlds[:, j, :3, 3] for j in (leg.hip, leg.knee, leg.ankle))
+        distance = np.linalg.norm(ankles - hips, axis=1)
+        result[:, number] = distance / np.maximum(reach(hips, knees, ankles), 1e-30)
+    return result
 
 
 def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
@@ -264,7 +279,11 @@ def foot_paths(
         ends = (pair.hip, pair.ankle, pair.toe)
         hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
         above = world[:, hip, :3, 3] @ axes.T
-        place = world[:, ankle, :3, 3] @ axes.T
+        place, ball = (world[:, joint, :3, 3] @ axes.T for joint in (ankle, toe))
+        if pair.is_digitigrade:
+            ball = ball if toe != ankle else place + own[0]
+            result.append(FootPath(ball, ball, above))
+            continue
         upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
         height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
         length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
@@ -272,5 +291,5 @@ def foot_paths(
             result.append(FootPath(place + own[0], place + own[1], above))
             continue
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
-        result.append(FootPath(world[:, toe, :3, 3] @ axes.T, heel @ axes.T, above))
+        result.append(FootPath(ball, heel @ axes.T, above))
     return result

@@ -94,7 +94,7 @@ def plant_feet(
         What was changed; None if the figure or the source has no legs of known names, or the
         figure has the source's proportions.
     """
-    pairs = leg_pairs(found, figure.require_skeleton())
+    pairs = leg_pairs(found, figure)
     rest_up = np.eye(3)["xyz".index(figure.up)]
     up = -rest_up if hangs else rest_up
     clip = cast("SampledClip", in_frame_order(found.clip))
