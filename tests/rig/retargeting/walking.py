@@ -34,6 +34,26 @@ def ankle_path(side: str, lift: float = 12.0) -> np.ndarray:
     return np.stack([along, rest[1] + lift * 64.0 * (phase * (1.0 - phase)) ** 3], axis=1)
 
 
+def plane_angles(
+    joints: tuple[np.ndarray, np.ndarray, np.ndarray], away: np.ndarray, front: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far thigh and shin rotate towards +z, radians, by the law of cosines.
+
+    ``joints``: hip, knee and ankle at rest, z and y. ``away``: from the hip to the ankle, (N, 2).
+    ``front``: 1 if the knee bends forwards, -1 backwards.
+    """
+    hip, knee, ankle = joints
+    a, b = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
+    distance = np.linalg.norm(away, axis=1)
+    assert (distance < a + b).all()
+    bend = np.pi - np.arccos((a * a + b * b - distance**2) / (2.0 * a * b))
+    inner = np.arccos((a * a + distance**2 - b * b) / (2.0 * a * distance))
+    thigh = np.arctan2(away[:, 0], -away[:, 1]) + front * inner
+    own = [np.arctan2(*((end - start) * [1.0, -1.0])) for start, end in
+           ((hip, knee), (knee, ankle))]  # fmt: skip
+    return thigh - own[0], thigh - front * bend - own[1]
+
+
 def walk(rise: float = 0.0, lift: float = 12.0) -> tuple[np.ndarray, np.ndarray]:
     """Return rotations relative to the T-pose, (N, J, 3, 3), and the path of the hips, (N, 3).
 
@@ -46,20 +66,10 @@ def walk(rise: float = 0.0, lift: float = 12.0) -> tuple[np.ndarray, np.ndarray]
     for side in ("Left", "Right"):
         names = [NAMES.index(f"{side}{part}") for part in ("UpLeg", "Leg", "Foot")]
         hip, knee, ankle = POINTS[names][:, [2, 1]]
-        a, b = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
         goal = ankle_path(side, lift)
         moved = (goal[:, 0] - ankle[0] - STRIDE * (0.3 if side == "Left" else -0.2)) / STRIDE
         goal[:, 1] += rise * (2.0 * moved + (0.0 if side == "Left" else -1.0))
-        away = goal - (hip + path[:, [2, 1]])
-        distance = np.linalg.norm(away, axis=1)
-        assert (distance < a + b).all()
-        # Angles about x from straight down, towards +z.
-        bend = np.pi - np.arccos((a * a + b * b - distance**2) / (2.0 * a * b))
-        inner = np.arccos((a * a + distance**2 - b * b) / (2.0 * a * distance))
-        thigh = np.arctan2(away[:, 0], -away[:, 1]) + inner
-        own = [np.arctan2(*((end - start) * [1.0, -1.0])) for start, end in
-               ((hip, knee), (knee, ankle))]  # fmt: skip
-        hips, shins = thigh - own[0], thigh - bend - own[1]
+        hips, shins = plane_angles((hip, knee, ankle), goal - (hip + path[:, [2, 1]]), 1.0)
         vectors[:, names[0]] = -hips[:, None] * X
         vectors[:, names[1]] = -(shins - hips)[:, None] * X
         vectors[:, names[2]] = shins[:, None] * X

@@ -33,8 +33,8 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     -------
     list of Leg
         Hip, knee and ankle are the two long bones of a leg, without a scapula. The ankle is the
-        hock of a hind leg and the wrist of a front leg. Empty if there are fewer legs, or one has
-        no counterpart on the other side.
+        hock of a hind leg and the wrist of a front leg. Chains without a counterpart on the other
+        side, such as a tail, are left out. Empty if there are fewer legs.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())
@@ -91,15 +91,17 @@ def _leg(path: list[int], points: Floats, heights: Floats) -> Leg | None:
 
 
 def _paired(legs: list[Leg], flat: Floats, up: Floats) -> list[Leg]:
-    """Return the legs if each has a counterpart on the other side, left before right."""
+    """Return the legs that have a counterpart on the other side, left before right."""
     if len(legs) < _FEWEST:
         return []
     feet = flat[[leg.toe for leg in legs]]
     for side in np.eye(3)[np.abs(up) < 0.5]:
         across = feet @ side
-        mirrored = feet - 2.0 * (across - np.mean(across))[:, None] * side
+        middle = 0.5 * (across.min() + across.max())
+        mirrored = feet - 2.0 * (across - middle)[:, None] * side
         away = np.linalg.norm(mirrored[:, None] - feet, axis=2)
         np.fill_diagonal(away, np.inf)
-        if (away.min(axis=1) < _MIRRORED).all():
-            return [legs[n] for n in np.argsort(-across)]
+        chosen = [int(n) for n in np.argsort(-across) if away[n].min() < _MIRRORED]
+        if len(chosen) >= _FEWEST:
+            return [legs[n] for n in chosen]
     return []
