@@ -30,7 +30,7 @@ def address():
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
     }
-    options = {"host": "tcp://127.0.0.1", "dashboard_address": None, "port": 0}
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
     scheduler = {"cls": Scheduler, "options": options}
     with SpecCluster(workers, scheduler, silence_logs=50) as cluster:
         yield cluster.scheduler_address
@@ -122,7 +122,7 @@ def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
 
     monkeypatch.setattr(dask_cluster, "_ALONE", 0.1)
     monkeypatch.setattr(dask_cluster, "_COUNT_EVERY", 0.1)
-    options = {"host": "tcp://127.0.0.1", "dashboard_address": None, "port": 0}
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
     with SpecCluster({}, {"cls": Scheduler, "options": options}, silence_logs=50) as cluster:
         limits = Limits(cluster=cluster.scheduler_address)
         with pytest.raises(ViewerError, match=r"has had no workers for 0\.1 s; start some with: "):
