@@ -137,7 +137,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.drives and _has_bare_motion(cast):
         from viewer.loading.figure_motions import drive_by_figures
 
-        if drive_by_figures(cast, wanted, settings.joint_map):
+        if drive_by_figures(cast, wanted, settings):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate

@@ -11,13 +11,13 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_panel
 from viewer.app.files.state import Files
+from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
     is_automatic,
     match_automatically,
     match_joint,
-    no_edit,
 )
 from viewer.app.retargeting.state import JointMatch, shown_match
 from viewer.formats import Source

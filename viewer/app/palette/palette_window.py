@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, overlay_rect
 from viewer.app.palette.entries import Entry, entries
@@ -162,7 +163,7 @@ def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
     if key:
         right -= imgui.calc_text_size(key).x
         imgui.same_line(right)
-        imgui.text_colored(_KEY_COLOR, key)
+        imgui.text_colored(ink(_KEY_COLOR), key)
         right -= imgui.get_font_size()
     left = right - imgui.calc_text_size(note).x
     if left > start + imgui.calc_text_size(entry.text).x + imgui.get_font_size():

@@ -89,7 +89,7 @@ def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
-            "job of shards (viewer help batch)"
+            "job of shards (viewer help batches)"
         )
     cluster = slurm_cluster(name, limits)
     cluster.scale(n=limits.workers)

@@ -40,6 +40,14 @@ MESSAGES = {
     "{names:list}",
     "F007.rest-unknown": "zero pose of {motion:text} used as its rest pose, though it is "
     "not a standing pose: the motion is not upright; --source-rest N uses frame N",
+    "F007.feet-planted": "feet of {figure:text} planted in {n:#contact} of {motion:text}: they "
+    "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
+    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "
+    "leaves them as retargeted",
+    "F007.feet-kept": "feet of {figure:text} not planted: they slide as little as those of "
+    "{motion:text}",
+    "F007.feet-no-contacts": "feet of {figure:text} not planted: those of {motion:text} never "
+    "stand",
     "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
