@@ -34,12 +34,13 @@ PARTS = {
         *("rendering", "rig", "interrupts", "resources"),
     },
     "lint": {"loading", "formats", "rig"},
-    "batching": {"formats", "media", "interrupts", "streams"},
+    "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts"},
     "interrupts": set(),
     "resources": set(),
     "streams": set(),
+    "version": set(),
 }
 LEAVES = {
     "phrases": set(),
@@ -61,7 +62,7 @@ ALLOWED_IN_APP = {
     "files": {"core", "files"},
     "theme": set(),
     "preferences": {"core", "features", "files", "preferences", "theme"},
-    "actors": {"core", "actors"},
+    "actors": {"core", "actors", "retargeting"},
     "playback": {"core", "files", "playback"},
     "curves": {"core", "files", "curves"},
     "posing": {"core", "files", "curves", "posing"},

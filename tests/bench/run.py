@@ -22,6 +22,7 @@ NAMES = [
     "gltf",
     "nodes",
     "captures",
+    "batch",
     "observing",
     "losses",
     "lint",

@@ -18,7 +18,7 @@ __all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]
 
 _AMBIGUOUS = (".txt", ".json")  # notes and settings more often than poses
 _WILD = re.compile(r"[*?[]")
-_DIGITS = re.compile(r"([0-9]+)")
+_DIGITS = re.compile(r"[0-9]+")
 
 
 @dataclass(frozen=True)
@@ -89,18 +89,19 @@ def find_inputs(
     return search.result()
 
 
-def natural_key(path: str) -> tuple[list[list[str | int]], str]:
+def natural_key(path: str) -> tuple[str, str]:
     """Return a sort key that orders names part by part, and numbers in them by value.
 
     >>> sorted(["a/walk10", "a/walk9", "a-b/walk1"], key=natural_key)
     ['a/walk9', 'a/walk10', 'a-b/walk1']
     """
-    parts: list[list[str | int]] = []
-    for part in path.replace(os.sep, "/").split("/"):
-        # Splitting puts digits at odd places, so that numbers are compared with numbers only.
-        pieces = _DIGITS.split(part.casefold())
-        parts.append([int(piece) if index % 2 else piece for index, piece in enumerate(pieces)])
-    return parts, path
+    # A longer number is larger, and a folder is compared as a whole before what is in it.
+    return _DIGITS.sub(_with_length, path.casefold()).replace("/", "\0"), path
+
+
+def _with_length(number: re.Match[str]) -> str:
+    digits = number[0].lstrip("0")
+    return f"{len(digits):03}{digits}"
 
 
 def is_recording(folder: str | Path) -> bool:

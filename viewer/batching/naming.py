@@ -99,17 +99,17 @@ def items_of(inputs: Inputs, template: str = "") -> list[Item]:
         Template of the output names; empty if nothing is written.
     """
     pieces = list(Formatter().parse(template))
+    here = os.getcwd()
     items = []
     for index, path in enumerate(inputs.paths):
-        name = _below(path, inputs.base)
+        name = _below(os.path.normpath(os.path.join(here, path)), inputs.base)
         output = _filled(pieces, index, path, name, path in inputs.folders) if template else ""
         items.append(Item(index, (path,), output, name))
     return items
 
 
-def _below(path: str, base: str) -> str:
-    """Return a path relative to the shared folder."""
-    full = os.path.abspath(path)
+def _below(full: str, base: str) -> str:
+    """Return an absolute path relative to the shared folder."""
     if base and full.startswith(os.path.join(base, "")):
         return full[len(base) :].lstrip(os.sep).replace(os.sep, "/")
     return os.path.splitdrive(full)[1].lstrip(os.sep).replace(os.sep, "/")
@@ -162,9 +162,10 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
         The message lists the outputs and their inputs.
     """
     owners: dict[str, Item] = {}
+    here = os.getcwd()
     clashes = []
     for item in items:
-        other = owners.setdefault(_identity(item.output), item) if item.output else item
+        other = owners.setdefault(_identity(here, item.output), item) if item.output else item
         if other is not item:
             clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
     if clashes:
@@ -183,8 +184,9 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
         raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
 
 
-def _identity(path: str) -> str:
-    return unicodedata.normalize("NFC", os.path.abspath(path)).casefold()
+def _identity(folder: str, path: str) -> str:
+    path = os.path.normpath(os.path.join(folder, path))
+    return (path if path.isascii() else unicodedata.normalize("NFC", path)).casefold()
 
 
 class _RealPaths:

@@ -20,7 +20,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.formats._mesh.polygons import triangulate
+from viewer.formats._mesh.polygons import Picks, picked, triangulate
 from viewer.formats._mesh.surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._neutral import neutral_positions
 from viewer.formats._obj.lines import Places
@@ -63,7 +63,7 @@ def read(source: Source) -> Figure:
         raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
     rough = neutral_positions(parts.positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, parts.corners[:, 0], parts.counts)
-    triangles = parts.corners[picks, 0].astype(np.int32)
+    triangles = picked(parts.corners[:, 0], picks).astype(np.int32)
     positions = neutral_positions(parts.positions, triangles)
     source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
@@ -110,13 +110,13 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
     return tuple(facts)
 
 
-def _uvs(source: Source, parts: ObjParts, picks: Places) -> tuple[Floats | None, Ints | None]:
+def _uvs(source: Source, parts: ObjParts, picks: Picks) -> tuple[Floats | None, Ints | None]:
     """Return the table of texture coordinates, and their index for each triangle corner."""
     # Invalid values are NaN, which a single sum detects.
     uvs = np.nan_to_num(parts.uvs) if np.isnan(parts.uvs.sum()) else parts.uvs
     if len(uvs) == 0:
         return None, None
-    corners = parts.corners[picks, 1]
+    corners = picked(parts.corners[:, 1], picks)
     absent = corners < 0
     if absent.all():
         source.warn("F007.obj-texcoords", n=len(uvs))
@@ -140,11 +140,16 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     if np.isnan(listed.sum()):
         # Invalid normals are computed from the triangles instead.
         used &= ~np.isnan(listed.sum(axis=1)[parts.corners[:, 2]])
-    vertices, indices = parts.corners[used, 0], parts.corners[used, 2]
-    result = np.full((n_vertices, 3), np.nan)
-    result[vertices] = listed[indices]
-    differs = (result[vertices] != listed[indices]).any(axis=1)
-    several = np.bincount(vertices, differs, minlength=n_vertices) > 0
+    vertices, indices = parts.corners[:, 0], parts.corners[:, 2]
+    if not used.all():
+        vertices, indices = vertices[used], indices[used]
+    # Most vertices have the same normal in all corners, so that few need to be compared.
+    chosen = np.full(n_vertices, -1, dtype=indices.dtype)
+    chosen[vertices] = indices
+    others = np.flatnonzero(chosen[vertices] != indices)
+    result = np.where((chosen >= 0)[:, None], listed[chosen], np.nan)
+    differs = (result[vertices[others]] != listed[indices[others]]).any(axis=1)
+    several = np.bincount(vertices[others], differs, minlength=n_vertices) > 0
     if several.any():
         first = int(several.argmax())
         source.warn(

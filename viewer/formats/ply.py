@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Phrase
-from viewer.formats._mesh.polygons import first_known, triangles_of, triangulate
+from viewer.formats._mesh.polygons import first_known, picked, triangles_of, triangulate
 from viewer.formats._mesh.surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._neutral import neutral_positions
@@ -38,7 +38,7 @@ from viewer.rig.srgb import decode_srgb
 
 __all__ = ["read"]
 
-Indices = NDArray[np.int64]
+Indices = NDArray[np.integer]
 
 _UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 _COLORS = ("red", "green", "blue", "alpha")
@@ -71,7 +71,7 @@ def read(source: Source) -> Figure:
     counts, corners, uv_corners = _faces(source, tables, len(positions))
     rough = neutral_positions(positions, np.zeros((0, 3), np.int32))
     picks, owners = triangulate(rough, corners, counts)
-    triangles = corners[picks].astype(np.int32)
+    triangles = picked(corners, picks).astype(np.int32, copy=False)
     positions = neutral_positions(positions, triangles)
     _remember(source, tables, owners)
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
@@ -109,11 +109,10 @@ def read(source: Source) -> Figure:
 
 def _remember(source: Source, tables: dict[str, Table], owners: Indices) -> None:
     """Register the offsets of vertices and triangles in a text file."""
-    vertices, faces = tables["vertex"].offsets, tables["face"].offsets if "face" in tables else None
-    if vertices is not None:
-        source.remember("positions", lambda vertex: int(vertices[vertex]))
-    if faces is not None:
-        source.remember("triangles", lambda triangle: int(faces[owners[triangle]]))
+    if (vertices := tables["vertex"].offset_of) is not None:
+        source.remember("positions", vertices)
+    if "face" in tables and (faces := tables["face"].offset_of) is not None:
+        source.remember("triangles", lambda triangle: faces(int(owners[triangle])))
 
 
 def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple[Table, Floats]:
@@ -140,10 +139,15 @@ def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | N
     if any(name not in table.columns for name in names):
         return None
     with np.errstate(over="ignore"):
-        values = np.stack([table.columns[name].astype(np.float64) for name in names], axis=1)
+        values = np.empty((table.element.count, len(names)))
+        for column, name in enumerate(names):
+            values[:, column] = table.columns[name]
+    # A single NaN makes the extremes NaN.
+    if len(values) == 0 or (values.min() >= -LARGEST and values.max() <= LARGEST):
+        return values
     odd = np.flatnonzero(~(np.abs(values) <= LARGEST).all(axis=1))
     if len(odd):
-        if table.offsets is None:
+        if table.offset_of is None:
             row = values[odd[0]]
             is_place = names == ("x", "y", "z")
             source.refuse(
@@ -189,13 +193,20 @@ def _corners(
     source: Source, faces: Table, counts: Indices, values: NDArray[Any], n_vertices: int
 ) -> Indices:
     """Return the vertices of all faces; invalid ones are replaced by others of the same face."""
+    # A single NaN makes the extremes NaN.
+    if len(values) and values.min() >= 0 and values.max() < n_vertices:
+        corners = values.astype(np.int32, copy=False)
+        if values.dtype.kind in "iu" or (corners == values).all():
+            return corners
     corners = np.clip(np.nan_to_num(values, nan=-1.0), -1.0, n_vertices).astype(np.int64)
     is_wrong = (corners != values) | (corners < 0) | (corners >= n_vertices)
     if not is_wrong.any():
         return corners
     owners = np.repeat(np.arange(len(counts)), counts)
     # Words of a text that are not numbers are recorded already.
-    wrong = np.flatnonzero(is_wrong & ~np.isnan(values) if faces.offsets is not None else is_wrong)
+    wrong = np.flatnonzero(
+        is_wrong & ~np.isnan(values) if faces.offset_of is not None else is_wrong
+    )
     if len(wrong):
         face = int(owners[wrong[0]])
         source.refuse(
@@ -224,7 +235,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
     uvs = values.astype(np.float64).reshape(-1, 2)
     odd = np.flatnonzero(~(np.abs(uvs) <= LARGEST).all(axis=1))
     if len(odd):
-        if faces.offsets is None:
+        if faces.offset_of is None:
             face = int(np.searchsorted(np.cumsum(counts), odd[0], side="right"))
             source.refuse(
                 "F003.ply-finite",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -77,6 +77,10 @@ class Builder:
     joint_map : JointMap or None
         Joints of the target and the joints of the model that drive them; None to match them by
         name.
+    plants_feet : bool
+        Whether the feet of the target are planted, which is still to be done.
+    hangs : bool
+        Whether the axis along which people stand points down before placement.
     """
 
     capture: Capture
@@ -93,6 +97,8 @@ class Builder:
     target: Figure | None = None
     swings: bool = False
     joint_map: JointMap | None = None
+    plants_feet: bool = True
+    hangs: bool = False
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
     _has_parameters: bool = False
     _parts: Iterator[CapturePart] | None = None
@@ -116,7 +122,7 @@ class Builder:
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True
-            return [], []
+            return [], self._fresh(self._plant_feet())
         return self.add(part)
 
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
@@ -147,13 +153,18 @@ class Builder:
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
         notes += self._shape_notes()
+        notes += self._plant_feet()
         for actor in new:
             if self.swings:
                 actor.springs = springs_for(actor, self.up)
             pose_actor(actor, 0.0)
-        fresh = {str(note): note for note in reversed(notes) if str(note) not in self._notes}
+        return new, self._fresh(notes)
+
+    def _fresh(self, notes: Iterable[Diagnostic]) -> list[Diagnostic]:
+        """Return the messages that were not reported before, each once."""
+        fresh = {str(note): note for note in notes if str(note) not in self._notes}
         self._notes.update(fresh)
-        return new, [*reversed(fresh.values())]
+        return [*fresh.values()]
 
     def _shape_notes(self) -> list[Diagnostic]:
         """At the end, return messages about bodies without a shape, and a model without bodies."""
@@ -188,7 +199,22 @@ class Builder:
         return [replace(note, path=self.path) for note in notes]
 
     def _drive(self, clip: SampledClip) -> Drive:
-        return carrying_drive(self.model, clip, self.up, self.joint_map)
+        # Feet are planted at the end, because contacts and the ground need the whole motion.
+        up = f"-{self.up}" if self.hangs else self.up
+        return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+
+    def _plant_feet(self) -> list[Diagnostic]:
+        """At the end, plant the feet of driven figures, once."""
+        if not (self.is_done and self.plants_feet and self.target is not None):
+            return []
+        self.plants_feet = False
+        notes: list[Diagnostic] = []
+        for actor in self._bodies.values():
+            if actor.drive is not None:
+                actor.drive = replace(actor.drive, plants_feet=True)
+                actor.clip, said = driven_clip(actor.drive, self.target)
+                notes += [replace(note, path=self.path) for note in said]
+        return notes
 
     def _add_clip(
         self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
@@ -259,7 +285,8 @@ class Builder:
         self.up = "z" if up.endswith("z") else "y"
         for actor in self._points.values():
             actor.figure = replace(actor.figure, up=self.up)
-        if up.startswith("-"):
+        self.hangs = up.startswith("-")
+        if self.hangs:
             self.placement = rotation_transform(0, np.pi)
             for actor in self.actors:
                 actor.placement = self.placement.copy()
@@ -283,11 +310,10 @@ class Builder:
             actor.figure, actor.clip, actor.color = target, clip, None
             actor.drive = drive
             actor.pose = figure_pose(target)
+        notes = [replace(note, path=self.path) for note in notes] + self._plant_feet()
+        for actor, _, _ in clips:
             pose_actor(actor, 0.0)
-        notes += self._shape_notes()
-        fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
-        self._notes.update(str(note) for note in fresh.values())
-        return [*reversed(fresh.values())]
+        return self._fresh([*notes, *self._shape_notes()])
 
     def refusal(self, problem: RigError) -> RigError:
         """Return an error that also names the model that would match."""

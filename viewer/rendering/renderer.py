@@ -21,6 +21,7 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlays import Overlays, draw_overlays
 from viewer.rendering.passes.background_pass import BackgroundPass
 from viewer.rendering.passes.ground_pass import GroundPass
@@ -50,7 +51,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
-    from viewer.rendering.outlined import Outlined
     from viewer.rendering.overlay.annotation import Annotation
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
@@ -180,8 +180,6 @@ class Renderer:
             self.late, over, scene, view, options, target.size, selected
         )
         if options.outline:
-            from viewer.rendering.outlined import Outlined
-
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
@@ -286,15 +284,18 @@ class Renderer:
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that a failure leaves the previous scene intact.
 
+        Whatever was uploaded before a failure is freed.
+
         Raises
         ------
         RenderError
             If there is not enough graphics memory.
         """
-        prepare_meshes(self.buffers, scene.actors, DisplayOptions())
-        for actor in scene.actors:
-            if actor.figure.skeleton is not None:
-                self.buffers.skeleton(actor)
+        with self.buffers.guard():
+            prepare_meshes(self.buffers, scene.actors, DisplayOptions())
+            for actor in scene.actors:
+                if actor.figure.skeleton is not None:
+                    self.buffers.skeleton(actor)
 
     def _update(
         self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import signal
+from importlib.util import find_spec
+
 import pytest
 
 from viewer.batching.engines import Limits
@@ -35,9 +38,13 @@ def test_other_names_are_refused(text, message) -> None:
     assert message in str(caught.value)
 
 
+# Importing it here would replace the handler of Ctrl-C in the process of all tests.
+needs_jobqueue = pytest.mark.skipif(find_spec("dask_jobqueue") is None, reason="no dask-jobqueue")
+
+
 @pytest.mark.slow
+@needs_jobqueue
 def test_job_script_asks_slurm_for_the_options() -> None:
-    pytest.importorskip("dask_jobqueue")
     from viewer.batching.engines._clusters import slurm_cluster
 
     name = parse_cluster("slurm:partition=gpu,time=2:00:00,cpus=4,gres=gpu:1,exclusive,account=lab")
@@ -55,10 +62,21 @@ def test_job_script_asks_slurm_for_the_options() -> None:
         slurm_cluster(parse_cluster("slurm:cpus=many"), Limits())
 
 
+@needs_jobqueue
 def test_slurm_needs_sbatch(monkeypatch) -> None:
-    pytest.importorskip("dask_jobqueue")
     from viewer.batching.engines import dask_cluster
 
     monkeypatch.setenv("PATH", "")
     with pytest.raises(ViewerError, match="sbatch was not found"):
         next(dask_cluster.run([], lambda item: item, Limits(cluster="slurm")))
+
+
+@pytest.mark.slow
+@needs_jobqueue
+def test_handlers_of_signals_survive_the_import_of_dask_jobqueue() -> None:
+    from viewer.batching.engines._clusters import slurm_cluster
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(ViewerError):
+        slurm_cluster(parse_cluster("slurm:cpus=0"), Limits())
+    assert signal.getsignal(signal.SIGINT) is before

@@ -78,9 +78,13 @@ def test_items_of_a_killed_worker_run_elsewhere(address, tmp_path) -> None:
 
 
 def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
+    from distributed import Client
+
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
     finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
     assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
+    with Client(address) as client:  # an earlier test may have killed one of them
+        client.wait_for_workers(2, timeout=60)
     finished(Job(seconds=0.05), some, Limits(2, cluster=address))
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
 

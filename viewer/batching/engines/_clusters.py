@@ -7,6 +7,7 @@ import logging
 import signal
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import Limits
@@ -50,9 +51,13 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
         if name.kind != "address":
             # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
             # batch decides what is finished.
+            folder = stack.enter_context(TemporaryDirectory(prefix="viewer-dask-"))
             with _signals_blocked(), dask.config.set(_CONFIG):
-                cluster = _local_cluster(limits) if name.kind == "local" else _slurm(name, limits)
-            target = stack.enter_context(cluster)
+                if name.kind == "local":
+                    target = _local_cluster(limits, folder)
+                else:
+                    target = _slurm(name, limits)
+            stack.enter_context(target)
         try:
             with _signals_blocked():
                 client = Client(target, timeout=_CONNECT, set_as_default=False)
@@ -64,7 +69,7 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
         yield stack.enter_context(client)
 
 
-def _local_cluster(limits: Limits) -> Any:
+def _local_cluster(limits: Limits, folder: str) -> Any:
     from distributed import LocalCluster
 
     return LocalCluster(
@@ -73,6 +78,7 @@ def _local_cluster(limits: Limits) -> Any:
         processes=True,
         memory_limit=None,
         dashboard_address=None,
+        local_directory=folder,
         silence_logs=logging.CRITICAL,
     )
 
@@ -83,7 +89,7 @@ def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
     if shutil.which("sbatch") is None:
         raise ViewerError(
             "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
-            "job of shards (viewer help batch)"
+            "job of shards (viewer help batches)"
         )
     cluster = slurm_cluster(name, limits)
     cluster.scale(n=limits.workers)
@@ -102,7 +108,8 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         If dask-jobqueue is missing, or ``cpus`` is not a positive integer.
     """
     try:
-        from dask_jobqueue import SLURMCluster
+        with _handlers_kept():  # importing it replaces the one of Ctrl-C
+            from dask_jobqueue import SLURMCluster
     except ImportError:
         raise ViewerError(
             "--cluster slurm needs dask-jobqueue: pip install skinning-viewer[batch]"
@@ -133,6 +140,19 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         silence_logs=logging.CRITICAL,
         **known,
     )
+
+
+@contextmanager
+def _handlers_kept() -> Iterator[None]:
+    """Restore the signal handlers that the block replaces."""
+    numbers = (signal.SIGINT, signal.SIGTERM)
+    before = [signal.getsignal(number) for number in numbers]
+    try:
+        yield
+    finally:
+        for number, handler in zip(numbers, before, strict=True):
+            if signal.getsignal(number) is not handler:
+                signal.signal(number, handler)
 
 
 @contextmanager

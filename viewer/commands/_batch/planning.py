@@ -33,6 +33,7 @@ class Request:
     ``shared``: files that all items read.
     ``few``: largest number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
+    ``notes``: messages about the paths.
     """
 
     paths: Sequence[str]
@@ -52,6 +53,9 @@ class Request:
     timeout: float | None = None
     memory: int | None = None
     report: str = ""
+    notes: Sequence[str] = ()
+    table: str = ""
+    overview: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,7 +91,7 @@ def plan_of(request: Request) -> Plan:
     settings = Settings(
         engine, limits, report, _existing(request), request.identity, tuple(request.shared)
     )
-    return Plan(items, settings, (*inputs.notes, *note))
+    return Plan(items, settings, (*request.notes, *inputs.notes, *note))
 
 
 def _report_of(request: Request) -> Path | None:

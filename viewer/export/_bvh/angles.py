@@ -7,6 +7,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import axis_rotations
 
+_WHOLE = 2.0 * np.pi  # radians in a revolution
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
 
 
@@ -45,6 +46,12 @@ def unrolled(angles: Floats, order: str) -> Floats:
     """
     if len(angles) < 2:
         return angles.copy()
+    if angles.ndim > 2:
+        # One joint at a time, so that the arrays of many frames fit into the processor's cache.
+        joints = np.empty_like(angles)
+        for joint in range(angles.shape[1]):
+            joints[:, joint] = unrolled(angles[:, joint], order)
+        return joints
     angles = _unlocked(angles, order)
     other = angles * [1.0, -1.0, 1.0] + np.pi
     # Switching costs the same from either form, so the number of switches accumulates.
@@ -53,11 +60,18 @@ def unrolled(angles: Floats, order: str) -> Floats:
     changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)
     chosen = angles.copy()
     chosen[1:] = np.where(changed[..., None], other[1:], angles[1:])
-    return np.unwrap(chosen, axis=0)
+    turns = np.zeros_like(chosen)
+    np.cumsum(_revolutions(chosen[1:] - chosen[:-1]), axis=0, out=turns[1:])
+    return chosen - _WHOLE * turns
+
+
+def _revolutions(angles: Floats) -> Floats:
+    """Return the nearest whole numbers of revolutions."""
+    return np.rint(angles / _WHOLE)
 
 
 def _wrapped(angles: Floats) -> Floats:
-    return (angles + np.pi) % (2.0 * np.pi) - np.pi
+    return angles - _WHOLE * _revolutions(angles)
 
 
 def _unlocked(angles: Floats, order: str) -> Floats:

@@ -21,7 +21,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-_BLOCK = 1024  # poses at a time, so that the matrices of all frames never exist at once
+_BLOCK = 256  # poses at a time, so that their matrices fit into the processor's cache
 _CHUNK = 128  # poses per single-precision estimate
 _LIKELY = 4  # poses per chunk whose farthest vertex is measured first
 _SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["first_known", "triangles_of", "triangulate"]
+__all__ = ["Picks", "first_known", "picked", "triangles_of", "triangulate"]
 
-Picks = NDArray[np.int64]
+Picks = NDArray[np.integer]
 
 _MOST_CORNERS = 400  # ear clipping of larger polygons would take seconds, so they become fans
 _CHUNK = 4_000_000  # (corner, corner) pairs that are tested at once
@@ -40,14 +40,15 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
     """
     starts = np.cumsum(counts) - counts
     if (counts == 3).all():
-        return starts[:, None] + np.arange(3), np.arange(len(counts))
+        every = np.arange(3 * len(counts), dtype=np.int32)
+        return every.reshape(-1, 3), np.arange(len(counts))
     picks: list[Picks] = []
     faces: list[Picks] = []
     for size in np.unique(counts).tolist():
         rows = np.flatnonzero(counts == size)
         places = starts[rows, None] + np.arange(size)
         if size == 3:
-            local = np.broadcast_to(np.arange(3), (len(rows), 1, 3))
+            local: Picks = np.broadcast_to(np.arange(3), (len(rows), 1, 3))
         else:
             local = _cut(positions[corners[places]])
         picks.append(np.take_along_axis(places[:, None], local, axis=2).reshape(-1, 3))
@@ -55,6 +56,12 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
     owners = np.concatenate(faces)
     order = np.argsort(owners, kind="stable")
     return np.concatenate(picks)[order], owners[order]
+
+
+def picked(corners: Picks, picks: Picks) -> Picks:
+    """Return a value of every corner for the corners of triangles: (C,) to (T, 3)."""
+    # If there are as many, all polygons are triangles.
+    return corners.reshape(-1, 3) if len(corners) == picks.size else corners[picks]
 
 
 def _cut(points: Floats) -> Picks:

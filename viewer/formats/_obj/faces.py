@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._text.numbers import parse_numbers, word_begins
@@ -18,6 +19,8 @@ CORNER_KINDS = ("v", "vt", "vn")
 
 FEWEST = 3
 """Corners of a face."""
+
+Corners = NDArray[np.integer]
 
 _SLASH = ord("/")
 
@@ -58,7 +61,7 @@ class FaceRows:
     """
 
     counts: Places
-    corners: Places
+    corners: Corners
     offsets: Places
     faults: tuple[CornerFault, ...] = ()
 
@@ -93,7 +96,7 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
     return FaceRows(counts, written - 1, rows.origins - 1)
 
 
-def _corner_numbers(rows: Rows, begins: Places) -> Places | None:
+def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
     """Return the three numbers of every corner as written, 0 where there is none: (C, 3).
 
     None if a corner is invalid.
@@ -149,12 +152,13 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     return fits, n_numbers, has_gap
 
 
-def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Places | None:
+def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Corners | None:
     """Arrange the numbers of corners in rows of three; with a gap, the second becomes the third."""
-    whole = np.clip(values, -(2.0**40), 2.0**40).astype(np.int64)
+    # Larger numbers are out of range; they are read again by the function for invalid faces.
+    whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
     if (whole != values).any():
         return None
-    table = np.zeros((len(counts), 3), dtype=np.int64)
+    table = np.zeros((len(counts), 3), dtype=np.int32)
     if gaps is None and (counts == counts[0]).all():
         table[:, : counts[0]] = whole.reshape(len(counts), -1)
         return table

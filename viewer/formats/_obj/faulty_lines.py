@@ -175,9 +175,10 @@ def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int])
     (C, 3)
         Corners; -1 for invalid indices of texture coordinates and normals.
     """
-    corners = np.concatenate([np.zeros((0, 3), np.int64), *(rows.corners for rows in faces)])
+    corners = np.concatenate([np.zeros((0, 3), np.int32), *(rows.corners for rows in faces)])
     limits = np.array([ends[keyword] for keyword in CORNER_KINDS])
-    if not any(rows.faults for rows in faces) and (corners < limits).all():
+    largest = [column.max(initial=-1) for column in corners.T]
+    if not any(rows.faults for rows in faces) and (largest < limits).all():
         return corners
     counts = np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in faces)])
     offsets = np.concatenate([np.zeros(0, np.int64), *(rows.offsets for rows in faces)])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,15 +13,20 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
+from viewer.formats._ply.even import even_binary, even_text
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers, parse_words
-from viewer.formats._text.words import Words, number_key
+from viewer.formats._text.line_sizes import line_sizes
+from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
+from viewer.formats._text.words import number_key
 
 __all__ = ["Table", "read_tables"]
 
 Places = NDArray[np.int64]
+Indices = NDArray[np.integer]
 Numbers = NDArray[Any]
+
+_WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 
 @dataclass(slots=True)
@@ -34,8 +41,8 @@ class Table:
         Properties of the element that are not lists.
     lists : dict of str to ((N,), (M,))
         List properties: the number of values of each row, and the values of all rows.
-    offsets : (N,) or None
-        Offset of each row; None in a binary file.
+    offset_of : callable or None
+        Returns the offset of a row; slow, for errors only. None in a binary file.
     is_first : bool
         Whether it is the first element with its name; later ones are read and discarded.
     """
@@ -43,12 +50,12 @@ class Table:
     element: Element
     columns: dict[str, Numbers] = field(default_factory=dict)
     lists: dict[str, tuple[Places, Numbers]] = field(default_factory=dict)
-    offsets: Places | None = None
+    offset_of: Callable[[int], int] | None = None
     is_first: bool = True
 
     def offset(self, row: int) -> int | None:
         """Return the offset of a row in the file; None in a binary file, which has no lines."""
-        return None if self.offsets is None else int(self.offsets[row])
+        return None if self.offset_of is None else self.offset_of(row)
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
@@ -64,8 +71,11 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     tables: dict[str, Table] = {}
     for element in header.elements:
         table = Table(element, is_first=element.name not in tables)
+        if body.take_even(table):
+            tables.setdefault(element.name, table)
+            continue
         cursor = body.begin(element)
-        table.offsets = body.offsets(cursor)
+        table.offset_of = body.offsets(cursor)
         for prop in element.properties:
             if prop.count_kind:
                 counts, values, cursor = body.take_lists(table, cursor, prop)
@@ -91,19 +101,33 @@ class _Text:
         self.source, self.start = source, header.end
         self.data = source.data.rstrip(b"\x1a")
         self.values, bad = parse_numbers(self.data, self.start, len(self.data))
-        letters = np.frombuffer(self.data, dtype=np.uint8, offset=self.start)
-        inked = ~((letters == 32) | ((letters >= 9) & (letters <= 13)))
-        self.begins = np.flatnonzero(inked & ~np.concatenate([[False], inked[:-1]]))
         if bad >= 0:
             self.values = parse_words(self.data, self.start, len(self.data))
-        ends = np.flatnonzero((letters == 10) | (letters == 13))
-        self.lines = lines = np.searchsorted(ends, self.begins)
         self.has_bad = bad >= 0
         # The first word of every non-empty line, and its number of words.
-        is_first = np.concatenate([[True], lines[1:] != lines[:-1]]) if len(lines) else lines > 0
-        self.firsts = np.flatnonzero(is_first)
-        self.counts = np.diff(np.append(self.firsts, len(self.begins)))
+        self.counts = line_sizes(self.data, self.start)
+        self.firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
         self.line = 0
+        self._begins: Places | None = None
+
+    def take_even(self, table: Table) -> bool:
+        """Read an element whose rows all have the same size; return whether it is one."""
+        element = table.element
+        last = self.line + element.count
+        if self.has_bad or element.count == 0 or last > len(self.counts):
+            return False
+        counts = self.counts[self.line : last]
+        first, width = int(self.firsts[self.line]), int(counts[0])
+        if (counts != width).any():
+            return False
+        block = self.values[first : first + width * element.count].reshape(-1, width)
+        found = even_text(element, block)
+        if found is None:
+            return False
+        table.columns, table.lists = found
+        table.offset_of = lambda row: self._offset(first + width * row)
+        self.line = last
+        return True
 
     def begin(self, element: Element) -> Places:
         """Return the first word of each row."""
@@ -121,9 +145,9 @@ class _Text:
         self.line = last
         return self.firsts[rows]
 
-    def offsets(self, cursor: Places) -> Places | None:
-        """Return the offsets of words in the file."""
-        return self.begins[cursor] + self.start
+    def offsets(self, cursor: Places) -> Callable[[int], int] | None:
+        """Return a function that finds the offset of a row in the file."""
+        return lambda row: self._offset(int(cursor[row]))
 
     def take(self, table: Table, cursor: Places, prop: Property) -> tuple[Numbers, Places]:
         """Return the next number of each row."""
@@ -160,7 +184,12 @@ class _Text:
         return whole, values, cursor + whole
 
     def _refuse_words(
-        self, table: Table, words: Places, rows: Places, part: Part, places: Places | None
+        self,
+        table: Table,
+        words: Places,
+        rows: Places,
+        part: Part,
+        places: Indices | None,
     ) -> None:
         """Refuse words that are not numbers, each in a row of a table."""
         if len(words):
@@ -168,7 +197,11 @@ class _Text:
             self._refuse_first(words, item, part, places)
 
     def _refuse_first(
-        self, words: Places, item: Phrase, part: Part = "", places: Places | None = None
+        self,
+        words: Places,
+        item: Phrase,
+        part: Part = "",
+        places: Indices | None = None,
     ) -> None:
         first = int(words[0])
         word = self._word(first)
@@ -215,10 +248,14 @@ class _Text:
         raise self.source.fault("F002.ply-more", where, expected=expected, found=found)
 
     def _word(self, word: int) -> bytes:
-        return Words(self.data, self.values, self.begins + self.start, self.lines).word(word)
+        found = _WORD.match(self.data, self._offset(word))
+        return b"" if found is None else found.group()
 
     def _offset(self, word: int) -> int:
-        return self.start + int(self.begins[word])
+        if self._begins is None:
+            letters = np.frombuffer(self.data, dtype=np.uint8, offset=self.start)
+            self._begins = word_begins(letters)
+        return self.start + int(self._begins[word])
 
 
 class _Binary:
@@ -237,35 +274,35 @@ class _Binary:
             raise self._short(element, left)
         if not element.has_lists:
             return self.position + np.arange(element.count, dtype=np.int64) * sum(sizes)
-        starts = self._even(element)
-        return self._walked(element) if starts is None else starts
+        return self._walked(element)
 
-    def offsets(self, cursor: Places) -> Places | None:
+    def offsets(self, cursor: Places) -> Callable[[int], int] | None:
         """Return None, as binary files have no lines."""
         return None
 
-    def _even(self, element: Element) -> Places | None:
-        """Return the offsets of rows if all their lists are as long as those of the first."""
+    def take_even(self, table: Table) -> bool:
+        """Read an element whose rows all have the same size; return whether it is one."""
+        element = table.element
         if element.count == 0:
-            return np.zeros(0, np.int64)
-        size = self._row_size(element, self.position)
-        if size * element.count > len(self.data) - self.position:
-            return None
-        starts = self.position + np.arange(element.count, dtype=np.int64) * size
-        cursor = starts
-        for prop in element.properties:
-            if prop.count_kind:
-                counts, cursor = self._numbers(cursor, prop.count_kind)
-                if (counts != counts[0]).any():
-                    return None
-                cursor = cursor + int(counts[0]) * int(prop.kind[1])
-            else:
-                cursor = cursor + int(prop.kind[1])
-        return starts
+            return False
+        counts = self._list_sizes(element, self.position)[1]
+        # Longer lists than the file are refused with the element.
+        if sum(counts) > len(self.data) or any(count < 0 for count in counts):
+            return False
+        found = even_binary(element, self.data, self.position, self.order, counts)
+        if found is None:
+            return False
+        (table.columns, table.lists), size = found
+        self.position += size * element.count
+        return True
 
     def _row_size(self, element: Element, start: int) -> int:
         """Return the size of one row in bytes; counts beyond the end of the file are 0."""
-        place = start
+        return self._list_sizes(element, start)[0]
+
+    def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
+        """Return the size of one row in bytes, and the lengths of its lists as declared."""
+        place, counts = start, list[int]()
         for prop in element.properties:
             size = int(prop.kind[1])
             if prop.count_kind:
@@ -275,10 +312,11 @@ class _Binary:
                     "little" if self.order == "<" else "big",
                     signed=prop.count_kind[0] == "i",
                 )
+                counts.append(number)
                 place += width + max(number, 0) * size
             else:
                 place += size
-        return place - start
+        return place - start, counts
 
     def _walked(self, element: Element) -> Places:
         """Return the starts of rows, followed one by one because their lists differ in length.

@@ -1,0 +1,15 @@
+import pytest
+
+from viewer.formats._text import line_sizes as module
+from viewer.formats._text.line_sizes import line_sizes
+
+
+@pytest.mark.parametrize("piece", [1, 3, 8, 1 << 18])
+def test_sizes_are_those_of_the_lines_with_words(monkeypatch, piece):
+    monkeypatch.setattr(module, "_PIECE", piece)
+    text = b"head 9\n 1 2\r\n\r\n\t\n3\r4 5 6 \v7\f8\n\n-1.5e3\n  9  9"
+    lines = text.replace(b"\r", b"\n").split(b"\n")
+    expected = [len(line.split()) for line in lines if line.split()]
+    assert line_sizes(text, 0).tolist() == expected == [2, 2, 1, 5, 1, 2]
+    assert line_sizes(text, 7).tolist() == expected[1:]
+    assert line_sizes(b"", 0).tolist() == line_sizes(b" \n", 0).tolist() == []
