@@ -20,7 +20,7 @@ from viewer.version import VERSION
 __all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
 
 ENDED = "viewer-ended"
-"""Topic of events on the scheduler: attempts that their time limit ended."""
+"""Topic of events on the scheduler: attempts ended by their time limit."""
 
 _SETTLE = 0.5  # seconds for sending the last event of a worker that ends itself
 _FAILED = 70  # exit code of such a worker
