@@ -62,7 +62,7 @@ ALLOWED_IN_APP = {
     "files": {"core", "files"},
     "theme": set(),
     "preferences": {"core", "features", "files", "preferences", "theme"},
-    "actors": {"core", "actors"},
+    "actors": {"core", "actors", "retargeting"},
     "playback": {"core", "files", "playback"},
     "curves": {"core", "files", "curves"},
     "posing": {"core", "files", "curves", "posing"},

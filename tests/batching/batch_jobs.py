@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import time
 from pathlib import Path
 
@@ -14,7 +15,9 @@ def misbehave(item: Item) -> dict[str, int]:
     """Return the process; crash, hang, allocate 1 GB or raise where the item says so."""
     if item.name == "crash.txt":
         os._exit(3)
-    if item.name == "hang.txt":
+    if item.name == "term.txt":
+        os.kill(os.getpid(), signal.SIGTERM)  # as batch systems do at the end of a job's time
+    if item.name in ("hang.txt", "term.txt"):
         time.sleep(100)
     if item.name == "hog.txt":
         data = bytearray(1 << 30)

@@ -41,20 +41,21 @@ def test_two_thousand_files_of_which_one_in_twenty_is_broken(tmp_path, monkeypat
 def test_workers_that_crash_hang_or_eat_memory_cost_no_other_item(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 100)
-    status = {"crash": "crashed", "hang": "timeout", "hog": "memory", "raise": "failed"}
+    status = {"crash": "crashed", "hang": "timeout", "hog": "memory", "term": "crashed"}
+    status["raise"] = "failed"
     for name in status:
         (tmp_path / "in" / f"{name}.txt").write_text("1")
     limits = {"workers": 2, "retries": 1, "timeout": 0.4, "memory": 600 << 20}
     report = viewer.batch("in/*.txt", misbehave, "out", to="sum", **limits)
-    assert sorted(one.item.index for one in report.results) == list(range(104))
+    assert sorted(one.item.index for one in report.results) == list(range(105))
     by_name = {Path(one.item.name).stem: one for one in report.results}
     assert {name: by_name[name].status for name in status} == status
-    attempts = {"crash": 2, "hang": 2, "hog": 2, "raise": 1}
+    attempts = {"crash": 2, "hang": 2, "hog": 2, "term": 2, "raise": 1}
     assert {name: by_name[name].attempts for name in status} == attempts
     assert {one.item.name for one in report.failures} == {*broken, *(f"{n}.txt" for n in status)}
     assert os.getpid() not in {one.values.get("process") for one in report.results}
     assert len(list((tmp_path / "out").glob("*.sum"))) == 95
-    assert len((tmp_path / "out" / "report.jsonl").read_text().splitlines()) == 104
+    assert len((tmp_path / "out" / "report.jsonl").read_text().splitlines()) == 105
 
 
 KILLED = """

@@ -94,7 +94,8 @@ class ReportFile:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | (os.O_TRUNC if replaces else 0)
-            self._handle = os.open(path, flags, 0o666)
+            # Windows would write another line end.
+            self._handle = os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666)
         except OSError as problem:
             raise self._error(problem) from None
 

@@ -140,6 +140,13 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         "otherwise estimated from the motion (default: auto)",
     )
     group.add_argument(
+        "--feet",
+        choices=("on", "off"),
+        default="on",
+        help="keep the feet of driven figures on the ground where those of the motion stand "
+        "(default: on)",
+    )
+    group.add_argument(
         "--joint-map",
         metavar="FILE",
         help="joints of the driven figure and the joints that drive them, one pair per line, as in "
@@ -210,6 +217,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         space=arguments.space or "",
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
+        feet=arguments.feet == "on",
         joint_map=_joint_map(arguments),
         find_model=family_model,
         up=arguments.up or "",

@@ -16,6 +16,7 @@ from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
+from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "parser_of", "run"]
 
@@ -81,9 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
     prints = JOBS[arguments.job].prints
     with Display(arguments.job, plan.items, prints) as display:
         report = run_batch(plan.items, job, plan.settings, display.show)
-    print("\n".join(summary_lines(report)))
+    stream = summary_stream(plan.settings.report or "")
+    print("\n".join(summary_lines(report)), file=stream)
     for line in save_results(arguments.job, request.table, request.overview, report.results):
-        print(line)
+        print(line, file=stream)
     if report.signal:
         return 128 + report.signal
     return 0 if report.is_complete else _FAILED

@@ -83,7 +83,7 @@ def export_animation(
     space = _space(figure, options)
     with np.errstate(invalid="ignore", over="ignore"):
         body = body_of(figure, rigged, reference, options.rotation_order, space)
-    if not all(np.isfinite(part).all() for part in (body.angles, body.places, body.offsets)):
+    if not all(np.isfinite(part).all() for part in (body.angles, body.positions, body.offsets)):
         raise RigError(f"{animation.name}: expected finite numbers in every frame")
     writer = _Writer(
         animation, figure, body, _ends(animation, figure, space, reference), space, options
@@ -204,7 +204,7 @@ class _Writer:
 
     def text(self, start: int, stop: int) -> bytes:
         """Return the file contents for a range of frames."""
-        angles = np.degrees(unrolled(self.body.angles[start:stop], self.options.rotation_order))
+        angles = unrolled(self.body.angles[start:stop], self.options.rotation_order)
         positions = self.body.positions[start:stop]
         if self.options.rest_frame:
             still = self.body.offsets[None]

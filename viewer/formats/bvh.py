@@ -214,6 +214,7 @@ def _rotations(table: _Table, values: Floats) -> Floats:
             for number, part in enumerate(parts):
                 rotations[rows, joints, number] = part
     _keep_signs(rotations)
+    rotations.flags.writeable = False  # the clip can use a read-only array without a copy
     return rotations
 
 
@@ -253,6 +254,7 @@ def _translations(source: Source, table: _Table, values: Floats) -> Floats | Non
     translations = np.zeros((len(values), len(table.names), 3))
     names = [("XYZ"[axis], table.names[at]) for at, axis in zip(joints, axes, strict=True)]
     translations[:, joints, axes] = _within_reach(source, shifts - base, names)
+    translations.flags.writeable = False
     return translations
 
 

@@ -137,7 +137,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.drives and _has_bare_motion(cast):
         from viewer.loading.figure_motions import drive_by_figures
 
-        if drive_by_figures(cast, wanted, settings.joint_map):
+        if drive_by_figures(cast, wanted, settings):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate
@@ -156,7 +156,9 @@ def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSetting
     if contents.used_options is None:
         return
     used = contents.used_options | cast.used_options
-    if any(actor.drive is not None for actor in cast.actors):
+    # The first body of a capture may appear later.
+    is_driving = any(builder.target is not None for builder in cast.builders)
+    if is_driving or any(actor.drive is not None for actor in cast.actors):
         used.add("joint-map")
     cast.diagnostics += unused_options(settings, used)
 

@@ -36,7 +36,6 @@ from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
-    from viewer.rig.retargeting.joint_map import JointMap
 
 __all__ = ["drive", "is_body"]
 
@@ -245,7 +244,7 @@ def _give_body_motion(
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
     if target is not None:
-        carried = _carried(path, actor, up[-1], target, cast, settings.joint_map)
+        carried = _carried(path, actor, up, target, cast, settings)
         cast.add(carried, up[-1], placed=False)
         return
     if is_bundled and _drives_character(path, motion.name, actor, up, cast, settings):
@@ -256,14 +255,14 @@ def _give_body_motion(
 
 
 def _carried(
-    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, joint_map: JointMap | None
+    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, settings: MotionSettings
 ) -> Actor:
     """Return an actor of a figure with other joints that a body moves.
 
     Raises RigError if too few joints match.
     """
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
-    drive = carrying_drive(actor.figure, actor.clip, up, joint_map)
+    drive = carrying_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
     try:
         clip, notes = driven_clip(drive, target)
     except RigError as problem:
@@ -285,7 +284,12 @@ def _drives_character(
 
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
     body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
-    drive = Drive(SkeletonMotion(body, actor.clip), joint_map=settings.joint_map)
+    drive = Drive(
+        SkeletonMotion(body, actor.clip),
+        joint_map=settings.joint_map,
+        plants_feet=settings.feet,
+        hangs=up.startswith("-"),
+    )
     return drive_somebody(path, drive, cast, actor.placement)[0]
 
 
@@ -331,6 +335,7 @@ def _begin_capture(
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     builder.swings, builder.joint_map = settings.springs, settings.joint_map
+    builder.plants_feet = settings.feet
     _carry(builder, cast, target, drives=is_bundled and settings.drives)
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)

@@ -7,7 +7,7 @@ import gc
 from app.curves.plotted import clip_text
 from app.driver import Driver
 from app.tiny import write_rig
-from gl_objects import gl_objects
+from rendering.gpu.gl_objects import gl_objects
 
 
 def kept(hand: Driver) -> tuple[dict[str, int], int]:

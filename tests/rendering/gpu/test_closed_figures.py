@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from gl_objects import gl_objects
 from rendering.drawn_figures import arm, checker, sphere
+from rendering.gpu.gl_objects import gl_objects
 from rendering.plain_pictures import draw, front, plain
 
 from viewer.errors import RenderError

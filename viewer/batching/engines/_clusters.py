@@ -150,7 +150,8 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
             f"--{key}={value}" if value else f"--{key}" for key, value in options.items()
         ],
         worker_extra_args=["--resources", "GPU=1"] if has_gpu else [],
-        scheduler_options={"dashboard_address": ":0"},
+        # Port 0 is any free one: others use the login node too.
+        scheduler_options={"dashboard": False, "dashboard_address": ":0"},
         silence_logs=logging.CRITICAL,
         **known,
     )

@@ -24,8 +24,9 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.motion.evaluation import Frames, frames_between, rest_translations_of, world_frames
 from viewer.rig.pose import rest_pose
+from viewer.rig.skeleton import Skeleton
 
-_BLOCK = 4096  # frames at a time, so that the matrices of all frames never exist at once
+_BLOCK = 128  # frames at a time, so that their matrices fit into the processor's cache
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 
@@ -62,15 +63,12 @@ class Body:
         Relative to the parent, including the offset; for roots, in the file's space.
     moves : (J,) bool
         Joints whose positions differ from the offset.
-    places : (F, J, 3)
-        Joint positions in the file's space.
     """
 
     offsets: Floats
     angles: Floats
     positions: Floats
     moves: Bools
-    places: Floats
 
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
@@ -98,26 +96,73 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
     inner = parents >= 0
     offsets = points - np.where(inner[:, None], points[parents], 0.0)
     shape = (count, skeleton.n_joints, 3)
-    angles, positions, places = np.empty(shape), np.empty(shape), np.empty(shape)
+    angles, positions, farthest = np.empty(shape), np.empty(shape), 0.0
+    is_plain = _is_plain(figure, frames, scale)
     for start in range(0, count, _BLOCK):
         report(start, count, "frames", "converting")
         block = slice(start, min(start + _BLOCK, count))
         part = frames_between(frames, block)
-        places[block] = _places(figure, part, weights, scale) @ space.world.T * space.factor
         rotations = _rotations(figure, part, space)
         angles[block] = euler_angles(rotations, order)
-        world = np.swapaxes(
-            forward_kinematics(parents, np.ascontiguousarray(np.swapaxes(rotations, 0, 1))), 0, 1
-        )
-        offsets_from_parent = places[block] - np.where(
-            inner[:, None], places[block][:, parents], 0.0
-        )
-        within = np.einsum("njba,njb->nja", world[:, parents], offsets_from_parent)
-        positions[block] = np.where(inner[:, None], within, offsets_from_parent)
+        if is_plain:
+            positions[block] = _still_positions(figure, part, weights, scale, space)
+        else:
+            positions[block] = _positions(figure, part, weights, scale, space, rotations)
+        roots = positions[block][:, ~inner]
+        farthest = max(farthest, float(np.abs(roots).max(initial=0.0)))
     size = float(np.ptp(points, axis=0).max())
-    noise = _NOISE * (size + 1e-3 * float(np.abs(places).max(initial=0.0)))
+    noise = _NOISE * (size + 1e-3 * farthest)
     offsets, moves = _fixed(offsets, positions, inner, noise)
-    return Body(offsets, angles, positions, moves, places)
+    return Body(offsets, angles, positions, moves)
+
+
+def _is_plain(figure: Figure, frames: Frames, scale: float) -> bool:
+    """Return whether joints only rotate and translate, with bones of a fixed shape."""
+    is_fixed = len(frames.shape_weights) == 1 and (frames.figure_scales == scale).all()
+    return bool(
+        is_fixed and (frames.scales == 1.0).all() and not figure.require_skeleton().constraints
+    )
+
+
+def _still_positions(
+    figure: Figure, frames: Frames, weights: Floats, scale: float, space: Space
+) -> Floats:
+    """Return the positions of joints that only rotate and translate: (F, J, 3).
+
+    With place_j - place_parent = W t_j, W being the rotation of the parent in this frame, and D =
+    x W W_parent^-1 e^-1, they are e W_parent t_j.
+    """
+    skeleton = figure.require_skeleton()
+    inner = skeleton.parents >= 0
+    axes = _parent_axes(skeleton, space)
+    axes[~inner] = space.world
+    moved = scale * (rest_translations_of(figure, weights) + frames.translations)
+    moved[:, ~inner] += frames.figure_translations[:, None]
+    if not (axes == np.eye(3)).all():
+        moved = np.einsum("jab,fjb->fja", axes, moved)
+    return moved * space.factor
+
+
+def _positions(
+    figure: Figure, frames: Frames, weights: Floats, scale: float, space: Space, rotations: Floats
+) -> Floats:
+    """Return the positions of joints relative to their parents, from those in the world."""
+    parents = figure.require_skeleton().parents
+    inner = (parents >= 0)[:, None]
+    places = _places(figure, frames, weights, scale) @ space.world.T * space.factor
+    local = np.ascontiguousarray(np.swapaxes(rotations, 0, 1))
+    world = np.swapaxes(forward_kinematics(parents, local), 0, 1)
+    from_parent = places - np.where(inner, places[:, parents], 0.0)
+    within = np.einsum("njba,njb->nja", world[:, parents], from_parent)
+    return np.where(inner, within, from_parent)
+
+
+def _parent_axes(skeleton: Skeleton, space: Space) -> Floats:
+    """Return the rotation from the axes of each joint's parent at rest to those of the file."""
+    parents = skeleton.parents
+    above = forward_kinematics(parents, quaternion_to_matrix(skeleton.rest_rotations))[parents]
+    above[parents < 0] = np.eye(3)
+    return space.rest @ above
 
 
 def shape_at(frames: Frames, frame: int) -> Floats:
@@ -156,9 +201,7 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
     skeleton = figure.require_skeleton()
     parents = skeleton.parents
     rest = quaternion_to_matrix(skeleton.rest_rotations)
-    above = forward_kinematics(parents, rest)[parents]
-    above[parents < 0] = np.eye(3)
-    before = space.rest @ above
+    before = _parent_axes(skeleton, space)
     after = np.swapaxes(rest, -1, -2) @ np.swapaxes(before, -1, -2)
     before[parents < 0] = space.world
     rotations = quaternion_to_matrix(frames.rotations)

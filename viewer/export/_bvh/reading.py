@@ -92,15 +92,17 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
         found = world_frames(motion.figure, frames_of(motion.figure, clip, times))[:, order]
         world = np.zeros(found.shape)
         world[..., 3, 3] = 1.0
-        world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
         world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
+        if body is not None:
+            world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
         places = world[..., :3, 3].copy()
         shifts = frames_between(frames, rows).figure_translations
         world[..., :3, 3] -= shifts[:, None]
         corrective_rotations = np.zeros((len(rows), 0))
         if body is not None and body.correctives is not None:
             corrective_rotations = _corrective_rotations(figure, world / scale)
-        palette = anchored(world @ bound, np.full(len(rows), scale))
+        matrices = world[:, :0] if body is None else world @ bound
+        palette = anchored(matrices, np.full(len(rows), scale))
         return Poses(places, palette, shifts, np.zeros((1, 0)), corrective_rotations)
 
     return Side(body, poses)

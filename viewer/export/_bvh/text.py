@@ -6,16 +6,18 @@ three on the others, positions first, the same rotation order everywhere, no exp
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from viewer.formats._text.decimals import fixed
 from viewer.formats._text.number_text import row_texts
+from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
 _DEEPEST = 32  # maximum indentation in tabs
+_BLOCK = 256  # frames that are formatted at once
 _SECONDS_DIGITS = 9  # minimum decimals of the frame time, for a relative error below 1e-8
 
 
@@ -39,18 +41,31 @@ def bvh_text(
     ``moves`` (J,) bool: which joints have position channels.
     ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
     ``rate``: frames per second.
-    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in degrees in the rotation order.
+    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in radians in the rotation order.
     ``digits``: number of decimals.
     """
     order = depth_first(parents)
     lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)
-    values = _columns(order, moves, rows)
     seconds = 1.0 / rate
     decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
-    lines += ["MOTION", f"Frames: {len(values)}", f"Frame Time: {seconds:.{decimals}f}"]
+    lines += ["MOTION", f"Frames: {len(rows[0])}", f"Frame Time: {seconds:.{decimals}f}"]
     head = "\n".join(lines) + "\n"
-    frames = row_texts(values, lambda numbers: fixed(numbers, digits))
-    return b"".join([head.encode("ascii"), *frames])
+    return b"".join([head.encode("ascii"), *_frames(order, moves, rows, digits)])
+
+
+def _frames(order: Ints, moves: Bools, rows: tuple[Floats, Floats], digits: int) -> Iterator[bytes]:
+    """Yield the lines of frames, joints in the order of the file."""
+    count = len(rows[0])
+    for start in range(0, count, _BLOCK):
+        report(start, count, "frames", "formatting")
+        positions, angles = (part[start : start + _BLOCK] for part in rows)
+        angles = np.degrees(angles)
+        columns = []
+        for joint in order:
+            if joint == order[0] or moves[joint]:
+                columns.append(positions[:, joint])
+            columns.append(angles[:, joint])
+        yield from row_texts(np.concatenate(columns, axis=1), lambda part: fixed(part, digits))
 
 
 def _hierarchy(
@@ -97,14 +112,3 @@ def _hierarchy(
 
 def _vector(values: Floats, digits: int) -> str:
     return " ".join(f"{value:.{digits}f}" for value in np.round(values, digits) + 0.0)
-
-
-def _columns(order: Ints, moves: Bools, rows: tuple[Floats, Floats]) -> Floats:
-    """Return the numbers of every frame, not rounded, joints in the order of the file: (F, C)."""
-    positions, angles = rows
-    parts = []
-    for joint in order:
-        if joint == order[0] or moves[joint]:
-            parts.append(positions[:, joint])
-        parts.append(angles[:, joint])
-    return np.concatenate(parts, axis=1)

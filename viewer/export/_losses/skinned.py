@@ -58,7 +58,8 @@ class Poses:
     places : (F, J, 3)
         Joint positions.
     palette : (F, J + 1, 4, 4)
-        Skinning matrices; the last one is that of the whole figure.
+        Skinning matrices; the last one is that of the whole figure. Without a body, it is the
+        only one.
     shifts : (F, 3)
         Translations added to the vertices after skinning, independent of weights.
     weights : (F, S) or (1, S)
@@ -123,7 +124,8 @@ def figure_side(
         if corrects:
             differences = quaternion_to_matrix(part.rotations[:, 1:]) - np.eye(3)
             corrective_weights = differences.reshape(len(rows), -1)
-        palette = anchored(_skinning(figure, part, world), part.figure_scales)
+        matrices = world[:, :0] if body is None else _skinning(figure, part, world)
+        palette = anchored(matrices, part.figure_scales)
         places = world[..., :3, 3] + shifts[:, None]
         return Poses(places, palette, shifts, weights, corrective_weights)
 

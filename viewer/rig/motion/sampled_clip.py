@@ -127,8 +127,9 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
     if clip.n_rows == 0:
         rest = np.tile([0.0, 0.0, 0.0, 1.0], (len(before), clip.n_joints, 1))
         return SampledRows(present, rest, None, None, None, None, None)
-    rotations = clip.rotations[before]
+    rotations = _taken(clip.rotations, before)
     if len(between):
+        rotations = rotations.copy()
         ends = clip.rotations[after[between]]
         rotations[between] = slerp(rotations[between], ends, fraction[between, None])
 
@@ -146,10 +147,19 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
     )
 
 
+def _taken(rows: Floats, places: Ints) -> Floats:
+    """Return the rows at some places; the array itself if these are all rows."""
+    if len(places) == len(rows) and (places == np.arange(len(rows))).all():
+        return rows
+    return rows[places]
+
+
 def _line(rows: Floats, before: Ints, after: Ints, fraction: Floats) -> Floats:
     if len(rows) == 1:
         return rows[np.zeros(len(before), dtype=np.int32)]
-    start = rows[before]
+    start = _taken(rows, before)
+    if not fraction.any():
+        return start
     weight = fraction.reshape(-1, *[1] * (rows.ndim - 1))
     return start + weight * (rows[after] - start)
 
