@@ -32,7 +32,7 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
-    # Not MALLOC_TRIM_THRESHOLD_: memory that is returned at once is faulted in again by every array.
+    # Not MALLOC_TRIM_THRESHOLD_: arrays would fault in again the memory that others returned.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
     # These look at the workers many times a second, which costs a tenth of short items and more.
     "distributed.worker.profile.enabled": False,
