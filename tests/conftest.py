@@ -90,6 +90,7 @@ def own_settings(tmp_path_factory, monkeypatch) -> None:
     folder = tmp_path_factory.getbasetemp() / f"settings{next(_NUMBERS)}"
     for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(folder / name))
+    monkeypatch.setenv("VIEWER_CACHE", "off")
 
 
 @pytest.fixture

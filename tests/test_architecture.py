@@ -20,7 +20,7 @@ OTHER_FOLDERS = {"bench", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.
-EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress"}
+EVERYWHERE = {"diagnostics", "errors", "near_names", "phrases", "progress", "version"}
 PARTS = {
     "rig": set(),
     "autorig": {"rig"},
@@ -34,12 +34,13 @@ PARTS = {
         *("rendering", "rig", "interrupts", "resources"),
     },
     "lint": {"loading", "formats", "rig"},
-    "batching": {"formats", "media", "interrupts", "streams"},
+    "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
     "models": {"formats", "interrupts"},
     "interrupts": set(),
     "resources": set(),
     "streams": set(),
+    "version": set(),
 }
 LEAVES = {
     "phrases": set(),
@@ -47,6 +48,7 @@ LEAVES = {
     "errors": {"diagnostics", "phrases"},
     "near_names": {"phrases"},
     "progress": set(),
+    "version": set(),
 }
 ALLOWED = {name: parts | {name} for name, parts in LEAVES.items()} | {
     name: parts | EVERYWHERE | {name} for name, parts in PARTS.items()
@@ -60,7 +62,7 @@ ALLOWED_IN_APP = {
     "files": {"core", "files"},
     "theme": set(),
     "preferences": {"core", "features", "files", "preferences", "theme"},
-    "actors": {"core", "actors"},
+    "actors": {"core", "actors", "retargeting"},
     "playback": {"core", "files", "playback"},
     "curves": {"core", "files", "curves"},
     "posing": {"core", "files", "curves", "posing"},
@@ -85,15 +87,19 @@ HOMES = {
     "glfw": {"app"},
     "imgui_bundle": {"app"},
     "PIL": {
+        "media/captioned_sheet.py",
         "media/cell_labels.py",
         "media/image.py",
+        "media/thumbnails.py",
         "rendering/overlay/legend_picture.py",
         "rendering/overlay/lettering.py",
+        "rendering/overlay/typeface.py",
     },
     "av": {"media/video.py", "media/video_frames.py"},
     "isal": {"media/png.py"},
     "rich": {"commands"},
     "shtab": {"commands/completion.py"},
+    "pebble": {"batching/engines/processes.py"},
 }
 
 

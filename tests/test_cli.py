@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import stat
@@ -40,6 +41,19 @@ def _refused(done, code, *words):
     assert done.returncode == code, lines
     assert len(lines) == 1 and ": " in lines[0], lines
     assert all(word in lines[0] for word in words), lines
+
+
+def test_garbage_is_collected_once_the_program_has_started(rig, capsys):
+    frozen = gc.get_freeze_count()
+    assert run(["info", str(rig[0])]) == 0
+    assert gc.get_freeze_count() <= frozen  # nothing was suspended
+    gc.disable()
+    try:
+        assert run(["info", str(rig[0])]) == 0
+        assert gc.isenabled()
+        assert gc.get_freeze_count() > frozen
+    finally:
+        gc.enable()
 
 
 def test_help_and_version():

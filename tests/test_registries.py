@@ -8,6 +8,7 @@ import pytest
 
 import viewer
 from viewer.app.features import ACTIONS, KEYS, PANELS, panel_module
+from viewer.batching.engines import ENGINES
 from viewer.commands import COMMANDS
 from viewer.export import EXPORTERS
 from viewer.formats import FORMATS
@@ -29,8 +30,9 @@ def modules(folder: str) -> set[str]:
         ("rig/skinning", METHODS),
         ("commands", COMMANDS),
         ("export", EXPORTERS),
+        ("batching/engines", ENGINES),
     ],
-    ids=["formats", "skinning", "commands", "export"],
+    ids=["formats", "skinning", "commands", "export", "engines"],
 )
 def test_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert modules(folder) == set(registry)

@@ -1,10 +1,13 @@
 """Run the viewer: ``python -m viewer`` and the command ``viewer``."""
 
+import gc
 import sys
 
 
 def main() -> int:
     """Run the command line and return its exit code."""
+    # Searching for garbage while modules are imported finds none; ``run`` resumes it.
+    gc.disable()
     try:
         from viewer.interrupts import watch_program
 

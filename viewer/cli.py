@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import gc
 import io
 import os
 import sys
@@ -103,7 +104,21 @@ def _dispatch(arguments: list[str]) -> int:
     parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
-    return import_module(f"viewer.commands.{name}").run(parsed)
+    command = import_module(f"viewer.commands.{name}")
+    _resume_collection()
+    if getattr(parsed, "no_cache", False):
+        from viewer.media.array_cache import without_cache
+
+        with without_cache():
+            return command.run(parsed)
+    return command.run(parsed)
+
+
+def _resume_collection() -> None:
+    """Collect garbage from now on, if starting the program suspended it; modules are left out."""
+    if not gc.isenabled():
+        gc.freeze()
+        gc.enable()
 
 
 def protect_numbers(arguments: list[str]) -> list[str]:

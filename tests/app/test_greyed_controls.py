@@ -40,7 +40,10 @@ def rest(hand, label):
     [
         ("Timeline", NOTHING_MOVES),
         ("Curves", NOTHING_MOVES),
-        ("Actors", NOTHING_MOVES),
+        (
+            "Actors",
+            "one figure and no motion: open several figures together, or a motion",
+        ),
         ("Shape", "this figure has no blend shapes"),
         ("Hands", "this figure has no hands"),
     ],

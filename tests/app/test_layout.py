@@ -10,7 +10,7 @@ from imgui_bundle import imgui
 
 from viewer.app.features import PANELS
 from viewer.app.layout import Layout
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.shown_panels import ShownPanels, set_open
 
 
 def resize(hand, *size):
@@ -67,6 +67,21 @@ def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
     assert "Filter" in hand.state.item_rects
 
 
+def test_menu_brings_a_hidden_tab_to_the_front_and_into_view(drive, rig):
+    hand = drive(*rig, size=(900, 600))
+    for title in ("Stats", "Display"):
+        hand.menu("menu Window", title)
+        hand.step(4)
+        window = imgui.internal.find_window_by_name(title)
+        tab, bar = window.dc.dock_tab_item_rect, window.dock_node.tab_bar.bar_rect
+        assert window.dock_node.selected_tab_id == window.tab_id
+        assert bar.min.x <= tab.min.x + 1 and tab.max.x <= bar.max.x + 1
+        assert not hand.state.of(ShownPanels).closed
+    # Only the panel in front is closed.
+    hand.menu("menu Window", "Display")
+    assert hand.state.of(ShownPanels).closed == {"display"}
+
+
 def test_panel_closes_by_its_cross(hand):
     tab = imgui.internal.find_window_by_name("Joints").dc.dock_tab_item_rect
     hand.click((tab.max.x - 8, (tab.min.y + tab.max.y) / 2))
@@ -75,9 +90,9 @@ def test_panel_closes_by_its_cross(hand):
 
 
 def test_all_panels_closed_leave_the_view(hand):
-    for panel in PANELS.values():
+    for name, panel in PANELS.items():
         if not panel.needs and not panel.on_demand:  # the others are closed
-            hand.menu("menu Window", panel.title)
+            set_open(hand.state, name, False)
     hand.step(3)
     x, _y, width, height = hand.state.view_rect
     assert (x, width) == (0, 1000) and height > 600
@@ -87,7 +102,7 @@ def test_all_panels_closed_leave_the_view(hand):
 def test_reset_layout_opens_every_panel_where_it_was(hand):
     rect, labels = hand.state.view_rect, set(hand.state.item_rects)
     hand.menu("menu Window", "Joints")
-    hand.menu("menu Window", "Stats")
+    set_open(hand.state, "stats", False)
     hand.menu("menu Window", "Reset layout")
     hand.step(4)
     assert not hand.state.of(ShownPanels).closed

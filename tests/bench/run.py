@@ -23,6 +23,7 @@ NAMES = [
     "gltf",
     "nodes",
     "captures",
+    "batch",
     "observing",
     "losses",
     "lint",

@@ -87,6 +87,7 @@ def write_wheel(path, content):
         (["add"], "anny"),
         (["add", "smpl"], "smpl"),
         (["list", "anny"], "anny"),
+        (["--dry-run"], "expected models add NAME"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_line(arguments, part, capsys):

@@ -181,6 +181,16 @@ def test_ranges_outside_the_frames_of_the_file_are_refused(frames):
         clean_up(Scene([person(0, 0, 60)]), CleanUp(frames=frames))
 
 
+def test_the_note_names_the_windows_that_were_used():
+    # At 30 frames per second, 0.2 s are 7 frames; runs of 4 and 1 frames have 3 and none.
+    scene = Scene([person(0, 0, 4), person(1, 8, 9), person(2, 12, 60)])
+    wanted = CleanUp(merged=((0, 1, 2),), smoothing=SavitzkyGolay())
+    *_, note = clean_up(scene, wanted)
+    assert "Savitzky-Golay filter, 3 to 7 frames, degree 2; 1 run of too few frames is un" in str(
+        note
+    )
+
+
 def driven() -> Actor:
     """Return a person whose motion was retargeted from a skeleton with the same joints."""
     actor = person(0, 0, 60)

@@ -162,7 +162,7 @@ def options() -> str:
     for command in COMMANDS:
         for group in command_parser(command)._action_groups:
             for action in group._group_actions:
-                if action.dest != "help":
+                if action.dest != "help" and action.help != argparse.SUPPRESS:
                     row = _names(action), (action.help or "").replace("%%", "%")
                     rows = groups.setdefault(_title(group), {})
                     rows.setdefault(row, []).append(command)

@@ -60,7 +60,7 @@ def test_links_resolve(path: Path) -> None:
 def test_options_used_on_pages_exist(page: str, line: str) -> None:
     words = shlex.split(line, comments=True)[1:]
     name = words.pop(0) if words and words[0] in COMMANDS else "view"
-    parser = command_parser(name)
+    parser = command_parser(name, words)
     words = protect_numbers(words)
     parser.check_options(words)
     parser.parse_intermixed_args(words)

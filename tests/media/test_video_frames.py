@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from media.small_videos import write
+from PIL import Image
 
 from viewer.errors import FormatError
 from viewer.media import video_frames
@@ -96,6 +97,15 @@ def test_other_files_are_refused(tmp_path, data):
     with pytest.raises(FormatError) as found:
         VideoFrames(path)
     assert found.value.diagnostic.key in ("F002.video", "F002.video-stream")
+
+
+@pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp"])
+def test_pictures_are_no_videos(tmp_path, suffix):
+    path = tmp_path / f"a{suffix}"
+    Image.new("RGB", (8, 6)).save(path)
+    with pytest.raises(FormatError) as found:
+        VideoFrames(path)
+    assert found.value.diagnostic.key == "F002.video-picture"
 
 
 def test_missing_files_are_refused_with_the_reason(tmp_path):

@@ -160,6 +160,16 @@ def test_search_of_a_huge_folder_ends(folder, monkeypatch):
     assert len(looked) == 1 + 21
 
 
+def test_a_name_is_looked_up_in_one_walk(folder, monkeypatch):
+    root = folder("a/SMPL_MALE.npz", "b/SMPLX_NEUTRAL.npz")
+    roots = []
+    real = os.walk
+    monkeypatch.setattr(models.os, "walk", lambda path: roots.append(path) or real(path))
+    assert models.find_model("smplx", root) == root / "b" / "SMPLX_NEUTRAL.npz"
+    assert models.find_model("smpl_male.npz", root) == root / "a" / "SMPL_MALE.npz"
+    assert roots == [root, root]
+
+
 # The remembered folder
 
 

@@ -144,6 +144,22 @@ def test_volume_far_from_the_origin_keeps_its_digits():
     assert volume(box, CUBE) == pytest.approx(4.2, abs=1e-8)
 
 
+@pytest.mark.parametrize("seed", range(20))
+def test_split_vertices_are_the_distinct_pairs_in_ascending_order(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n_vertices, n_uvs, n_triangles = rng.integers(3, 20, 3)
+    triangles = rng.integers(0, n_vertices, (n_triangles, 3))
+    uv_triangles = rng.integers(0, n_uvs, (n_triangles, 3))
+    positions, uvs = rng.normal(size=(n_vertices, 3)), rng.random((n_uvs, 2))
+    mesh = build(positions, triangles, uvs=uvs, uv_triangles=uv_triangles)
+    check_split(mesh)
+    sources, uv_indices, _ = split_seams(mesh)
+    pairs = sorted({*zip(triangles.ravel().tolist(), uv_triangles.ravel().tolist(), strict=True)})
+    unused = sorted({*range(n_vertices)} - {*triangles.ravel().tolist()})
+    assert sources.tolist() == [vertex for vertex, _ in pairs] + unused
+    assert uv_indices.tolist()[: len(pairs)] == [uv for _, uv in pairs]
+
+
 def test_hole_far_from_the_origin_does_not_count_as_volume():
     # Without the top, a sixth of the cube is missing: the pyramid from its middle.
     open_cube = np.array([t for t in CUBE.tolist() if not set(t) <= {1, 5, 7, 3}])

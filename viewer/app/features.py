@@ -246,6 +246,7 @@ KEYS = (
 _WANT = "window_actions.want"
 _ROOM = "core.reasons.no_job_room"
 _MATCH = "retargeting.match_actions"
+_NO_EDIT = "retargeting.drive_changes.no_edit"
 
 ACTIONS = (
     Action("Open the bundled figure", _WANT, ("open bundled",)),
@@ -268,10 +269,11 @@ ACTIONS = (
     Action("Reset the pose of this actor", "posing.pose_actions.reset_actor"),
     Action("Reset shape", "posing.pose_actions.reset_shape"),
     Action("Random shape", "posing.pose_actions.random_shape"),
-    Action("Match joints automatically", f"{_MATCH}.match_automatically", why=f"{_MATCH}.no_edit"),
-    Action("Load joint map…", f"{_MATCH}.ask_for_map", why=f"{_MATCH}.no_edit"),
+    Action("Match joints automatically", f"{_MATCH}.match_automatically", why=_NO_EDIT),
+    Action("Load joint map…", f"{_MATCH}.ask_for_map", why=_NO_EDIT),
     Action("Save joint map…", f"{_MATCH}.ask_where_to_save", why="core.reasons.no_drive"),
     Action("Show all parts", "actors.part_actions.show_all_parts", why="core.reasons.no_parts"),
+    Action("Feet on the ground", "retargeting.feet.toggle_feet", why=_NO_EDIT),
     Action("Springs", "actors.springs.toggle_springs", why="actors.springs.no_springs"),
     Action("Reset lights", "view.display_actions.reset_lights"),
     Action("Axis gizmo", "view.display_actions.toggle_gizmo"),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from imgui_bundle import imgui, implot
 
@@ -10,7 +11,7 @@ from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.frame import Frame
 from viewer.app.preferences.state import Appearance
-from viewer.app.theme import apply_theme
+from viewer.app.theme import add_system_fonts, apply_theme, lacks_letters
 from viewer.rendering.gpu.graphics import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
@@ -99,6 +100,8 @@ class HeadlessApp:
         for note in self.state.messages.notes:
             note.until = math.inf
         self.state.framing.is_fitting = fits
+        if lacks_letters(_names(self.state)):
+            add_system_fonts()
         self.step(_SETTLE_FRAMES)
         while self.state.of(Files).stream is None and not self.state.framing.is_settled:
             self.step(1)
@@ -126,6 +129,17 @@ class HeadlessApp:
 
     def __exit__(self, *_: object) -> None:
         self.release()
+
+
+def _names(state: AppState) -> Iterator[str]:
+    """Yield the names from files that panels may show, and the messages."""
+    yield from (note.text for note in state.messages.notes)
+    for actor in state.scene.actors:
+        figure = actor.figure
+        yield actor.name
+        yield from () if figure.skeleton is None else figure.skeleton.names
+        yield from () if figure.blend_shapes is None else figure.blend_shapes.names
+        yield from () if figure.mesh is None else figure.mesh.parts
 
 
 def _upload_textures() -> None:

@@ -9,13 +9,13 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS, Panel, panel_module
-from viewer.app.layout import Layout, draw_dock, keep_fronts
+from viewer.app.layout import Layout, bring_to_front, draw_dock, keep_fronts
 from viewer.app.manual.manual_window import draw_manual
 from viewer.app.menus import draw_menus
 from viewer.app.message_window import draw_error, draw_message_window
 from viewer.app.overlays import draw_overlays
 from viewer.app.preferences.preferences_window import draw_preferences
-from viewer.app.shown_panels import is_open, set_open
+from viewer.app.shown_panels import ShownPanels, is_open, set_open
 
 __all__ = ["draw_interface"]
 
@@ -31,13 +31,13 @@ def draw_interface(state: AppState) -> list[Path]:
             if is_open(state, name) and not no_panel(state, panel.needs):
                 appears = _draw_panel(state, name, panel)
                 leading = panel.title if appears and panel.leads else leading
-        layout = state.of(Layout)
-        for title in layout.fronts:
-            imgui.set_window_focus(title)
-        layout.fronts.clear()
+        for fronts in (state.of(Layout).fronts, state.of(ShownPanels).fronts):
+            for title in fronts:
+                bring_to_front(title)
+            fronts.clear()
         if leading:
             # Set after the panels are drawn: a menu that closes brings another panel to the front.
-            imgui.set_window_focus(leading)
+            bring_to_front(leading)
         node = imgui.internal.dock_builder_get_central_node(dock)
         state.view_rect = (node.pos.x, node.pos.y, node.size.x, node.size.y)
     else:

@@ -9,9 +9,17 @@ from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
-from viewer.app.shown_panels import ShownPanels
+from viewer.app.shown_panels import ShownPanels, is_open, set_open, show_panel
 
-__all__ = ["Layout", "Sizes", "default_sizes", "draw_dock", "keep_fronts"]
+__all__ = [
+    "Layout",
+    "Sizes",
+    "bring_to_front",
+    "default_sizes",
+    "draw_dock",
+    "keep_fronts",
+    "toggle_panel",
+]
 
 _DOCK = "viewer dock"
 # Minimum and maximum width of each side, in font sizes.
@@ -122,6 +130,7 @@ def draw_dock(state: AppState) -> int:
         _resize(layout, sizes) if is_same else _rebuild(layout, dock, sizes)
     else:
         _notice(layout)
+    _scroll_tabs()
     flags = imgui.DockNodeFlags_.passthru_central_node
     flags |= imgui.DockNodeFlags_.no_docking_over_central_node
     imgui.dock_space_over_viewport(dock, imgui.get_main_viewport(), flags)
@@ -190,6 +199,23 @@ def _rebuild(layout: Layout, dock: int, sizes: Sizes) -> None:
     layout.fronts += front
 
 
+def toggle_panel(state: AppState, name: str) -> None:
+    """Close a panel in front; open another one, or bring it to the front if it is open."""
+    if is_open(state, name) and _is_in_front(PANELS[name].title):
+        set_open(state, name, False)
+    else:
+        show_panel(state, name)
+
+
+def bring_to_front(title: str) -> None:
+    """Bring a panel in front of its neighbours, and scroll to its tab if there are many."""
+    imgui.set_window_focus(title)
+    window = imgui.internal.find_window_by_name(title)
+    node = None if window is None else window.dock_node
+    if window is not None and node is not None and node.tab_bar is not None:
+        node.tab_bar.next_selected_tab_id = window.tab_id
+
+
 def keep_fronts(layout: Layout) -> None:
     """Remember the tabs in front while the panels are hidden."""
     layout.fronts = layout.fronts or _in_front()
@@ -231,6 +257,14 @@ def _notice(layout: Layout) -> None:
     if layout.found and drags and found != layout.found:
         layout.is_arranged = True
     layout.found = found
+
+
+def _scroll_tabs() -> None:
+    """Scroll tab bars to their targets at once: an idle window draws no frames of an animation."""
+    for title in _docked():
+        node = imgui.internal.find_window_by_name(title).dock_node
+        if node is not None and node.tab_bar is not None:
+            node.tab_bar.scrolling_anim = node.tab_bar.scrolling_target
 
 
 def _docked() -> list[str]:

@@ -26,6 +26,7 @@ from viewer.app.files.model_menu import draw_model_menu
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
+from viewer.app.layout import toggle_panel
 from viewer.app.linting.actions import check_rig
 from viewer.app.manual.manual_window import draw_manual_menu
 from viewer.app.palette.palette_window import toggle_palette
@@ -40,7 +41,7 @@ from viewer.app.posing.pose_actions import (
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.record_dialog import open_record_dialog
-from viewer.app.shown_panels import is_open, reset_layout, set_open
+from viewer.app.shown_panels import is_open, reset_layout
 from viewer.app.view.view_menu import draw_view_menu
 from viewer.export import files_written
 from viewer.formats import FORMATS, file_stem, opened_text
@@ -65,9 +66,8 @@ def draw_menus(state: AppState) -> list[Path]:
     if begin_menu(state, "Window"):
         for name, panel in PANELS.items():
             why = no_panel(state, panel.needs)
-            shown = is_open(state, name)
-            if menu_item(state, panel.title, "", shown, why):
-                set_open(state, name, not shown)
+            if menu_item(state, panel.title, "", is_open(state, name), why):
+                toggle_panel(state, name)
         imgui.separator()
         if menu_item(state, "Messages", "Ctrl+M", state.messages.is_open):
             state.messages.is_open = not state.messages.is_open

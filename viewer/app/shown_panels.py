@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
 
-__all__ = ["ShownPanels", "is_open", "reset_layout", "set_open"]
+__all__ = ["ShownPanels", "is_open", "reset_layout", "set_open", "show_panel"]
 
 
 @dataclass(slots=True)
@@ -22,11 +22,14 @@ class ShownPanels:
         Panels on demand that were opened.
     wants_reset : bool
         Whether the default layout is to be restored.
+    fronts : list of str
+        Titles of panels to bring to the front of their tabs once they are drawn.
     """
 
     closed: set[str] = field(default_factory=set)
     opened: set[str] = field(default_factory=set)
     wants_reset: bool = False
+    fronts: list[str] = field(default_factory=list)
 
 
 def is_open(state: AppState, name: str) -> bool:
@@ -46,6 +49,12 @@ def set_open(state: AppState, name: str, opened: bool) -> None:
         names.add(name)
     else:
         names.discard(name)
+
+
+def show_panel(state: AppState, name: str) -> None:
+    """Open a panel, and bring it to the front of its tabs once it is drawn."""
+    set_open(state, name, True)
+    state.of(ShownPanels).fronts.append(PANELS[name].title)
 
 
 def reset_layout(state: AppState) -> None:

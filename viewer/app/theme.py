@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterable
 
-import imgui_bundle
 from imgui_bundle import imgui
 
-__all__ = ["apply_theme", "change_scale", "set_theme"]
+from viewer.rendering.overlay.typeface import interface_font, system_fonts
+
+__all__ = ["add_system_fonts", "apply_theme", "change_scale", "lacks_letters", "set_theme"]
 
 _FONT_POINTS = 15.0
 _ACCENT = (0.93, 0.55, 0.20, 1.0)
@@ -27,6 +28,7 @@ _COLORS = {
     "quiet text": ((0.56, 0.57, 0.59, 1.0), (0.37, 0.385, 0.41, 1.0)),
     "track": ((0.80, 0.47, 0.17, 1.0), (0.84, 0.47, 0.12, 1.0)),
     "track active": ((1.0, 0.66, 0.30, 1.0), (0.72, 0.37, 0.04, 1.0)),
+    "docking": ((0.93, 0.55, 0.20, 0.5), (0.84, 0.47, 0.12, 0.4)),
     "dim": ((0.0, 0.0, 0.0, 0.5), (0.0, 0.0, 0.0, 0.3)),
     "grip": ((0.30, 0.33, 0.37, 1.0), (0.70, 0.72, 0.75, 1.0)),
     "chosen text": ((0.62, 0.36, 0.12, 0.9), (0.97, 0.78, 0.55, 1.0)),
@@ -37,7 +39,7 @@ _USES = {
     "popup": ("popup_bg",),
     "title": ("title_bg", "title_bg_active", "menu_bar_bg", "table_header_bg"),
     "tab": ("tab", "tab_dimmed"),
-    "frame": ("frame_bg",),
+    "frame": ("frame_bg", "checkbox_selected_bg"),
     "button": ("button", "header"),
     "button hovered": ("button_hovered",),
     "hovered": ("frame_bg_hovered", "header_hovered", "tab_hovered"),
@@ -45,8 +47,14 @@ _USES = {
     "line": ("separator",),
     "text": ("text",),
     "quiet text": ("text_disabled",),
-    "track": ("slider_grab",),
-    "track active": ("slider_grab_active", "resize_grip_hovered", "resize_grip_active"),
+    "track": ("slider_grab", "separator_hovered"),
+    "track active": (
+        "slider_grab_active",
+        "resize_grip_hovered",
+        "resize_grip_active",
+        "separator_active",
+    ),
+    "docking": ("docking_preview",),
     "dim": ("modal_window_dim_bg",),
     "grip": ("resize_grip",),
     "chosen text": ("text_selected_bg", "plot_histogram"),
@@ -64,8 +72,8 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     theme : str
         ``"dark"`` or ``"light"``.
     """
-    font = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "DroidSans.ttf"
-    if font.is_file():
+    font = interface_font()
+    if font is not None:
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
     # A click on a number that can be dragged begins to type it.
     imgui.get_io().config_drag_click_to_input_text = True
@@ -82,6 +90,24 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     style.grab_min_size = 8.0
     style.scale_all_sizes(scale)
     style.font_scale_dpi = scale
+
+
+def lacks_letters(texts: Iterable[str]) -> bool:
+    """Return whether the current font lacks a letter of some texts."""
+    font = imgui.get_io().fonts.fonts[0]
+    letters = {letter for text in texts if not text.isascii() for letter in text}
+    return not all(font.is_glyph_in_font(ord(letter)) for letter in letters)
+
+
+def add_system_fonts() -> None:
+    """Complete the font with those of the system, for Chinese, Arabic and other scripts.
+
+    The files are large, so this is done after the first pictures of a window.
+    """
+    for path in system_fonts():
+        config = imgui.ImFontConfig()
+        config.merge_mode = True
+        imgui.get_io().fonts.add_font_from_file_ttf(str(path), _FONT_POINTS, config)
 
 
 def change_scale(old: float, new: float) -> None:

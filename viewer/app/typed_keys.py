@@ -1,4 +1,4 @@
-"""Filter for keys that only type a character, which bypass ImGui's queue during text input.
+"""Input between two frames: keys that only type a character, shortcuts, and clicks.
 
 ImGui spreads the press and release of a key over two frames, so that no press is lost, and delays
 all later input. On a slow machine, typed text would appear at one or two characters per frame.
@@ -16,7 +16,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-__all__ = ["TypedKeys", "end_frame_before"]
+__all__ = ["TypedKeys", "end_frame_before", "end_frame_before_click"]
 
 _PRINTABLE = range(32, 163)  # GLFW's keys from Space to World 2
 _KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
@@ -66,6 +66,28 @@ def end_frame_before(queue: Any, key: int, action: int) -> None:
     key, action : int
         Arguments of GLFW's key callback.
     """
-    if action == _RELEASE and key in _MODIFIERS and len(queue):
+    if action == _RELEASE and key in _MODIFIERS:
+        end_frame(queue)
+
+
+def end_frame_before_click(queue: Any, action: int) -> None:
+    """Let the motion before a press of a mouse button have a frame of its own.
+
+    Tabs and other widgets that may overlap react only if they were hovered in an earlier frame.
+
+    Parameters
+    ----------
+    queue : sequence
+        ImGui's queue of input events, to which the press has not been added yet.
+    action : int
+        Argument of GLFW's mouse button callback.
+    """
+    if action == _PRESS:
+        end_frame(queue)
+
+
+def end_frame(queue: Any) -> None:
+    """Let ImGui process the events of its queue, if there are any, before later ones."""
+    if len(queue):
         for is_down in (True, False):
             imgui.get_io().add_key_event(_SEPARATOR, is_down)

@@ -35,8 +35,8 @@ from viewer.app.preferences.applying import scale_of, start_with  # noqa: E402
 from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
-from viewer.app.theme import apply_theme  # noqa: E402
-from viewer.app.typed_keys import TypedKeys, end_frame_before  # noqa: E402
+from viewer.app.theme import add_system_fonts, apply_theme  # noqa: E402
+from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
@@ -58,6 +58,7 @@ __all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
+_FIRST_FRAMES = 3  # frames after which fonts for further scripts are read
 _IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
 _BUSY_SECONDS = 0.05  # the same interval while a file is being read
 
@@ -163,6 +164,7 @@ class _Window:
             raise
         self._dropped: list[Path] = []
         self._is_dirty = True
+        self._n_drawn = 0
         self._title = ""
         self._typed_keys = TypedKeys()
         self._set_callbacks()
@@ -186,6 +188,10 @@ class _Window:
             end_frame_before(self._imgui.input_events_queue, key, action)
             imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
+    def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
+        end_frame_before_click(self._imgui.input_events_queue, action)
+        imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
+
     def _on_change(self, *_: Any) -> None:
         self._is_dirty = True
 
@@ -207,7 +213,9 @@ class _Window:
         apply_theme(appearance.scale)
         self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
         imgui.backends.glfw_init_for_opengl(self._address, True)
-        glfw.set_key_callback(self.handle, self._on_key)  # replaces the callback of ImGui
+        # These replace callbacks of ImGui.
+        glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_mouse_button_callback(self.handle, self._on_button)
         imgui.backends.opengl3_init("#version 330")
 
     def _screen_scale(self) -> float:
@@ -272,6 +280,9 @@ class _Window:
         if min(size) < 1:
             return False
         self._set_title()
+        self._n_drawn += 1
+        if self._n_drawn == _FIRST_FRAMES:
+            add_system_fonts()
         self.state.of(Appearance).screen_scale = self._screen_scale()
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()

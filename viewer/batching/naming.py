@@ -14,7 +14,7 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["FIELDS", "check_outputs", "has_fields", "items_of", "template_of"]
+__all__ = ["FIELDS", "check_outputs", "items_of", "output_folder", "template_of"]
 
 FIELDS = {
     "parent": "the input's folder, relative to the folder that all inputs share",
@@ -62,9 +62,13 @@ def template_of(output: str, suffix: str) -> str:
     return os.path.join(folder, "{parent}", "{stem}" + last)
 
 
-def has_fields(output: str) -> bool:
-    """Return whether an output is a template rather than a folder."""
-    return bool(_fields(output))
+def output_folder(output: str) -> str:
+    """Return the folder of all outputs of a folder or template; empty if it has no name.
+
+    >>> output_folder("out"), output_folder("out/a_{stem}.bvh"), output_folder("{stem}.bvh")
+    ('out', 'out', '')
+    """
+    return os.path.dirname(output.partition("{")[0]) if _fields(output) else output
 
 
 def _fields(template: str) -> list[str]:
@@ -99,17 +103,17 @@ def items_of(inputs: Inputs, template: str = "") -> list[Item]:
         Template of the output names; empty if nothing is written.
     """
     pieces = list(Formatter().parse(template))
+    here = os.getcwd()
     items = []
     for index, path in enumerate(inputs.paths):
-        name = _below(path, inputs.base)
+        name = _below(os.path.normpath(os.path.join(here, path)), inputs.base)
         output = _filled(pieces, index, path, name, path in inputs.folders) if template else ""
         items.append(Item(index, (path,), output, name))
     return items
 
 
-def _below(path: str, base: str) -> str:
-    """Return a path relative to the shared folder."""
-    full = os.path.abspath(path)
+def _below(full: str, base: str) -> str:
+    """Return an absolute path relative to the shared folder."""
     if base and full.startswith(os.path.join(base, "")):
         return full[len(base) :].lstrip(os.sep).replace(os.sep, "/")
     return os.path.splitdrive(full)[1].lstrip(os.sep).replace(os.sep, "/")
@@ -162,9 +166,10 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
         The message lists the outputs and their inputs.
     """
     owners: dict[str, Item] = {}
+    here = os.getcwd()
     clashes = []
     for item in items:
-        other = owners.setdefault(_identity(item.output), item) if item.output else item
+        other = owners.setdefault(_identity(here, item.output), item) if item.output else item
         if other is not item:
             clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
     if clashes:
@@ -183,8 +188,9 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
         raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
 
 
-def _identity(path: str) -> str:
-    return unicodedata.normalize("NFC", os.path.abspath(path)).casefold()
+def _identity(folder: str, path: str) -> str:
+    path = os.path.normpath(os.path.join(folder, path))
+    return (path if path.isascii() else unicodedata.normalize("NFC", path)).casefold()
 
 
 class _RealPaths:

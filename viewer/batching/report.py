@@ -12,18 +12,20 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from viewer.batching.items import Item, Result
+from viewer.diagnostics.describing import plain
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable
 
 __all__ = ["Report", "ReportFile", "read_results"]
 
-_NAMES = {field.name for field in fields(Result)} - {"item"}
+_ITEM_NAMES = [field.name for field in fields(Item)]
+_NAMES = [field.name for field in fields(Result) if field.name != "item"]
 
 
 @dataclass
@@ -92,7 +94,8 @@ class ReportFile:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | (os.O_TRUNC if replaces else 0)
-            self._handle = os.open(path, flags, 0o666)
+            # Windows would write another line end.
+            self._handle = os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666)
         except OSError as problem:
             raise self._error(problem) from None
 
@@ -156,11 +159,14 @@ def _locked(handle: int) -> Iterator[None]:
 
 def _line(result: Result) -> str:
     """Return a result as one line of JSON; the item's fields come first."""
-    item = asdict(result.item)
-    rest = {name: getattr(result, name) for name in _NAMES}
-    ordered = {one.name: rest[one.name] for one in fields(Result) if one.name in rest}
-    ordered["seconds"] = round(result.seconds, 6)
-    return json.dumps(item | ordered, default=str, separators=(",", ":"))
+    item = {name: getattr(result.item, name) for name in _ITEM_NAMES}
+    found = item | {name: getattr(result, name) for name in _NAMES}
+    found["seconds"] = round(result.seconds, 6)
+    try:
+        return json.dumps(found, default=str, separators=(",", ":"), allow_nan=False)
+    except ValueError:  # JSON has no infinite numbers, and no NaN
+        found["values"] = plain(result.values)
+        return json.dumps(found, default=str, separators=(",", ":"))
 
 
 def read_results(path: Path) -> list[Result]:

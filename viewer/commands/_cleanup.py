@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
 __all__ = ["add_cleanup_arguments", "clean_up_of"]
 
-_ONE_SECOND = 0  # value of --fill-gaps without a number
 _LONGEST_WINDOW = 9999
 _KEYS = {"one-euro": ("cutoff", "beta", "speed-cutoff"), "savgol": ("window", "order")}
 
@@ -33,15 +32,6 @@ def add_cleanup_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="A,B,…",
         help="IDs of tracks that belong to one person, who keeps ID A; may be repeated",
-    )
-    group.add_argument(
-        "--fill-gaps",
-        nargs="?",
-        type=_longest,
-        const=_ONE_SECOND,
-        metavar="N",
-        help="interpolate gaps of up to N frames (default: one second); longer ones remain, see "
-        "--gaps of viewer convert",
     )
     group.add_argument(
         "--smooth",
@@ -112,16 +102,6 @@ def _people(text: str) -> tuple[int, ...]:
             f"expected at least two numbers of people, as in 3,7, found {printable(text, 40)}"
         )
     return people
-
-
-def _longest(text: str) -> int:
-    """Return the length of the longest gap in frames."""
-    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
-        raise argparse.ArgumentTypeError(
-            f"expected a number of frames, or no value and the files before the option, found "
-            f"{printable(text, 60)}"
-        )
-    return int(text)
 
 
 def _filter(text: str) -> OneEuro | SavitzkyGolay:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import clean_up_of
+from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._pose import add_pose_arguments, apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
@@ -75,10 +76,19 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         metavar="SIZE",
         help="refuse larger files, with k, M or G (default: 2G)",
     )
+    group.add_argument(
+        "--no-cache",
+        action="store_true",
+        help="parse all numbers anew, without the arrays that earlier runs kept (see doctor)",
+    )
 
 
-def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that control how captures and BVH are read."""
+def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") -> None:
+    """Add the options that control how captures and BVH are read.
+
+    ``parser``: parser of a command.
+    ``gaps``: how the command handles gaps, see ``add_gap_arguments``.
+    """
     group = parser.add_argument_group("captures and BVH")
     _add_driving_arguments(group)
     group.add_argument(
@@ -101,9 +111,7 @@ def add_capture_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="show a BVH next to the figures instead of driving one",
     )
-    group.add_argument(
-        "--interpolate-gaps", action="store_true", help="interpolate gaps in captures"
-    )
+    add_gap_arguments(group, gaps)
 
 
 def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
@@ -130,6 +138,13 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         help="rest pose of a skeleton that drives a figure: frame N, the file's zero pose, or "
         "auto: the zero pose if it is a standing pose, otherwise a frame in a T- or A-pose, "
         "otherwise estimated from the motion (default: auto)",
+    )
+    group.add_argument(
+        "--feet",
+        choices=("on", "off"),
+        default="on",
+        help="keep the feet of driven figures on the ground where those of the motion stand "
+        "(default: on)",
     )
     group.add_argument(
         "--joint-map",
@@ -202,6 +217,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         space=arguments.space or "",
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
+        feet=arguments.feet == "on",
         joint_map=_joint_map(arguments),
         find_model=family_model,
         up=arguments.up or "",

@@ -23,7 +23,7 @@ from viewer.rendering.options import (
     SHOWN,
     DisplayOptions,
 )
-from viewer.rendering.passes.ground_pass import parse_color
+from viewer.rendering.passes.background_pass import parse_color
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
 from viewer.rig.mesh import bounding_box, box_size

@@ -10,11 +10,13 @@ from viewer.commands._batch.jobs import JOBS, job_parser
 from viewer.commands._batch.options import add_batch_arguments
 from viewer.commands._batch.planning import plan_of
 from viewer.commands._batch.requests import request_of
+from viewer.commands._batch.results import add_result_arguments, save_results
 from viewer.commands._scene import print_warnings
 from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
+from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "parser_of", "run"]
 
@@ -47,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     add_batch_arguments(parser)
+    add_result_arguments(parser, "diff")  # which has all of them
 
 
 def parser_of(words: Sequence[str]) -> Parser | None:
@@ -79,7 +82,10 @@ def run(arguments: argparse.Namespace) -> int:
     prints = JOBS[arguments.job].prints
     with Display(arguments.job, plan.items, prints) as display:
         report = run_batch(plan.items, job, plan.settings, display.show)
-    print("\n".join(summary_lines(report)))
+    stream = summary_stream(plan.settings.report or "")
+    print("\n".join(summary_lines(report)), file=stream)
+    for line in save_results(arguments.job, request.table, request.overview, report.results):
+        print(line, file=stream)
     if report.signal:
         return 128 + report.signal
     return 0 if report.is_complete else _FAILED

@@ -73,7 +73,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_motion_arguments(parser)
     add_vrm_arguments(parser)
     add_frame_arguments(parser, "A:B")
-    add_capture_arguments(parser)
+    add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
     add_pose_arguments(parser)
     add_skinning_arguments(parser)

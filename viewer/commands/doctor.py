@@ -15,7 +15,7 @@ from pathlib import Path
 import viewer
 from viewer.commands._printing import print_line
 from viewer.errors import RenderError
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 
 __all__ = ["Finding", "add_arguments", "examine", "run"]
 
@@ -37,6 +37,10 @@ _EXTRAS = {
     "av": "videos",
     "isal": "PNG images in less time",
     "scipy": "viewer rig, comparing different meshes",
+    "pebble": "worker processes of viewer batch",
+    "dask": "viewer batch on clusters",
+    "distributed": "viewer batch on clusters",
+    "dask-jobqueue": "viewer batch on SLURM clusters",
 }
 _WINDOW_SECONDS = 20
 _STYLES = {"ok": "green", "note": "yellow", "missing": "bold red"}
@@ -54,7 +58,12 @@ class Finding:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options; it has none."""
+    """Add the command's option."""
+    parser.add_argument(
+        "--bench",
+        action="store_true",
+        help="also measure how fast programs start and frames are drawn here (takes a minute)",
+    )
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -68,7 +77,18 @@ def run(arguments: argparse.Namespace) -> int:
         sys.stdout.flush()  # the next finding may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
+    if arguments.bench and not code:
+        _print_measurements()
     return code
+
+
+def _print_measurements() -> None:
+    """Print how fast this machine is; all times are medians."""
+    from viewer.commands._benchmarks import measured
+
+    for found in measured():
+        print_line(f"{'bench':<8}", str(found))
+        sys.stdout.flush()
 
 
 def examine() -> Iterator[Finding]:
@@ -82,6 +102,7 @@ def examine() -> Iterator[Finding]:
     yield from _examine_drawing()
     yield from _examine_display()
     yield _examine_state_folder()
+    yield _examine_cache()
 
 
 def _examine_packages() -> Iterator[Finding]:
@@ -199,3 +220,15 @@ def _examine_state_folder() -> Finding:
         return Finding("settings", "ok", str(folder))
     cure = "set XDG_STATE_HOME to a writable folder"
     return Finding("settings", "note", f"{folder} is not writable: settings are not saved", cure)
+
+
+def _examine_cache() -> Finding:
+    """Report where parsed numbers and decoded images are kept, and how many."""
+    from viewer.media.array_cache import LIMIT, VARIABLE, cache_folder, cache_use
+
+    folder = cache_folder()
+    if folder is None:
+        return Finding("cache", "ok", f"switched off by {VARIABLE}")
+    count, size = cache_use()
+    used = f"{counted(count, 'array')}, {size / 1e6:.1f} of at most {LIMIT / 1e6:.0f} MB"
+    return Finding("cache", "ok", f"{folder}: {used} ({VARIABLE}=off for none)")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from viewer.commands._model_info import describe_model, model_lines
+from viewer.commands._info.body_models import describe_model, model_lines
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
@@ -113,7 +113,7 @@ def _describe_actor(actor: Actor, up: str) -> dict[str, Any]:
 def _describe_motions(actor: Actor) -> dict[str, Any]:
     if actor.clip is None and not actor.figure.animations:
         return {}
-    from viewer.commands._clip_info import describe_animations, describe_clip
+    from viewer.commands._info.clips import describe_animations, describe_clip
 
     parts: dict[str, Any] = {}
     if actor.clip is not None:
@@ -263,11 +263,11 @@ def _lines(actor: dict[str, Any]) -> list[str]:
 def _motion_lines(actor: dict[str, Any]) -> list[str]:
     lines: list[str] = []
     if "clip" in actor:
-        from viewer.commands._clip_info import clip_lines
+        from viewer.commands._info.clips import clip_lines
 
         lines += clip_lines(actor["clip"])
     if "animations" in actor:
-        from viewer.commands._clip_info import animation_lines
+        from viewer.commands._info.clips import animation_lines
 
         lines += animation_lines(actor["animations"])
     return lines

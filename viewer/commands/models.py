@@ -48,6 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
         return _add(arguments)
     if arguments.name is not None:
         raise ViewerError(f"models list: unexpected {printable(arguments.name, 60)}")
+    if arguments.dry_run:
+        raise ViewerError("--dry-run: expected models add NAME, found models list")
     found = found_models()
     for kind in CATALOG:
         own = {name: path for name, path in found.items() if name.partition(":")[0] == kind}

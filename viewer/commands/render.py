@@ -54,7 +54,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "%(prog)s [FILES ...] -o FILE [options]"
     add_file_arguments(parser)
     _add_output_arguments(parser)
-    add_capture_arguments(parser)
+    add_capture_arguments(parser, gaps="view")
     add_cleanup_arguments(parser)
     add_frame_arguments(parser, "A:B[:STEP]")
     add_sequence_arguments(parser)

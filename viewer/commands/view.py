@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--scale", type=_scale, metavar="S", help="scale of the interface, such as 1.5"
     )
-    add_capture_arguments(parser)
+    add_capture_arguments(parser, gaps="view")
     add_cleanup_arguments(parser)
     add_frame_arguments(parser)
     add_pose_arguments(parser)

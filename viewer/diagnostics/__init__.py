@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from viewer.diagnostics.codes import SEVERITIES, Code
 from viewer.diagnostics.collector import Collector
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic, Part
 from viewer.diagnostics.phrase import Phrase, frame_range
 
 if TYPE_CHECKING:
+    from viewer.diagnostics.codes import SEVERITIES, Code
     from viewer.diagnostics.wording import CODES, MESSAGES
 
 __all__ = [
@@ -34,8 +34,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     """Import the wording when it is first used: most runs have no message to print."""
-    if name not in ("CODES", "MESSAGES"):
+    if name not in ("CODES", "MESSAGES", "SEVERITIES", "Code"):
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from viewer.diagnostics import wording
+    from viewer.diagnostics import codes, wording
 
-    return getattr(wording, name)
+    return getattr(codes if hasattr(codes, name) else wording, name)

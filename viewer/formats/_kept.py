@@ -11,7 +11,6 @@ from typing import Any, TypeVar
 from viewer.diagnostics import Diagnostic
 from viewer.formats._source import Source
 from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
 
 __all__ = ["keeping_figures", "kept_or_read"]
 
@@ -78,6 +77,8 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
         return known.content
     n_found, n_read = len(source.diagnostics), len(source.also_read)
     content = reader(source)
+    from viewer.rig.figure_group import FigureGroup
+
     if isinstance(content, Figure | FigureGroup):
         also = tuple(source.also_read[n_read:])
         new = tuple(source.diagnostics)[n_found:]

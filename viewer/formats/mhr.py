@@ -22,6 +22,7 @@ import numpy as np
 
 from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
 from viewer.formats._archive.values import Archive
+from viewer.formats._file_bytes import unreadable
 from viewer.formats._mhr.rig import bind_matrices, read_feature, read_parameters, read_skeleton
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats
@@ -90,12 +91,13 @@ def _files(source: Source) -> tuple[Source, Source]:
     """Return the rig and the chosen level of detail."""
     folder = source.path if source.is_folder else source.path.parent
     place = source.inside if source.is_folder else source.beside
-    if not (folder / _RIG).is_file():
+    names = _names(folder)
+    if _RIG not in names:
         raise source.fault("F002.mhr-folder")
     rig = source if source.path.name == _RIG else place(_RIG)
     named = _LOD.fullmatch(source.path.name)
     wanted = source.option("lod") or (named[1] if named else "")
-    levels = _levels(folder)
+    levels = sorted(int(match[1]) for match in map(_LOD.fullmatch, names) if match)
     if not levels:
         raise source.fault("F002.mhr-no-lod")
     if wanted and wanted not in map(str, levels):
@@ -106,9 +108,12 @@ def _files(source: Source) -> tuple[Source, Source]:
     return rig, source if is_this else place(f"lod{level}.npz")
 
 
-def _levels(folder: Path) -> list[int]:
-    found = (_LOD.fullmatch(path.name) for path in folder.iterdir())
-    return sorted(int(match[1]) for match in found if match)
+def _names(folder: Path) -> list[str]:
+    """Return the names of the files in a folder; raises FormatError if it cannot be listed."""
+    try:
+        return [path.name for path in folder.iterdir()]
+    except OSError as problem:
+        raise unreadable(folder, problem.strerror or problem) from None
 
 
 def _opened(source: Source, keys: str) -> Archive:
@@ -178,7 +183,8 @@ def _correctives(
     def load() -> Floats:
         values = array.values()
         for row in values:
-            finite(lod, "corrective_blendshapes", row)
+            if not np.isfinite(row).all():  # without the conversion to double precision
+                finite(lod, "corrective_blendshapes", row)
         return values
 
     return Correctives(Deferred(array.shape, array.dtype, load), feature)

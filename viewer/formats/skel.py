@@ -18,17 +18,16 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Part, Phrase
-from viewer.formats._skel.writing import KEYWORDS, UNLIMITED, write
+from viewer.formats._skel.keywords import KEYWORDS, UNLIMITED
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_infinite, is_number, to_number
-from viewer.formats._text.words import number_key
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
-from viewer.rig.posing.dof_text import beyond_text
 from viewer.rig.skeleton import DOF_KINDS, Skeleton
 
 __all__ = ["read", "write"]
@@ -83,8 +82,17 @@ def read(source: Source) -> Figure:
     return Figure(name=source.path.stem, skeleton=skeleton, facts=_facts(skeleton, dofs))
 
 
+def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
+    """Write a figure's skeleton; see ``viewer.formats._skel.writing``."""
+    from viewer.formats._skel import writing
+
+    return writing.write(figure, path)
+
+
 def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
     """Return a message about DOFs of the file's pose that were clamped to their limits."""
+    from viewer.rig.posing.dof_text import beyond_text
+
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
@@ -185,6 +193,8 @@ class _Parser:
 
     def _refuse(self, keyword: Word, expected: int, found: int) -> None:
         """Record an error in an item with a wrong number of values, and skip the item."""
+        from viewer.formats._text.words import number_key
+
         refuse, word, places = self.source.refuse, _text(self.word), [self.open[-1]]
         part: Part = "joints" if keyword.group() == b"offset" else "items"
         owner = _called(self.found[self.open[-1]])

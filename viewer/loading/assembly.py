@@ -14,6 +14,7 @@ from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
 from viewer.loading.placing import place_side_by_side, placed_views, stand_up
 from viewer.loading.settings import MotionSettings
+from viewer.loading.unused_options import unused_options
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import first_person_parts
@@ -82,7 +83,6 @@ def begin(
         cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
     _give_morphs(contents, cast)
     _move(contents, cast, settings or MotionSettings())
-    _note_unused_map(cast, settings or MotionSettings())
     for path, record in contents.poses:
         cast.diagnostics += _assign_pose(path, record, cast.actors)
     for path, pixels in contents.pictures:
@@ -94,6 +94,7 @@ def begin(
         _switch_on_springs(cast, world_up)
     place_side_by_side(cast)
     cast.views += placed_views(cast)
+    _note_unused_options(contents, cast, settings or MotionSettings())
     found = (*contents.diagnostics, *cast.diagnostics)
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
@@ -136,7 +137,7 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     if settings.drives and _has_bare_motion(cast):
         from viewer.loading.figure_motions import drive_by_figures
 
-        if drive_by_figures(cast, wanted, settings.joint_map):
+        if drive_by_figures(cast, wanted, settings):
             wanted = ""
     if wanted or any(actor.figure.animations for actor in cast.actors):
         from viewer.loading.animating import animate
@@ -150,11 +151,16 @@ def _move(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
             pose_actor(actor, start)
 
 
-def _note_unused_map(cast: Cast, settings: MotionSettings) -> None:
-    """Record that the joint map is not used, because no motion drives a figure."""
-    chosen = settings.joint_map
-    if chosen is not None and all(actor.drive is None for actor in cast.actors):
-        cast.note("F007.unused-joint-map", chosen.path)
+def _note_unused_options(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
+    """Record the options that had no effect."""
+    if contents.used_options is None:
+        return
+    used = contents.used_options | cast.used_options
+    # The first body of a capture may appear later.
+    is_driving = any(builder.target is not None for builder in cast.builders)
+    if is_driving or any(actor.drive is not None for actor in cast.actors):
+        used.add("joint-map")
+    cast.diagnostics += unused_options(settings, used)
 
 
 def _has_bare_motion(cast: Cast) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
@@ -77,6 +77,10 @@ class Builder:
     joint_map : JointMap or None
         Joints of the target and the joints of the model that drive them; None to match them by
         name.
+    plants_feet : bool
+        Whether the feet of the target are planted, which is still to be done.
+    hangs : bool
+        Whether the axis along which people stand points down before placement.
     """
 
     capture: Capture
@@ -93,7 +97,12 @@ class Builder:
     target: Figure | None = None
     swings: bool = False
     joint_map: JointMap | None = None
+    plants_feet: bool = True
+    hangs: bool = False
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
+    _has_parameters: bool = False
+    _grows: bool = True  # whether the motions of driven figures are computed part by part
+    _is_behind: bool = False  # whether such a motion lacks parts that were read
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -111,12 +120,20 @@ class Builder:
         return self._parts
 
     def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
-        """Read the next part; return new actors and messages."""
+        """Read the next part; return new actors and messages.
+
+        For captures that are read to the end before they are shown: the motions of driven figures
+        are computed once, at the end.
+        """
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True
-            return [], []
-        return self.add(part)
+            return [], self._fresh(self._finished())
+        self._grows = False
+        try:
+            return self.add(part)
+        finally:
+            self._grows = True
 
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
         """Add one part to the actors.
@@ -137,24 +154,34 @@ class Builder:
         notes = [*part.warnings]
         for person, motion in sorted(part.bodies.items(), key=_order):
             notes += self._add_body(person, motion, new)
+        self._has_parameters |= bool(part.parameters)
         shown = part.parameters if self.model.parameters is not None else {}
         for person, parameters in sorted(shown.items(), key=_order):
-            self._add_clip(person, parameter_clip(parameters, self.model), new)
+            notes += self._add_driven(person, parameter_clip(parameters, self.model), new)
         points = {person: both for person, both in part.points.items() if person not in shown}
         for person, (layout, clip) in sorted(points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
         notes += self._shape_notes()
+        notes += self._finished()
         for actor in new:
             if self.swings:
                 actor.springs = springs_for(actor, self.up)
             pose_actor(actor, 0.0)
-        fresh = {str(note): note for note in reversed(notes) if str(note) not in self._notes}
+        return new, self._fresh(notes)
+
+    def _fresh(self, notes: Iterable[Diagnostic]) -> list[Diagnostic]:
+        """Return the messages that were not reported before, each once."""
+        fresh = {str(note): note for note in notes if str(note) not in self._notes}
         self._notes.update(fresh)
-        return new, [*reversed(fresh.values())]
+        return [*fresh.values()]
 
     def _shape_notes(self) -> list[Diagnostic]:
-        """At the end, return a message if bodies have the mean shape because none was given."""
+        """At the end, return messages about bodies without a shape, and a model without bodies."""
+        if self.is_done and self.target is not None and not self._bodies:
+            key = "F007.model-of-parameters" if self._has_parameters else "F007.model-of-points"
+            values = {"member": self.capture.model}
+            return [Diagnostic(key, self.path, values=values)]
         lacks = self._bodies and self.model.n_shapes and not self._names_shapes
         lacks = lacks and self.target is None and self.model.parameters is None
         if not (self.is_done and self.keeps_shape and lacks):
@@ -168,16 +195,42 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         clip, notes = body_clip(motion, self.model)
-        drive: Drive | None = None
-        if self.target is not None:
-            drive = self._drive(clip)
-            clip, more = driven_clip(drive, self.target)
-            notes += more
-        self._add_clip(person, clip, new, drive)
+        notes += self._add_driven(person, clip, new)
+        return [replace(note, path=self.path) for note in notes]
+
+    def _add_driven(self, person: int, clip: SampledClip, new: list[Actor]) -> list[Diagnostic]:
+        """Append a clip of the model, or the motion of the target that it drives."""
+        if self.target is None:
+            self._add_clip(person, clip, new)
+            return []
+        drive = self._drive(clip)
+        actor = self._bodies.get(person)
+        if not self._grows and actor is not None and actor.drive is not None:
+            actor.drive = _grown(actor.drive, drive)
+            self._is_behind = True
+            return []
+        found, notes = driven_clip(drive, self.target)
+        self._add_clip(person, found, new, drive)
         return [replace(note, path=self.path) for note in notes]
 
     def _drive(self, clip: SampledClip) -> Drive:
-        return carrying_drive(self.model, clip, self.up, self.joint_map)
+        # Feet are planted at the end, because contacts and the ground need the whole motion.
+        up = f"-{self.up}" if self.hangs else self.up
+        return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+
+    def _finished(self) -> list[Diagnostic]:
+        """At the end, compute the whole motions of driven figures and plant their feet, once."""
+        is_left = self.plants_feet or self._is_behind
+        if not (self.is_done and is_left and self.target is not None):
+            return []
+        plants_feet, self.plants_feet, self._is_behind = self.plants_feet, False, False
+        notes: list[Diagnostic] = []
+        for actor in self._bodies.values():
+            if actor.drive is not None:
+                actor.drive = replace(actor.drive, plants_feet=plants_feet)
+                actor.clip, said = driven_clip(actor.drive, self.target)
+                notes += [replace(note, path=self.path) for note in said]
+        return notes
 
     def _add_clip(
         self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
@@ -195,9 +248,7 @@ class Builder:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
             actor.clip = _extended(actor.clip, clip)
             if drive is not None and actor.drive is not None:
-                motion = actor.drive.motion
-                motion = replace(motion, clip=_extended(motion.clip, drive.motion.clip))
-                actor.drive = replace(actor.drive, motion=motion)
+                actor.drive = _grown(actor.drive, drive)
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]
@@ -248,7 +299,8 @@ class Builder:
         self.up = "z" if up.endswith("z") else "y"
         for actor in self._points.values():
             actor.figure = replace(actor.figure, up=self.up)
-        if up.startswith("-"):
+        self.hangs = up.startswith("-")
+        if self.hangs:
             self.placement = rotation_transform(0, np.pi)
             for actor in self.actors:
                 actor.placement = self.placement.copy()
@@ -272,10 +324,10 @@ class Builder:
             actor.figure, actor.clip, actor.color = target, clip, None
             actor.drive = drive
             actor.pose = figure_pose(target)
+        notes = [replace(note, path=self.path) for note in notes] + self._finished()
+        for actor, _, _ in clips:
             pose_actor(actor, 0.0)
-        fresh = {str(note): replace(note, path=self.path) for note in reversed(notes)}
-        self._notes.update(str(note) for note in fresh.values())
-        return [*reversed(fresh.values())]
+        return self._fresh([*notes, *self._shape_notes()])
 
     def refusal(self, problem: RigError) -> RigError:
         """Return an error that also names the model that would match."""
@@ -288,6 +340,13 @@ def _order(item: tuple[int, object]) -> tuple[bool, int]:
     """Return a sort key of people: by number, untracked ones last."""
     person = item[0]
     return not is_tracked(person), abs(person)
+
+
+def _grown(first: Drive, second: Drive) -> Drive:
+    """Return what drives a figure over the rows of two motions with the same timeline."""
+    motion = first.motion
+    clip = _extended(motion.clip, second.motion.clip)
+    return replace(first, motion=replace(motion, clip=clip))
 
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:

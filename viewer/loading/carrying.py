@@ -30,7 +30,11 @@ def has_joints(figure: Figure, names: Sequence[str]) -> bool:
 
 
 def carrying_drive(
-    body: Figure, clip: SampledClip, up: str, joint_map: JointMap | None = None
+    body: Figure,
+    clip: SampledClip,
+    up: str,
+    joint_map: JointMap | None = None,
+    plants_feet: bool = True,
 ) -> Drive:
     """Return the motion of a body as one that drives other figures, in the world of the body.
 
@@ -40,10 +44,18 @@ def carrying_drive(
         Body model that ``clip`` moves.
     clip : SampledClip
         Its motion.
-    up : "y" or "z"
+    up : "y", "z", "-y" or "-z"
         Up axis of the motion's world, which driven figures keep.
     joint_map : JointMap, optional
         The requested match of joints.
+    plants_feet : bool
+        Whether feet are kept where those of the body stand.
     """
-    moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up == "z" else "y")
-    return Drive(SkeletonMotion(moving, clip), joint_map=joint_map, keeps_up=True)
+    moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
+    return Drive(
+        SkeletonMotion(moving, clip),
+        joint_map=joint_map,
+        keeps_up=True,
+        plants_feet=plants_feet,
+        hangs=up.startswith("-"),
+    )

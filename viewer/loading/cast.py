@@ -40,6 +40,8 @@ class Cast:
         Images of the cameras: those of the first capture that has any.
     diagnostics : list of Diagnostic
         Messages from assembling the scene.
+    used_options : set of str
+        Options that had an effect, see ``unused_options``.
     """
 
     actors: list[Actor]
@@ -50,6 +52,7 @@ class Cast:
     views: list[CameraView] = field(default_factory=list)
     images: CameraImages | None = None
     diagnostics: list[Diagnostic] = field(default_factory=list)
+    used_options: set[str] = field(default_factory=set)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
         """Record a message, with the values of its template, about a file if ``path`` is given."""

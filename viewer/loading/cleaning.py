@@ -20,7 +20,7 @@ from viewer.rig.cleanup.gap_filling import interpolate_gaps
 from viewer.rig.cleanup.one_euro import OneEuro
 from viewer.rig.cleanup.resampling import resampled
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
-from viewer.rig.cleanup.smoothing import smoothed
+from viewer.rig.cleanup.smoothing import run_lengths, smoothed
 from viewer.rig.cleanup.trimming import trimmed
 from viewer.rig.inspection.resting_height import resting_height
 from viewer.rig.motion.evaluation import pose_actor
@@ -127,7 +127,7 @@ def _cleaned(
 
 def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured, Diagnostic]:
     found = smoothed(clip, chosen, METRES.get(actor.figure.unit, 1.0))
-    values = {"filter": _filter_phrase(chosen, clip.timing.frame_rate)}
+    values = {"filter": _filter_phrase(chosen, clip)}
     return found, _note("X006.smoothed", actor, values, clip, found)
 
 
@@ -185,19 +185,9 @@ def _trimmed(
     actor: Actor, clip: Captured, frames: tuple[int | None, int | None]
 ) -> tuple[Captured, Diagnostic]:
     timing = clip.timing
-    first = 0 if frames[0] is None else frames[0] - timing.first_frame
-    stop = timing.n_frames if frames[1] is None else frames[1] - timing.first_frame
-    if not 0 <= first < stop <= timing.n_frames:
-        low, high = timing.first_frame, timing.first_frame + timing.n_frames
-        asked = ":".join("" if end is None else str(end) for end in frames)
-        raise RigError(
-            f"frames to keep: expected a range within {low}:{high} (frames {low} to {high - 1}), "
-            f"found {asked}"
-        )
-    found = trimmed(clip, first, stop)
-    number = found.timing.first_frame
-    values = {"first": number, "last": number + stop - first - 1, "n": stop - first}
-    values["all"] = timing.n_frames
+    found = trimmed(clip, *frames)
+    number, count = found.timing.first_frame, found.timing.n_frames
+    values = {"first": number, "last": number + count - 1, "n": count, "all": timing.n_frames}
     return found, Diagnostic("X006.trimmed", values={"figure": actor.name, **values})
 
 
@@ -226,10 +216,17 @@ def _interpolated(
     return clip, notes
 
 
-def _filter_phrase(chosen: Smoothing, rate: float) -> Phrase:
+def _filter_phrase(chosen: OneEuro | SavitzkyGolay, clip: Captured) -> Phrase:
+    """Return the filter with the windows that were used, which are shorter in short runs."""
     if isinstance(chosen, OneEuro):
         return Phrase("one-euro", cutoff=chosen.cutoff, beta=chosen.beta)
-    return Phrase("savgol", n=chosen.frames(rate), order=chosen.order)
+    rate = clip.timing.frame_rate
+    used = [chosen.used_frames(count, rate) for count in run_lengths(clip)]
+    windows = sorted(set(filter(None, used)))
+    values = {"order": chosen.order, "n": windows[-1] if windows else chosen.frames(rate)}
+    shortest = windows[0] if len(windows) > 1 else 0
+    left = Phrase("savgol-short", n=used.count(0)) if 0 in used else ""
+    return Phrase("savgol", **values, shortest=shortest, left=left)
 
 
 def _note(

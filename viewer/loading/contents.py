@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -48,6 +48,9 @@ class Contents:
         Messages from the readers.
     files : tuple of Path
         All files that were read.
+    used_options : set of str or None
+        Options that had an effect on the contents, see ``unused_options``; None if unused options
+        are not to be reported.
     """
 
     figures: list[tuple[Path, Figure]] = field(default_factory=list)
@@ -62,6 +65,7 @@ class Contents:
     called: dict[Path, str] = field(default_factory=dict)
     diagnostics: tuple[Diagnostic, ...] = ()
     files: tuple[Path, ...] = ()
+    used_options: set[str] | None = None
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -113,20 +117,10 @@ def read_files(
     contents.diagnostics = tuple(
         found for source in sources for found in source.diagnostics.warnings
     )
-    contents.diagnostics += tuple(_unused_options(sources, settings or MotionSettings()))
+    contents.used_options = {name for source in sources for name in source.used_options}
     read = (path for source in sources for path in (source.path, *source.also_read))
     contents.files = tuple(dict.fromkeys(read))
     return contents
-
-
-def _unused_options(sources: Sequence[Source], settings: MotionSettings) -> Iterator[Diagnostic]:
-    """Yield a message for each option for file contents that had no effect."""
-    if settings.model is not None:
-        return  # read later
-    used = {name for source in sources for name in source.used_options}
-    for name, value in reader_options(settings).items():
-        if value and name not in used:
-            yield Diagnostic(f"F007.unused-{name}", values={"value": value})
 
 
 def read_source(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
@@ -189,11 +183,12 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     kind = detect(source)
     if kind == "easymocap":
         from viewer.formats.easymocap import open_capture
-        from viewer.rig.motion.timing import DEFAULT_RATE
+        from viewer.rig.captures.capture_rate import capture_rate
 
+        source.used_options |= {"images", "video"}
         return open_capture(
             source,
-            frame_rate=settings.frame_rate or _video_rate(settings) or DEFAULT_RATE,
+            frame_rate=capture_rate(settings.frame_rate, None, _video_rate(settings)),
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
@@ -203,6 +198,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
     if kind == "video_mocap":
         from viewer.formats.video_mocap import open_results
 
+        source.used_options |= {"images", "video"}
         return open_results(
             source,
             settings.frame_rate,

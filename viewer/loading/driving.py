@@ -23,6 +23,7 @@ from viewer.loading.refusals import map_refusal, model_refusal
 from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
+from viewer.rig.captures.capture_rate import capture_rate
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
@@ -30,13 +31,11 @@ from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.motion.timing import DEFAULT_RATE
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
-    from viewer.rig.retargeting.joint_map import JointMap
 
 __all__ = ["drive", "is_body"]
 
@@ -60,6 +59,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     named = _named_model(cast, settings) if bodies or drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
+        cast.used_options |= {"model", "rig", "lod"}  # this message is enough
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
         model, is_bundled, target = _model(contents, cast, named, settings)
@@ -135,6 +135,7 @@ def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
     if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
         raise source.fault("F002.no-body-model")
     cast.diagnostics += source.diagnostics.warnings
+    cast.used_options |= {"model", *source.used_options}
     return model
 
 
@@ -150,9 +151,12 @@ def _model(
         moves = [body.joint_names for _, body in contents.body_motions]
         own = any(has_joints(named, names) for names in moves)
         is_family = is_body(named) or (own and named.require_skeleton().humanoid is None)
-        if is_family or (named.parameters is not None and _all_have_parameters(contents)):
+        has_parameters = _all_have_parameters(contents)
+        if is_family or (named.parameters is not None and has_parameters):
             return named, False, None
-        return _bundled(), True, named
+        # People given by parameters move another figure by way of the model of their parameters.
+        carrier = _own_model(cast, contents, settings, "carrier") if has_parameters else None
+        return carrier or _bundled(), carrier is None, named
     for index, actor in enumerate(cast.actors):
         if actor.clip is None and is_body(actor.figure):
             figure = cast.take(index).figure
@@ -169,8 +173,13 @@ def _bundled() -> Figure:
     return body
 
 
-def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figure | None:
-    """Return the user's model for the first capture whose bodies it fits, if there is one."""
+def _own_model(
+    cast: Cast, contents: Contents, settings: MotionSettings, use: str = "model"
+) -> Figure | None:
+    """Return the user's model for the first capture whose bodies it fits, if there is one.
+
+    ``use``: ``"model"`` if it is shown, ``"carrier"`` if it moves another figure.
+    """
     for path, capture in contents.captures:
         found = settings.find_model(capture.model) if settings.find_model is not None else None
         if found is None:
@@ -181,7 +190,7 @@ def _own_model(cast: Cast, contents: Contents, settings: MotionSettings) -> Figu
             cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
             continue
         if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
-            cast.note("F007.own-model", path, model=found.name)
+            cast.note(f"F007.own-{use}", path, model=found.name)
             return model
     return None
 
@@ -235,7 +244,7 @@ def _give_body_motion(
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
     if target is not None:
-        carried = _carried(path, actor, up[-1], target, cast, settings.joint_map)
+        carried = _carried(path, actor, up, target, cast, settings)
         cast.add(carried, up[-1], placed=False)
         return
     if is_bundled and _drives_character(path, motion.name, actor, up, cast, settings):
@@ -246,14 +255,14 @@ def _give_body_motion(
 
 
 def _carried(
-    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, joint_map: JointMap | None
+    path: Path, actor: Actor, up: str, target: Figure, cast: Cast, settings: MotionSettings
 ) -> Actor:
     """Return an actor of a figure with other joints that a body moves.
 
     Raises RigError if too few joints match.
     """
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
-    drive = carrying_drive(actor.figure, actor.clip, up, joint_map)
+    drive = carrying_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
     try:
         clip, notes = driven_clip(drive, target)
     except RigError as problem:
@@ -275,7 +284,12 @@ def _drives_character(
 
     assert isinstance(actor.clip, SampledClip)  # that of a captured body
     body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
-    drive = Drive(SkeletonMotion(body, actor.clip), joint_map=settings.joint_map)
+    drive = Drive(
+        SkeletonMotion(body, actor.clip),
+        joint_map=settings.joint_map,
+        plants_feet=settings.feet,
+        hangs=up.startswith("-"),
+    )
     return drive_somebody(path, drive, cast, actor.placement)[0]
 
 
@@ -321,6 +335,7 @@ def _begin_capture(
     up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
     builder.place(up)
     builder.swings, builder.joint_map = settings.springs, settings.joint_map
+    builder.plants_feet = settings.feet
     _carry(builder, cast, target, drives=is_bundled and settings.drives)
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
@@ -363,4 +378,4 @@ def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) ->
 
 def _rate(actors: Sequence[Actor], settings: MotionSettings) -> float:
     """Return the frame rate of a capture."""
-    return scene_rate(actors) if actors else settings.frame_rate or DEFAULT_RATE
+    return scene_rate(actors) if actors else capture_rate(settings.frame_rate, None, None)

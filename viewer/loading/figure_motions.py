@@ -17,10 +17,10 @@ from viewer.rig.motion.animation_choice import chosen_animation
 from viewer.rig.motion.baking import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
-from viewer.rig.retargeting.joint_map import JointMap
 
 if TYPE_CHECKING:
     from viewer.formats import Content
+    from viewer.loading.settings import MotionSettings
 
 __all__ = ["drive_by_figures", "motion_in"]
 
@@ -61,7 +61,7 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
     return SkeletonMotion(bare, clip)
 
 
-def drive_by_figures(cast: Cast, wanted: str, joint_map: JointMap | None = None) -> bool:
+def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
     """Let skeletons with animations, but without a mesh, move figures that have no motion.
 
     A skeleton that moves another figure is not shown itself. Returns whether there is one.
@@ -72,8 +72,8 @@ def drive_by_figures(cast: Cast, wanted: str, joint_map: JointMap | None = None)
         The actors before they play animations.
     wanted : str
         The animation, see ``chosen_animation``.
-    joint_map : JointMap, optional
-        The requested match of joints.
+    settings : MotionSettings
+        The requested match of joints, and whether feet are planted.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def drive_by_figures(cast: Cast, wanted: str, joint_map: JointMap | None = None)
             motion = _motion_of(figure, wanted)
         except RigError:
             continue  # reported when the animations are started
-        drive = Drive(motion, joint_map=joint_map)
+        drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
         if drive_somebody(actor.origin or Path(figure.name), drive, cast, np.eye(4))[0]:
             cast.take(next(n for n, other in enumerate(cast.actors) if other is actor))
             found = True

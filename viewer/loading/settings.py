@@ -66,6 +66,8 @@ class MotionSettings:
         Rest pose of skeletons whose motion drives a figure: the number of a frame, ``"zero"`` for
         the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
         a frame in a T- or A-pose, otherwise an estimate from the anatomy.
+    feet : bool
+        Whether the feet of driven figures are kept where those of the motion stand.
     joint_map : JointMap or None
         Joints of driven figures and the joints that drive them; None to match them by name.
     """
@@ -89,4 +91,5 @@ class MotionSettings:
     space: str = ""
     average_shape: bool = False
     source_rest: int | str = "auto"
+    feet: bool = True
     joint_map: JointMap | None = None

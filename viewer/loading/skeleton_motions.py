@@ -85,9 +85,15 @@ def give_skeleton_motion(
     if fault is not None:
         raise RigError(replace(fault, path=path))
     placement = rotation_transform(0, np.pi) if settings.up.startswith("-") else np.eye(4)
+    drive = Drive(
+        motion,
+        settings.source_rest,
+        settings.joint_map,
+        plants_feet=settings.feet,
+        hangs=settings.up.startswith("-"),
+    )
     if settings.drives and model is not None:
         try:
-            drive = Drive(motion, settings.source_rest, settings.joint_map)
             clip, notes = driven_clip(drive, model)
         except RigError as problem:
             raise model_refusal(problem, path) from None
@@ -97,7 +103,6 @@ def give_skeleton_motion(
         cast.add(actor, model.up, placed=False)
         return None
     if settings.drives:
-        drive = Drive(motion, settings.source_rest, settings.joint_map)
         is_driving, refusal = drive_somebody(path, drive, cast, placement)
         if is_driving:
             return None

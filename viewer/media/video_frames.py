@@ -16,6 +16,7 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["VideoFrames"]
 
+_PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures
 _BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is fast
 _FEWEST = 2  # frames that are kept regardless of their size
 _AHEAD = 2.0  # seconds to decode forwards rather than to seek
@@ -79,6 +80,8 @@ class VideoFrames:
             self._container = self._errors.open(str(path))
         except (self._errors.FFmpegError, ValueError):
             raise FormatError(Diagnostic("F002.video", path)) from None
+        if self._container.format.name.endswith(_PICTURES):
+            raise FormatError(Diagnostic("F002.video-picture", path))
         streams = self._container.streams.video
         if not streams:
             raise FormatError(Diagnostic("F002.video-stream", path))

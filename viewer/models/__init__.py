@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from collections.abc import Iterable
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
@@ -106,8 +107,13 @@ def known_models(folder: Path) -> dict[str, Path]:
     dict
         ``"smplx:neutral"`` to its file; an ``.npz`` takes precedence over a ``.pkl``.
     """
+    return _named(_files(folder))
+
+
+def _named(files: Iterable[Path]) -> dict[str, Path]:
+    """Return the models among files by name, see ``known_models``."""
     found: dict[str, Path] = {}
-    for path in _files(folder):
+    for path in files:
         name = _name_of(path)
         is_better = name in found and (_is_npz(path) and not _is_npz(found[name]))
         if name is not None and (name not in found or is_better):
@@ -165,11 +171,11 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     """
     if folder is None:
         return None
-    wanted = name.lower()
-    for path in _files(folder):
+    wanted, files = name.lower(), _files(folder)
+    for path in files:
         if path.name.lower() == wanted:
             return path
-    models = known_models(folder)
+    models = _named(files)
     of_kind = [path for key, path in models.items() if key.partition(":")[0] == wanted]
     return (
         models.get(wanted)

@@ -21,7 +21,9 @@ from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlays import Overlays, draw_overlays
+from viewer.rendering.passes.background_pass import BackgroundPass
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
@@ -49,7 +51,6 @@ from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
-    from viewer.rendering.outlined import Outlined
     from viewer.rendering.overlay.annotation import Annotation
     from viewer.rendering.overlay.legend import Legend
     from viewer.rendering.overlay.marks import Marks
@@ -93,6 +94,7 @@ class Renderer:
         self.scalars = ScalarQuantities()
         self.mesh_pass = MeshPass(context, programs)
         self.joint_pass = JointPass(context, programs)
+        self.background_pass = BackgroundPass(context, programs)
         self.ground_pass = GroundPass(context, programs)
         self.buffers = ActorBuffers(
             context, programs, self.joint_pass.cube, self.notes, self.mesh_pass.forget
@@ -156,16 +158,16 @@ class Renderer:
         target.framebuffer.use()
         view = view_of(camera, target.size, reach_of(scene, camera.fixed, options, box))
         meshes = self._update(scene, view, options, selected)
-        casters = Casters(
-            self.programs, self.mesh_pass, self.late, self.buffers, meshes, scene.actors, options
-        )
+        parts = self.programs, self.mesh_pass, self.late, self.buffers
+        casters = Casters(*parts, meshes, scene.actors, options)
         self.lighting.begin(casters, camera.up, box)
         count = n_passes(options)
         for index in range(count) if passes is None else passes:
             one = sample(index, count)
             shifted = jittered(view, one.shift, target.size)
             lit = self.lighting.light(casters, shifted, target.size, one, strength)
-            self._prepare(target)
+            self._set_state(target)
+            self.background_pass.draw(target, options.background)
             self._draw_layers(scene, meshes, lit, options, target, box, selected, strength)
             if count > 1:
                 self._accumulate(target, index == 0)
@@ -178,8 +180,6 @@ class Renderer:
             self.late, over, scene, view, options, target.size, selected
         )
         if options.outline:
-            from viewer.rendering.outlined import Outlined
-
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
             self._draw_legend(target.size)
@@ -198,8 +198,6 @@ class Renderer:
         """Draw everything that is part of the scene, from the background on."""
         if options.background == "environment":
             self.late.backdrop_pass.draw(view, options.lights)
-        else:
-            self.ground_pass.draw_background(options.background)
         draw_image_behind(self.late, scene, view, options, target.size)
         self._draw_meshes(meshes, view, options)
         draw_image_planes(self.late, scene, view, options, box)
@@ -278,22 +276,26 @@ class Renderer:
         box: Floats,
     ) -> None:
         """Draw only outlines, with straight alpha; see ``draw`` for the parameters."""
-        self._prepare(target)
+        self._set_state(target)
+        self.background_pass.draw(target, "transparent")
         view = view_of(camera, target.size, box)
         self.late.outline_pass.draw(outlined, scene, view, options, target, is_layer=True)
 
     def prepare(self, scene: Scene) -> None:
         """Upload a scene's buffers in advance, so that a failure leaves the previous scene intact.
 
+        Whatever was uploaded before a failure is freed.
+
         Raises
         ------
         RenderError
             If there is not enough graphics memory.
         """
-        prepare_meshes(self.buffers, scene.actors, DisplayOptions())
-        for actor in scene.actors:
-            if actor.figure.skeleton is not None:
-                self.buffers.skeleton(actor)
+        with self.buffers.guard():
+            prepare_meshes(self.buffers, scene.actors, DisplayOptions())
+            for actor in scene.actors:
+                if actor.figure.skeleton is not None:
+                    self.buffers.skeleton(actor)
 
     def _update(
         self, scene: Scene, view: View, options: DisplayOptions, selected: tuple[int, int]
@@ -342,11 +344,6 @@ class Renderer:
             if instances.mesh.is_blended or not blended:
                 draw_instances(self.programs, instances, actors, view, options, blended)
 
-    def _prepare(self, target: Target) -> None:
-        """Bind and clear a target."""
-        self._set_state(target)
-        target.framebuffer.clear(0.0, 0.0, 0.0, 0.0, depth=1.0)
-
     def _set_state(self, target: Target) -> None:
         """Bind a target with the state that all passes expect."""
         target.framebuffer.use()
@@ -394,6 +391,9 @@ class Renderer:
     def release(self) -> None:
         """Free everything except the programs."""
         self.buffers.keep_only([])
-        passes = self.mesh_pass, self.joint_pass, self.ground_pass, self.late, self.lighting
+        passes = (
+            *(self.mesh_pass, self.joint_pass, self.background_pass, self.ground_pass),
+            *(self.late, self.lighting),
+        )
         for item in passes:
             item.release()

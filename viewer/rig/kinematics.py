@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from functools import lru_cache
+
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.pose import Pose, local_matrices
@@ -21,6 +25,9 @@ __all__ = [
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
 # normals by at most half of it, in radians.
 _RIGID = 1e-5
+_MOST_JOINTS = 4096  # of hierarchies whose passes are kept
+
+Indices = NDArray[np.intp]
 
 
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
@@ -52,18 +59,32 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     """
     world = local.copy()
     if local.ndim > 3:
+        # Of many poses, a joint's matrices fill the caches: one pass, without copies.
         for joint, parent in enumerate(parents.tolist()):
             if parent >= 0:
                 np.matmul(world[parent], local[joint], out=world[joint])
         return world if root is None else root @ world
-    ancestors = parents.copy()
+    parents = np.asarray(parents, dtype=np.int32)
+    is_kept = len(parents) <= _MOST_JOINTS
+    for above, below in _kept_passes(parents.tobytes()) if is_kept else _passes(parents):
+        world[below] = world[above] @ world[below]
+    return world if root is None else root @ world
+
+
+def _passes(parents: Ints) -> Iterator[tuple[Indices, Indices]]:
+    """Yield the ancestors and joints whose matrices are multiplied in each pass."""
+    ancestors = parents.astype(np.intp)
     below = np.flatnonzero(ancestors >= 0)
     while len(below):
         above = ancestors[below]
-        world[below] = world[above] @ world[below]
+        yield above, below
         ancestors[below] = ancestors[above]
         below = below[ancestors[below] >= 0]
-    return world if root is None else root @ world
+
+
+@lru_cache(64)
+def _kept_passes(parents: bytes) -> tuple[tuple[Indices, Indices], ...]:
+    return tuple(_passes(np.frombuffer(parents, dtype=np.int32)))
 
 
 def world_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
@@ -153,7 +174,5 @@ def is_rigid(palette: Floats) -> Bools:
     squares = gram[..., 0, 0].max(axis=-1, initial=0.0)
     errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
     is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
-    first, second, third = np.moveaxis(linear, -1, 0)
-    volumes = np.einsum("...a,...a->...", np.cross(first, second), third)
     # A reflection also has orthogonal columns, but a negative determinant.
-    return is_uniform & (volumes > 0.0).all(axis=-1)
+    return is_uniform & (np.linalg.det(linear) > 0.0).all(axis=-1)

@@ -259,13 +259,27 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     if mesh.uv_triangles is None or mesh.uvs is None:
         identity = np.arange(mesh.n_vertices, dtype=np.int32)
         return identity, identity, mesh.triangles
-    corners = mesh.triangles.ravel().astype(np.int64)
-    pairs = corners * len(mesh.uvs) + mesh.uv_triangles.ravel()
-    unique, inverse = np.unique(pairs, return_inverse=True)
-    unused = np.setdiff1d(np.arange(mesh.n_vertices), corners)
-    sources = np.concatenate([unique // len(mesh.uvs), unused]).astype(np.int32)
-    uv_indices = np.concatenate([unique % len(mesh.uvs), np.zeros_like(unused)]).astype(np.int32)
-    return sources, uv_indices, inverse.reshape(-1, 3).astype(np.int32)
+    # Only the corners beyond the first texture coordinate of a vertex are sorted: few.
+    corners, uvs, n_uvs = mesh.triangles.ravel(), mesh.uv_triangles.ravel(), len(mesh.uvs)
+    lowest = np.full(mesh.n_vertices, n_uvs, dtype=np.int32)
+    np.minimum.at(lowest, corners, uvs)
+    further = np.flatnonzero(uvs != lowest[corners])
+    pairs = corners[further].astype(np.int64) * n_uvs + uvs[further]
+    pairs, which = np.unique(pairs, return_inverse=True)
+    owners = pairs // n_uvs
+    is_used, n_further = lowest < n_uvs, np.bincount(owners, minlength=mesh.n_vertices)
+    counts = is_used + n_further
+    starts = np.cumsum(counts) - counts
+    # Within its vertex, a further copy has the position that it has among all further copies.
+    places = starts[owners] + 1 + np.arange(len(pairs)) - (np.cumsum(n_further) - n_further)[owners]
+    triangles = starts[corners]
+    triangles[further] = places[which]
+    copies = np.repeat(np.arange(mesh.n_vertices), counts)
+    sources = np.concatenate([copies, np.flatnonzero(~is_used)]).astype(np.int32)
+    uv_indices = np.zeros(len(sources), dtype=np.int32)
+    uv_indices[starts[is_used]] = lowest[is_used]
+    uv_indices[places] = pairs % n_uvs
+    return sources, uv_indices, triangles.reshape(-1, 3).astype(np.int32)
 
 
 def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:

@@ -6,11 +6,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained_matrices
-from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
+from viewer.rig.geometry.axis_products import AxisProducts, axis_products
+from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.memo import Memo
 from viewer.rig.number_key import NumberKey
 from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, clamp_dofs
@@ -26,6 +27,8 @@ __all__ = [
     "pose_of",
     "rest_pose",
 ]
+
+_orders: Memo[Skeleton, AxisProducts] = Memo()
 
 
 @dataclass(slots=True, eq=False)
@@ -171,10 +174,11 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
     local = np.zeros((skeleton.n_joints, 4, 4))
     local[:, 3, 3] = 1.0
     local[:, :3, 3] = skeleton.rest_translations + pose.translations
-    is_translation = skeleton.dof_kinds < FIRST_ROTATION
-    joints, axes = skeleton.dof_joints[is_translation], skeleton.dof_kinds[is_translation]
-    # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
-    np.add.at(local[:, :3, 3], (joints, axes), pose.dofs[is_translation])
+    moves = np.flatnonzero(skeleton.dof_kinds < FIRST_ROTATION)
+    if len(moves):
+        # A joint may have several translation DOFs along one axis: unlike +=, add.at sums them all.
+        entries = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
+        np.add.at(local[:, :3, 3], entries, pose.dofs[moves])
     if skeleton.posing is not None:
         local[:, :3, 3] += skeleton.posing.translations(pose.dofs)
     rotations = constrained_matrices(
@@ -209,26 +213,13 @@ def dof_rotations(skeleton: Skeleton, dofs: Floats) -> Floats:
     """
     if skeleton.posing is not None:
         return skeleton.posing.rotations(dofs)
-    shape = (*dofs.shape[:-1], skeleton.n_joints, 3, 3)
-    rotations = np.broadcast_to(np.eye(3), shape).copy()
-    rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)
-    for rank_rows in _rows_by_rank(skeleton.dof_joints[rows], rows):
-        joints = skeleton.dof_joints[rank_rows]
-        axes = skeleton.dof_kinds[rank_rows] - FIRST_ROTATION
-        for axis in range(3):
-            chosen = axes == axis
-            # Rows are multiplied from the left: a later row is applied after the earlier ones.
-            rotation = axis_rotations(axis, dofs[..., rank_rows[chosen]])
-            rotations[..., joints[chosen], :, :] = rotation @ rotations[..., joints[chosen], :, :]
-    return rotations
+    return _order_of(skeleton).at(dofs)
 
 
-def _rows_by_rank(joints: Ints, rows: NDArray[np.intp]) -> list[NDArray[np.intp]]:
-    """Split rows into the first row of every joint, the second rows, and so on."""
-    order = np.argsort(joints, kind="stable")
-    ordered = joints[order]
-    first = np.concatenate([[True], ordered[1:] != ordered[:-1]]) if len(rows) else np.zeros(0)
-    group_start = np.maximum.accumulate(np.where(first, np.arange(len(rows)), 0))
-    rank = np.arange(len(rows)) - group_start
-    sorted_rows = rows[order]
-    return [sorted_rows[rank == k] for k in range(int(rank.max(initial=-1)) + 1)]
+def _order_of(skeleton: Skeleton) -> AxisProducts:
+    def order() -> AxisProducts:
+        rows = np.flatnonzero(skeleton.dof_kinds >= FIRST_ROTATION)
+        axes = skeleton.dof_kinds[rows] - FIRST_ROTATION
+        return axis_products(skeleton.n_joints, skeleton.dof_joints[rows], axes, rows)
+
+    return _orders.get(skeleton, None, order)

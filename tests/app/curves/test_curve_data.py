@@ -42,7 +42,7 @@ def test_keyed_clip_has_a_curve_per_dof():
 def test_sampled_animation_has_curves_for_position_and_three_angles_per_joint():
     labels = [c.label for c in curves_of(Actor(rig(), clip=turning([0.0])))]
     joints = [f"{name}.{axis}" for name in ("root", "#1") for axis in "xyz"]
-    assert labels == ["place.x", "place.y", "place.z", *joints]
+    assert labels == ["figure.x", "figure.y", "figure.z", *joints]
 
 
 def test_captured_points_have_coordinate_curves_and_still_figures_none():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from app.retargeting.driven import driven_scene
@@ -9,13 +11,13 @@ from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_panel
 from viewer.app.files.state import Files
+from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
     is_automatic,
     match_automatically,
     match_joint,
-    no_edit,
 )
 from viewer.app.retargeting.state import JointMatch, shown_match
 from viewer.formats import Source
@@ -50,6 +52,9 @@ def test_a_chosen_joint_drives_the_figure_at_once_and_undo_restores_it(panel):
     assert partner(hand, "right_elbow") == ("", "")
     assert no_edit(hand.state) == no_panel(hand.state, "drive") == ""
     assert is_automatic(hand.state) == "the match is automatic"
+    hand.state.of(Files).stream = object()
+    assert no_edit(hand.state) == "wait until the capture has been read"
+    hand.state.of(Files).stream = None
     hand.click("Only unmatched")
     hand.click("source of right_elbow")
     hand.step(2)
@@ -135,3 +140,15 @@ def test_saved_maps_can_be_loaded(panel, tmp_path):
 def test_figures_that_nothing_drives_have_no_panel(hand):
     assert no_edit(hand.state) == "no motion of another skeleton drives this figure"
     assert "Joint match" not in hand.state.item_rects
+
+
+def test_undo_of_other_edits_keeps_a_motion_that_has_grown(panel):
+    state, actor = panel.state, panel.state.actor
+    drive = replace(actor.drive)
+    actor.color = (1.0, 0.0, 0.0)
+    panel.step(2)
+    actor.clip, actor.drive = replace(actor.clip), drive  # as after another part of a capture
+    state.history.add_actors(state.scene, state.options)
+    panel.key("z", "ctrl")
+    panel.step(2)
+    assert actor.color is None and actor.drive is drive and shown_match(state).drive is drive

@@ -34,7 +34,7 @@ def written(folder: Path, *names: str) -> Path:
 def chosen(path: Path, expected=(), alike=ALIKE) -> list[str]:
     """Return the chosen paths, without the folder of the submission or its unpacked archive."""
     with opened(path, expected, alike) as found:
-        base = path if found.folder is None else found.folder / "0"
+        base = path if found.base is None else found.base
         assert all(file.exists() for file in found.files)
         return [file.relative_to(base).as_posix() for file in found.files]
 
@@ -103,8 +103,8 @@ def test_unpacked_files_are_removed_and_only_the_needed_ones_unpacked(tmp_path) 
     members = {"a/f.glb": "1", "a/f.bin": "2", "a/f.exe": "3", "b/x.png": "4"}
     path = zipped(tmp_path / "bob.zip", members)
     with opened(path, ["f.glb"], temporary=tmp_path) as found:
-        assert found.folder is not None and found.folder.parent == tmp_path
-        names = sorted(file.name for file in found.folder.rglob("*.*"))
+        assert found.base is not None and found.base.parent.parent == tmp_path
+        names = sorted(file.name for file in found.base.rglob("*.*"))
         assert names == ["f.bin", "f.glb"]
         assert found.files[0].read_text() == "1"
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]
@@ -121,8 +121,8 @@ def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
     folder.mkdir()
     (folder / "bob.zip").write_bytes(inner(inner(b"x", "bob/a.glb"), "deep.zip"))
     with opened(folder) as found:
-        assert found.folder is not None
-        assert found.files == (found.folder / "1/bob",)
+        assert found.base is not None
+        assert found.files == (found.base / "bob",)
     (folder / "bob.zip").write_bytes(inner(inner(inner(inner(b"x")))))
     with pytest.raises(FormatError, match="found archives in 3 archives"), opened(folder):
         pass

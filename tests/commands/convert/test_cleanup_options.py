@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+
 import numpy as np
 import pytest
 from formats.capture_files import body, write_frames
@@ -9,6 +11,7 @@ from formats.synthetic_smpl import model
 
 from viewer.cli import run
 from viewer.commands._cleanup import clean_up_of
+from viewer.commands._gaps import ONE_SECOND, add_gap_arguments
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -40,6 +43,42 @@ def test_other_options_are_parsed():
     assert found.frames == (5, None) and found.interpolates and found.longest_gap is None
     assert parsed("--fill-gaps", "12").longest_gap == 12
     assert parsed().is_empty
+
+
+@pytest.mark.parametrize(
+    ("text", "older", "results"),
+    [
+        ("hold", ["--gaps", "hold"], ("hold", False, None)),
+        ("interpolate", ["--interpolate-gaps"], (None, True, None)),
+        ("interpolate:12", ["--fill-gaps", "12"], (None, False, 12)),
+        ("interpolate:1s", ["--fill-gaps"], (None, False, ONE_SECOND)),
+        ("interpolate:12,split", ["--gaps=split", "--fill-gaps=12"], ("split", False, 12)),
+    ],
+)
+def test_one_option_has_the_meaning_of_its_older_names(text, older, results):
+    def parse(words):
+        parser = Parser()
+        add_arguments(parser)
+        found = parser.parse_args([*words, "-o", "a.npz"])
+        return found.gaps, found.interpolate_gaps, found.fill_gaps
+
+    assert parse(["--gaps", text]) == parse(older) == results
+
+
+@pytest.mark.parametrize(
+    ("use", "text"),
+    [
+        *(("write", text) for text in ("", "fill", "split,hold", "interpolate,split")),
+        *(("write", f"interpolate:{limit}") for limit in ("0", "2s", "5,", "5,5", "")),
+        *(("view", text) for text in ("hold", "interpolate:5,split")),
+        *(("check", text) for text in ("hold", "interpolate:5")),
+    ],
+)
+def test_other_values_of_gaps_are_refused(use, text):
+    parser = argparse.ArgumentParser(exit_on_error=False)
+    add_gap_arguments(parser.add_argument_group(), use)
+    with pytest.raises(argparse.ArgumentError, match="expected "):
+        parser.parse_args(["--gaps", text])
 
 
 @pytest.mark.parametrize(

@@ -182,3 +182,23 @@ def test_missing_files_are_named(tmp_path, folder):
     with pytest.raises(FormatError) as refused:
         read(Source.open(write(tmp_path / "none", levels=())))
     assert refused.value.diagnostic.key == "F002.mhr-no-lod"
+
+
+def test_a_folder_that_cannot_be_listed_is_an_error_of_one_line(folder, monkeypatch):
+    def refuse(path):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(type(folder), "iterdir", refuse)
+    with pytest.raises(FormatError) as found:
+        read(Source.open(folder / "rig.npz"))
+    assert found.value.diagnostic.key == "F001.unreadable"
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_correctives_that_are_not_finite_are_refused_on_first_use(tmp_path, value):
+    offsets = lod()["corrective_blendshapes"]
+    offsets[2, 3, 1] = value
+    changes = {"corrective_blendshapes": offsets}
+    model = read(Source.open(write(tmp_path / "mhr", lod_changes=changes)))
+    with pytest.raises(FormatError, match="corrective_blendshapes"):
+        model.correctives.values()

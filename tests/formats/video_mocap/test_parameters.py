@@ -91,6 +91,31 @@ def test_single_frames_keep_their_numbers() -> None:
     assert_allclose(body.translations, PLACES[[1, 0]], atol=1e-12)
 
 
+@pytest.mark.parametrize("key", ["", "track_id", "id"])
+def test_single_frames_of_two_people_keep_both(key: str) -> None:
+    # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7, in the order of the frames.
+    listed = [(5, 4), (5, 9), (6, 4), (7, 9)]
+    frames = [
+        {"rotmat": TURNED[row], "trans": PLACES[row], "frame": number}
+        | ({key: np.array(person)} if key else {})
+        for row, (number, person) in enumerate(listed)
+    ]
+    found = bodies(frames)
+    if key:
+        assert {person: body.timing.rows.tolist() for person, body in found.items()} == {
+            4: [0, 1, -1],
+            9: [0, -1, 1],
+        }
+        assert_allclose(found[9].translations, PLACES[[1, 3]], atol=1e-12)
+    else:  # the second person of frame 5 is in no other frame
+        assert sorted(found) == [0, 1]
+        assert_allclose(found[0].translations, PLACES[[0, 2, 3]], atol=1e-12)
+        assert_allclose(found[1].translations, PLACES[[1]], atol=1e-12)
+        opened = source(frames)
+        open_results(opened)
+        assert "F007.video-repeated" in [note.key for note in opened.diagnostics.warnings]
+
+
 @pytest.mark.parametrize(
     "changes", [{"rotmat": TURNED[:1, :22]}, {"betas": np.zeros(5)}], ids=["joints", "shape"]
 )

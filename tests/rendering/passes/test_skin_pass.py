@@ -353,6 +353,7 @@ def test_a_changed_pose_sends_one_palette_and_no_vertex(drawing, uploads):
 
 
 def test_a_camera_that_moves_sends_nothing(drawing, uploads):
+    drawing.draw()  # the second image of a size stores its background
     uploads.clear()
     orbit(drawing.camera, 30.0, 5.0)
     drawing.draw()

@@ -10,7 +10,7 @@ from turning import RATE, angles_of, turning
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.one_euro import OneEuro
 from viewer.rig.cleanup.savitzky_golay import SavitzkyGolay
-from viewer.rig.cleanup.smoothing import smoothed
+from viewer.rig.cleanup.smoothing import run_lengths, smoothed
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 
 FILTERS = [OneEuro(), SavitzkyGolay(), SavitzkyGolay(window=5, order=3)]
@@ -63,6 +63,19 @@ def test_one_euro_without_beta_attenuates_a_sine_by_its_transfer_function_withou
     assert_allclose(found.figure_translations[middle], factor * places[middle], atol=1e-8)
 
 
+@pytest.mark.parametrize("chosen", [OneEuro(beta=0.0), OneEuro()], ids=["fixed", "adaptive"])
+@pytest.mark.parametrize("count", [2, 9, 60])
+def test_one_euro_keeps_uniform_motion_up_to_its_ends(chosen, count):
+    # Without the continuation, the ends lag by (1 - a) / a = 1.6 frames at 3 Hz.
+    n = np.arange(float(count))
+    clip = turning(0.2 * n, axis=(1, 2, -1), places=np.outer(n, [0.1, -0.2, 0.3]))
+    found = smoothed(clip, chosen)
+    lag = 1e-3  # frames; a pass has settled to 1e-4
+    assert_allclose(found.figure_translations, clip.figure_translations, atol=0.3 * lag)
+    same = np.abs(np.einsum("nja,nja->nj", found.rotations, clip.rotations))
+    assert (2.0 * np.arccos(np.minimum(same, 1.0)) < 0.2 * lag).all()
+
+
 def test_one_euro_follows_fast_motion_more_closely():
     # Half way through a fast step, a filter with a higher beta is nearer to the step.
     step = np.where(np.arange(40) < 20, 0.0, 2.0)
@@ -110,6 +123,14 @@ def test_runs_between_gaps_are_filtered_separately(chosen):
     found = smoothed(turning(angles, rows=rows), chosen)
     expected = np.concatenate([np.full(8, 0.5), [np.nan] * 3, np.full(8, 2.0)])
     assert_allclose(angles_of(found), expected, atol=EXACT)
+
+
+def test_lengths_of_runs_are_those_of_the_frames_or_of_each_point():
+    clip = turning(np.zeros(5), rows=[0, 1, -1, 2, 3, 4])
+    assert run_lengths(clip) == [2, 3]
+    points = np.ones((5, 2, 4))
+    points[3, 1, 3] = 0.0
+    assert run_lengths(PointClip("points", clip.timing, points)) == [2, 3, 2, 1, 1]
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4])

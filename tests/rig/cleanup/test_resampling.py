@@ -51,15 +51,16 @@ def test_points_are_interpolated_where_they_are_visible_on_both_sides():
 
 def test_trimmed_frames_keep_numbers_times_and_gaps():
     clip = turning(np.arange(5.0), rows=[0, 1, -1, 2, 3, 4])
-    found = trimmed(clip, 1, 5)
+    found = trimmed(clip, 11, 15)
     assert found.timing.first_frame == 11
     assert found.start == pytest.approx(1 / 30.0, abs=1e-12)
     assert_array_equal(found.timing.present, [True, False, True, True])
     assert_allclose(angles_of(found)[[0, 2, 3]], [1, 2, 3], atol=1e-12)
     assert found.n_rows == 3
+    assert_array_equal(trimmed(clip).timing.present, clip.timing.present)
 
 
-@pytest.mark.parametrize("span", [(-1, 2), (2, 2), (0, 6)])
+@pytest.mark.parametrize("span", [(9, 12), (12, 12), (10, 16), (None, 16), (15, None)])
 def test_trimming_outside_the_clip_is_refused(span):
     with pytest.raises(RigError):
         trimmed(turning(np.zeros(5)), *span)

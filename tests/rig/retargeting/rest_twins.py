@@ -67,7 +67,13 @@ def worlds(local: np.ndarray) -> np.ndarray:
 
 def twin(axes: np.ndarray, starts_in_t_pose: bool = True) -> SkeletonMotion:
     """Return the walk with the joint axes C: (J, 3, 3)."""
-    rotations, path = truth(starts_in_t_pose)
+    return written(axes, *truth(starts_in_t_pose))
+
+
+def written(
+    axes: np.ndarray, rotations: np.ndarray, path: np.ndarray, rate: float = 30.0
+) -> SkeletonMotion:
+    """Return a motion with the joint axes C, from rotations relative to the T-pose and a path."""
     turned = rotations @ axes
     local = turned.copy()
     offsets = POINTS.copy()
@@ -79,10 +85,10 @@ def twin(axes: np.ndarray, starts_in_t_pose: bool = True) -> SkeletonMotion:
     for joint, parent in enumerate(PARENTS):
         places[joint] += places[parent] if parent >= 0 else 0.0
     figure = Figure("twin", skeleton=ball_skeleton(NAMES, PARENTS, places), up="y")
-    shifts = np.zeros((N_FRAMES, len(NAMES), 3))
+    shifts = np.zeros((len(path), len(NAMES), 3))
     shifts[:, 0] = path
     clip = SampledClip(
-        "walk", Timing(30.0, np.arange(N_FRAMES)), matrix_to_quaternion(local), shifts
+        "walk", Timing(rate, np.arange(len(path))), matrix_to_quaternion(local), shifts
     )
     return SkeletonMotion(figure, clip)
 

@@ -17,6 +17,8 @@ from viewer.app.core.widgets import (
     plain_zero,
     same_line_if_room,
 )
+from viewer.app.retargeting.drive_changes import no_edit
+from viewer.app.retargeting.feet import plants_feet, toggle_feet
 from viewer.phrases import printable
 from viewer.rig.captures.fit_error import fitted_body, keypoint_distances
 from viewer.rig.mesh import box_size
@@ -41,6 +43,7 @@ def draw(state: AppState) -> None:
     imgui.separator()
     _draw_place(state, actor)
     _draw_springs(state, actor)
+    _draw_feet(state, actor)
     _draw_following(state)
     _draw_motion_paths(state, actor)
     _draw_fit(state, actor)
@@ -115,6 +118,19 @@ def _draw_springs(state: AppState, actor: Actor) -> None:
     if checkbox(state, "Springs", is_on) != is_on:
         toggle_springs(state)
     explain("simulate hair and clothes while a motion plays; exported motions do not include this")
+
+
+def _draw_feet(state: AppState, actor: Actor) -> None:
+    """Draw the switch for feet, if the motion of another skeleton drives the chosen actor."""
+    if actor.drive is None:
+        return
+    why, is_on = no_edit(state), plants_feet(state)
+    if checkbox(state, "Feet on the ground", is_on, why) != is_on:
+        toggle_feet(state)
+    if not why:
+        explain(
+            "keep feet in place, with their soles on the ground, while those of the motion stand"
+        )
 
 
 def _draw_following(state: AppState) -> None:

@@ -45,8 +45,10 @@ def no_panel(state: AppState, needs: str) -> str:
     """
     if needs == "motion" and any(actor.figure.animations for actor in state.scene.actors):
         return ""
-    if needs == "motion" or (needs == "actors" and len(state.scene.actors) < 2):
+    if needs == "motion":
         return no_motion(state)
+    if needs == "actors" and len(state.scene.actors) < 2 and not state.clock.has_motion:
+        return "one figure and no motion: open several figures together, or a motion"
     if needs == "drive":
         return no_drive(state)
     if needs == "parts":

@@ -26,7 +26,7 @@ __all__ = ["Curve", "channel_of", "curves_of", "keyed_values", "sampled_points"]
 _AXES = "xyz"
 _PREFIXES = {"translation": "t", "rotation": "", "scale": "s"}
 _SHAPES, _SHAPE_NUMBER = "shapes", -2  # heading of the curves of blend shapes
-_PLACE = "place"  # heading of the curves of the whole figure
+_FIGURE = "figure"  # heading of the curves of the whole figure, as in the Joints panel
 _MOST_POINTS = 2000
 _PAGE = 500  # frames by which the visible part of a long motion advances
 
@@ -123,7 +123,7 @@ def _dof_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
 
 
 def _joint_curves(skeleton: Skeleton) -> tuple[Curve, ...]:
-    groups = [(_PLACE, -1, False)]
+    groups = [(_FIGURE, -1, False)]
     labels = joint_labels(skeleton)
     groups += [(printable(labels[j], 60), j, True) for j in shown_joints(skeleton).tolist()]
     return tuple(

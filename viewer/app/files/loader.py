@@ -116,6 +116,7 @@ class Loader:
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         morphs = [*opened.morphs, *contents.morphs]
         joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
+        joined.used_options = (contents.used_options or set()) | (opened.used_options or set())
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:

@@ -12,7 +12,7 @@ from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.linting.state import Checked, Linting, Running
 from viewer.app.playback.animations import choose_animation
-from viewer.app.shown_panels import set_open
+from viewer.app.shown_panels import show_panel
 from viewer.app.view.picks import take_pick
 from viewer.lint import (
     Finding,
@@ -47,8 +47,7 @@ _TITLE = "Checking the rig"
 
 def check_rig(state: AppState) -> None:
     """Show the Lint panel and check the scene."""
-    set_open(state, "lint", True)
-    imgui.set_window_focus("Lint")
+    show_panel(state, "lint")
     state.of(Linting).was_shown = True
     start_check(state)
 

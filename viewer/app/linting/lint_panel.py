@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ink
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import search_field
@@ -74,7 +75,7 @@ def draw(state: AppState) -> None:
 
 
 def _draw_warning(text: str) -> None:
-    imgui.push_style_color(imgui.Col_.text, _STALE_COLOR)
+    imgui.push_style_color(imgui.Col_.text, ink(_STALE_COLOR))
     imgui.text_wrapped(text)
     imgui.pop_style_color()
 
@@ -169,7 +170,7 @@ def _draw_filters(state: AppState, known: Checked) -> None:
         text = f"{counts[severity]:,} {severity}{'s' * (counts[severity] != 1)}"
         if severity != SEVERITIES[-1]:
             same_line_if_room(text)
-        imgui.push_style_color(imgui.Col_.text, _COLORS[severity])
+        imgui.push_style_color(imgui.Col_.text, ink(_COLORS[severity]))
         changed, _ = imgui.checkbox(f"{text}###{severity}", severity in view.severities)
         imgui.pop_style_color()
         note_item(state, f"lint {severity}")
@@ -246,13 +247,13 @@ def _draw_row(state: AppState, index: int, finding: Finding, several: bool) -> N
     imgui.set_cursor_screen_pos(place)
     _draw_severity(finding.severity)
     imgui.same_line(0.0, imgui.get_style().item_inner_spacing.x)
-    imgui.text_colored(_COLORS[finding.severity], finding.code)
+    imgui.text_colored(ink(_COLORS[finding.severity]), finding.code)
 
 
 def _draw_tooltip(state: AppState, finding: Finding) -> None:
     if imgui.begin_tooltip():
         imgui.push_text_wrap_pos(_TIP_WIDTH * imgui.get_font_size())
-        imgui.text_colored(_COLORS[finding.severity], f"{finding.severity} {finding.code}")
+        imgui.text_colored(ink(_COLORS[finding.severity]), f"{finding.severity} {finding.code}")
         imgui.text_unformatted(finding.title)
         if file_place(finding):
             imgui.text_unformatted(file_place(finding))
@@ -283,7 +284,10 @@ def _draw_severity(severity: str) -> None:
     corner = imgui.get_cursor_screen_pos()
     x, y, r = corner.x + 0.5 * size, corner.y + 0.5 * size, 0.42 * size
     draw_list = imgui.get_window_draw_list()
-    color, dark = imgui.get_color_u32(_COLORS[severity]), imgui.get_color_u32((0.1, 0.1, 0.1, 1))
+    color, dark = (
+        imgui.get_color_u32(ink(_COLORS[severity])),
+        imgui.get_color_u32((0.1, 0.1, 0.1, 1)),
+    )
     line = max(0.12 * size, 1.0)
     if severity == "error":
         draw_list.add_circle_filled((x, y), r, color)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, begin_window, menu_item, note_item
 from viewer.app.manual.blocks import Block, blocks_of
@@ -102,7 +103,7 @@ def _draw_page(state: AppState, manual: Manual) -> None:
 def _draw_block(block: Block, number: int) -> None:
     if block.kind == "title":
         imgui.push_font(None, _TITLE * imgui.get_style().font_size_base)
-        imgui.text_colored(_TITLE_COLOR, block.text)
+        imgui.text_colored(ink(_TITLE_COLOR), block.text)
         imgui.pop_font()
     elif block.kind == "heading":
         imgui.spacing()
@@ -126,7 +127,7 @@ def _draw_code(text: str, number: int) -> None:
     flags = imgui.ChildFlags_.frame_style | imgui.ChildFlags_.auto_resize_y
     scrolls = imgui.WindowFlags_.horizontal_scrollbar
     if imgui.begin_child(f"##code {number}", (0.0, 0.0), flags, scrolls):
-        imgui.push_style_color(imgui.Col_.text, _CODE_COLOR)
+        imgui.push_style_color(imgui.Col_.text, ink(_CODE_COLOR))
         # Spaces align comments only in a monospaced font.
         imgui.text_unformatted(_ALIGNED.sub("   #", text))
         imgui.pop_style_color()

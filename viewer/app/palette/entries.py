@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 
-from imgui_bundle import imgui
-
 from viewer.app.core.key_names import key_name
 from viewer.app.core.reasons import no_panel, no_skeleton
 from viewer.app.core.state import AppState
 from viewer.app.features import ACTIONS, KEYS, PANELS
 from viewer.app.playback.animations import choose_animation
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.shown_panels import is_open, set_open
+from viewer.app.shown_panels import show_panel
 from viewer.app.view.display_actions import set_shading, show, show_bones
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
@@ -82,9 +80,7 @@ def _panels(state: AppState) -> Iterator[Entry]:
 def _open_panel(state: AppState, name: str) -> None:
     """Open a panel, or bring it to the front of its tabs."""
     state.panels_visible = True
-    if is_open(state, name):
-        imgui.set_window_focus(PANELS[name].title)
-    set_open(state, name, True)
+    show_panel(state, name)
 
 
 def _choices(state: AppState) -> Iterator[Entry]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from imgui_bundle import imgui
 
+from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, overlay_rect
 from viewer.app.palette.entries import Entry, entries
@@ -95,8 +96,11 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(-1.0)
     hint = "Find an action, panel, joint or figure"
+    letters = "".join(map(chr, imgui.get_io().input_queue_characters))
     palette.query = imgui.input_text_with_hint("##query", hint, palette.query)[1]
     note_item(state, "palette query")
+    if not palette.has_focus:
+        _keep_early_letters(palette, letters)
     palette.has_focus |= imgui.is_item_active()
     if palette.query != palette.matched:
         palette.shown = ranked(palette.query, [entry.text for entry in palette.known])
@@ -106,6 +110,15 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
     if imgui.is_key_pressed(_K.enter, False) or imgui.is_key_pressed(_K.keypad_enter, False):
         return palette.known[palette.shown[palette.row]] if palette.shown else None
     return chosen
+
+
+def _keep_early_letters(palette: Palette, letters: str) -> None:
+    """Add letters that were typed before the text box takes them, as on a slow machine."""
+    palette.query += letters
+    editing = imgui.internal.get_input_text_state(imgui.get_item_id())
+    if imgui.is_item_activated() and editing is not None:
+        # The text box discards the letters of the frame in which it gets the focus.
+        editing.reload_user_buf_and_move_to_end()
 
 
 def _move(palette: Palette) -> bool:
@@ -162,7 +175,7 @@ def _draw_row(state: AppState, entry: Entry, row: int, is_chosen: bool) -> bool:
     if key:
         right -= imgui.calc_text_size(key).x
         imgui.same_line(right)
-        imgui.text_colored(_KEY_COLOR, key)
+        imgui.text_colored(ink(_KEY_COLOR), key)
         right -= imgui.get_font_size()
     left = right - imgui.calc_text_size(note).x
     if left > start + imgui.calc_text_size(entry.text).x + imgui.get_font_size():

@@ -16,13 +16,13 @@ from viewer.app.core.widgets import (
     note_item,
     same_line_if_room,
 )
+from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
     is_automatic,
     match_automatically,
     match_joint,
-    no_edit,
 )
 from viewer.app.retargeting.skeleton_preview import draw_preview, hover_pair
 from viewer.app.retargeting.state import JointMatch, Shown, shown_match

@@ -10,15 +10,13 @@ from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files
 from viewer.app.files.state import Files
+from viewer.app.retargeting.drive_changes import change_drive, no_edit
 from viewer.errors import ViewerError
 from viewer.formats import Source, file_stem
 from viewer.formats._text.joint_map import read_joint_map, write_joint_map
 from viewer.phrases import printable
-from viewer.rig.motion.retimed import with_rate
-from viewer.rig.motion.sampled_clip import SampledClip
-from viewer.rig.retargeting.driven_clip import driven_clip, full_map
+from viewer.rig.retargeting.driven_clip import full_map
 from viewer.rig.retargeting.joint_map import JointMap
-from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 
 __all__ = [
@@ -27,18 +25,9 @@ __all__ = [
     "is_automatic",
     "match_automatically",
     "match_joint",
-    "no_edit",
 ]
 
 _SUFFIXES = (".txt",)
-
-
-def no_edit(state: AppState) -> str:
-    """Return why the match of joints cannot be edited; empty if it can."""
-    why = no_drive(state)
-    if not why and state.of(Files).stream is not None:
-        why = "wait until the capture has been read"
-    return why
 
 
 def is_automatic(state: AppState) -> str:
@@ -126,37 +115,5 @@ def _save(state: AppState, paths: list[Path]) -> None:
 
 
 def _apply(state: AppState, joint_map: JointMap | None) -> bool:
-    """Retarget the chosen actor's motion, and those of all people of its capture."""
-    first = state.actor
-    together = [actor for actor in state.scene.actors if _is_together(actor, first)]
-    try:
-        changed = [_retargeted(actor, joint_map) for actor in together]
-    except ViewerError as problem:
-        state.error = str(problem)
-        return False
-    for actor, found in zip(together, changed, strict=True):
-        actor.clip, actor.drive = found.clip, found.drive
-        state.clock.pose(actor, again=True)
-    return True
-
-
-def _is_together(actor: Actor, first: Actor) -> bool:
-    """Return whether an actor is the first one or another person of the same capture."""
-    if actor is first:
-        return True
-    if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):
-        return False
-    is_same = actor.figure is first.figure and actor.title == first.title
-    return is_same and actor.drive.joint_map is first.drive.joint_map
-
-
-def _retargeted(actor: Actor, joint_map: JointMap | None) -> Actor:
-    """Return a copy of an actor whose motion is retargeted with another match of joints."""
-    assert actor.drive is not None and isinstance(actor.clip, SampledClip)  # by ``no_edit``
-    drive = replace(actor.drive, joint_map=joint_map)
-    clip = driven_clip(drive, actor.figure)[0]
-    if drive.finish is not None:
-        clip = drive.finish(clip)
-    return replace(
-        actor, drive=drive, clip=with_rate(clip, actor.clip.timing.frame_rate), pose=actor.pose
-    )
+    """Match the joints of the chosen actor, and of all people of its capture."""
+    return change_drive(state, lambda drive: replace(drive, joint_map=joint_map))

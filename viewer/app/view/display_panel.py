@@ -23,8 +23,9 @@ from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import BONES, MATCAPS, OPACITIES, QUALITIES, SHOWN
 from viewer.rendering.part_colors import part_colors
+from viewer.rendering.passes.background_pass import parse_color
 from viewer.rendering.passes.bone_style import skeleton_opacity
-from viewer.rendering.passes.ground_pass import grid_step, parse_color
+from viewer.rendering.passes.ground_pass import grid_step
 from viewer.rig.annotations import BodyParts
 from viewer.rig.scene import scene_unit
 

@@ -9,7 +9,6 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.features import PANELS
 from viewer.app.posing.gizmo import joint_at
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.posing.state import Posing
@@ -84,7 +83,6 @@ def _take_click(
         found = vertex_at(state, renderer, size, pixel)
         if found is not None:
             pin_vertex(state, found[0], found[1])
-            imgui.set_window_focus(PANELS["vertex"].title)  # another tab may hide it
         return
     pick = _pick(state, renderer, size, pixel, state.options)
     if not aims and (pick is None or pick.joint < 0):

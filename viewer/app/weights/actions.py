@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from viewer.app.core.state import AppState
 from viewer.app.posing.joint_tree import select_joint
-from viewer.app.shown_panels import is_open, set_open
+from viewer.app.shown_panels import is_open, set_open, show_panel
 from viewer.app.weights.state import Pinned, Weights
 from viewer.phrases import printable
 from viewer.rig.inspection.explanation import Explanation, explain
@@ -162,7 +162,7 @@ def pin_vertex(state: AppState, actor: int, vertex: int) -> None:
         state.say_status("This figure has no skin attached to a skeleton: no influences to explain")
         return
     state.of(Weights).pinned = Pinned(actor, figure, vertex)
-    set_open(state, "vertex", True)
+    show_panel(state, "vertex")
 
 
 def unpin(state: AppState) -> None:

@@ -94,6 +94,7 @@ class EngineKind:
 ENGINES = {
     "sequential": EngineKind("in this process", is_isolated=False),
     "processes": EngineKind("in worker processes", ("pebble",)),
+    "dask_cluster": EngineKind("on a cluster", ("dask", "distributed")),
 }
 
 

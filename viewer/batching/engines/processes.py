@@ -8,29 +8,35 @@ that crashes, hangs or exceeds its memory is replaced, and its item is run again
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import os
+import pickle
 import signal
 import sys
-from collections.abc import Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
+from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.items import Item, Result
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
+    from types import FrameType
+
     from pebble import ProcessFuture, ProcessPool
 
 __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit
+_PATIENCE = 120.0  # seconds until a pool in which no item runs is replaced; doubled each time
 _MOST_BREAKS = 3  # pools that end without a result, before the batch is given up
 _RETRIED = ("crashed", "timeout", "memory")
 
@@ -41,7 +47,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     Raises
     ------
     ViewerError
-        If pebble is missing, or the workers do not start.
+        If pebble is missing, the job cannot be pickled, or the workers do not start.
     """
     try:
         import pebble  # noqa: F401
@@ -49,6 +55,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         raise ViewerError(
             "worker processes need pebble: pip install pebble, or use --workers 0"
         ) from None
+    _check_pickles(job)
     pool = _Workers(job, limits)
     waiting, left = iter(items), True
     try:
@@ -65,12 +72,43 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         pool.close()
 
 
+def _check_pickles(job: Job) -> None:
+    try:
+        pickle.dumps(job)
+    except (pickle.PicklingError, AttributeError, TypeError) as problem:
+        raise ViewerError(
+            "worker processes import the job by its name: expected a function at the top level of "
+            f"a module, or workers=0 ({printable(problem)})"
+        ) from None
+
+
 @dataclass(frozen=True)
 class _Attempt:
     """An item and how often it has been started before."""
 
     item: Item
     earlier: int = 0
+
+
+class _Context(SpawnContext):
+    """Starts workers as new interpreters, and knows them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.workers: list[SpawnProcess] = []
+
+    def Process(  # type: ignore[override]  # noqa: N802  the name in multiprocessing
+        self,
+        target: Callable[..., object],
+        name: str,
+        args: tuple[Any, ...],
+        kwargs: dict[str, Any],
+    ) -> SpawnProcess:
+        """Return a worker."""
+        worker = SpawnProcess(target=target, name=name, args=args, kwargs=kwargs)
+        self.workers = [one for one in self.workers if one.exitcode is None]
+        self.workers.append(worker)
+        return worker
 
 
 class _Workers:
@@ -80,9 +118,11 @@ class _Workers:
         self.job, self.limits = job, limits
         self.flying: dict[ProcessFuture[Result], _Attempt] = {}
         self._done: SimpleQueue[ProcessFuture[Result]] = SimpleQueue()
-        self._context = multiprocessing.get_context("spawn")
-        self._is_stopping = self._context.Event()
+        self._context = _Context()
+        with _blocked():  # starts a process that tracks semaphores
+            self._is_stopping = self._context.Event()
         self._n_breaks = 0
+        self._patience, self._moved = _PATIENCE, time.monotonic()
         self._pool = self._new_pool()
 
     def stops(self) -> bool:
@@ -99,7 +139,8 @@ class _Workers:
             self._renew()
             future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
         self.flying[future] = attempt
-        future.add_done_callback(lambda _: self._done.put(future))
+        done = self._done
+        future.add_done_callback(lambda _: done.put(future))
 
     def finished(self) -> Iterator[Result]:
         """Wait for an attempt to end; yield its result unless the item is run again."""
@@ -107,7 +148,9 @@ class _Workers:
             future = self._done.get(timeout=_TICK)
         except Empty:
             self.stops()
+            self._check_stall()
             return
+        self._moved = time.monotonic()
         attempt = self.flying.pop(future)
         result = self._result(future, attempt)
         if result.status == "cancelled" and not result.message:
@@ -120,7 +163,12 @@ class _Workers:
     def close(self) -> None:
         """End the workers, and what they run."""
         self._pool.stop()  # type: ignore[no-untyped-call]
+        # Before the queue is closed, or workers that are starting would complain about it.
+        for worker in self._context.workers:
+            if worker.is_alive():
+                worker.terminate()
         self._pool.join()
+        self._context.workers.clear()
 
     def _result(self, future: ProcessFuture[Result], attempt: _Attempt) -> Result:
         from pebble import ProcessExpired
@@ -159,10 +207,30 @@ class _Workers:
         if self._n_breaks >= _MOST_BREAKS:
             raise ViewerError(
                 "the worker processes end before they do anything; a script that calls "
-                'viewer.batch needs the line if __name__ == "__main__": before its own work'
+                'viewer.batch needs the line if __name__ == "__main__": before its own work, and '
+                "a function typed into an interpreter or notebook needs workers=0"
             )
         self.close()
         self._pool = self._new_pool()
+
+    def _check_stall(self) -> None:
+        """Replace a pool in which no item runs.
+
+        The system may kill a worker that holds the lock of the queue, and nobody gets it then.
+        """
+        now = time.monotonic()
+        if any(future.running() for future in self.flying):
+            self._moved = now
+        elif now > self._moved + self._patience:
+            self._patience *= 2.0
+            self._moved = now
+            attempts = [*self.flying.values()]
+            self.flying.clear()
+            self._done = SimpleQueue()
+            self.close()
+            self._pool = self._new_pool()
+            for attempt in attempts:
+                self.schedule(attempt)
 
     def _new_pool(self) -> ProcessPool:
         from pebble import ProcessPool
@@ -203,12 +271,16 @@ def _end_of(code: int | None) -> str:
 
 _job: Job | None = None
 _stopping: Event | None = None
+_is_terminated = False
 
 
 def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
     """Begin a worker."""
     global _job, _stopping
     _job, _stopping = job, stopping
+    # Between items, a worker may hold the lock of the queue, which would be lost with it: only
+    # items are interrupted. A worker without one ends when the pool closes its queue.
+    signal.signal(signal.SIGTERM, _note_termination)
     if memory is not None:
         _limit_memory(memory)
 
@@ -225,8 +297,15 @@ def _limit_memory(size: int) -> None:
     resource.setrlimit(kind, (limit, most))
 
 
+def _note_termination(number: int, frame: FrameType | None) -> None:
+    global _is_terminated
+    _is_terminated = True
+
+
 def _work(item: Item) -> Result:
     assert _job is not None and _stopping is not None  # set by _prepare
+    if _is_terminated:
+        os._exit(128 + signal.SIGTERM)
     if _stopping.is_set():
         return Result(item, "cancelled")
     try:

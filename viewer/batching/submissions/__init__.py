@@ -3,6 +3,6 @@
 from __future__ import annotations
 
 from viewer.batching.submissions.opening import Submission, opened
-from viewer.batching.submissions.search import Found, find_submissions
+from viewer.batching.submissions.search import Found, find_submissions, is_archive
 
-__all__ = ["Found", "Submission", "find_submissions", "opened"]
+__all__ = ["Found", "Submission", "find_submissions", "is_archive", "opened"]

@@ -32,12 +32,12 @@ class Submission:
     ----------
     files : tuple of Path
         Files to open together, or one folder.
-    folder : Path or None
-        Temporary folder that an archive was unpacked into; it is removed with its content.
+    base : Path or None
+        Temporary folder that stands for the archive, and is removed with its content.
     """
 
     files: tuple[Path, ...]
-    folder: Path | None = None
+    base: Path | None = None
 
 
 @contextmanager
@@ -81,7 +81,7 @@ def opened(
     with tempfile.TemporaryDirectory(prefix="viewer-submission-", dir=_existing(temporary)) as name:
         folder = Path(name)
         chosen, base = _unpack(path, folder, expected, alike)
-        yield Submission(tuple(base / one for one in chosen), folder)
+        yield Submission(tuple(base / one for one in chosen), base)
 
 
 def _existing(folder: Path | None) -> Path | None:

@@ -9,10 +9,9 @@ from pathlib import Path
 from viewer.batching.submissions.choosing import is_junk, suffix_of
 from viewer.formats import SUFFIXES
 
-__all__ = ["ARCHIVES", "Found", "find_submissions"]
+__all__ = ["Found", "find_submissions", "is_archive"]
 
-ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".gz", ".tgz", ".bz2", ".xz")
-"""Suffixes of archives; of these, zip archives are opened, and the others are reported."""
+_ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar.xz")
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,6 +30,11 @@ class Found:
     ignored: tuple[Path, ...] = ()
 
 
+def is_archive(path: str) -> bool:
+    """Return whether a file is an archive by its name; only zip archives are opened."""
+    return path.lower().endswith(_ARCHIVES)
+
+
 def find_submissions(paths: Sequence[str | Path]) -> Found:
     """Return the submissions that paths refer to, in the order of the paths, then by name.
 
@@ -42,7 +46,7 @@ def find_submissions(paths: Sequence[str | Path]) -> Found:
     """
     given = [Path(path) for path in paths]
     entries = _entries(given[0]) if len(given) == 1 else []
-    inside = [one for one in entries if one.is_dir() or suffix_of(one.name) in ARCHIVES]
+    inside = [one for one in entries if one.is_dir() or is_archive(one.name)]
     if not inside or any(_is_rig_file(entry) for entry in entries):
         return Found(tuple(dict.fromkeys(given)))
     return Found(tuple(inside), tuple(one for one in entries if one not in inside))

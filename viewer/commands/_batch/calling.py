@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING, Any
 from viewer.batching.attempts import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
-from viewer.commands._batch.jobs import JOBS, CommandJob, job_parser
+from viewer.commands._batch.jobs import JOBS, job_parser
 from viewer.commands._batch.options import RETRIES
 from viewer.commands._batch.planning import Plan, Request, plan_of
 from viewer.commands._batch.requests import request_of
+from viewer.commands._batch.results import check_results, save_results
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.near_names import did_you_mean
@@ -48,6 +49,8 @@ def batch(
     timeout: float | None = None,
     memory: int | None = None,
     report: str | os.PathLike[str] = "",
+    table: str | os.PathLike[str] = "",
+    overview: str | os.PathLike[str] = "",
     on_result: Callable[[Result], None] | None = None,
 ) -> Report:
     """Run a job for each of many files; a failed one never stops the others.
@@ -92,6 +95,11 @@ def batch(
         Bytes that a worker may use.
     report : str or path
         File for one line of JSON per input; by default ``report.jsonl`` in ``out``.
+    table : str or path
+        CSV file for one row per input.
+    overview : str or path
+        A page (``.html``) of all inputs, for ``render``, ``lint``, ``diff`` and functions; for
+        ``render`` and ``diff`` also contact sheets (``.png``).
     on_result : callable, optional
         Called with each result.
 
@@ -122,13 +130,14 @@ def batch(
         timeout=timeout,
         memory=memory,
         report=os.fspath(report),
+        table=os.fspath(table),
+        overview=os.fspath(overview),
     )
-    one: Job
-    if callable(job):
-        one, request = FunctionJob(job), replace(request, identity=_identity(job))
-    else:
-        one, request = _command(job, request, options)
-    return _run(plan_of(request), one, on_result)
+    name = "function" if callable(job) else job
+    one, request = _function(job, request) if callable(job) else _command(job, request, options)
+    found = _run(plan_of(request), one, on_result)
+    save_results(name, request.table, request.overview, found.results)
+    return found
 
 
 def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Report:
@@ -144,6 +153,13 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
     return found
 
 
+def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Request]:
+    """Return a function as a job, and the request with its identity."""
+    may_replace = request.force or request.resume
+    check_results("function", request.table, request.overview, may_replace, request.output)
+    return FunctionJob(job), replace(request, identity=_identity(job))
+
+
 def _identity(function: Callable[[Item], Any]) -> str:
     """Return a function's name and a hash of its code, which changes with its body."""
     code = getattr(function, "__code__", None)
@@ -152,7 +168,7 @@ def _identity(function: Callable[[Item], Any]) -> str:
     return f"{function.__module__}.{name} {blake2b(body, digest_size=8).hexdigest()} {VERSION}"
 
 
-def _command(job: str, request: Request, options: Sequence[str]) -> tuple[CommandJob, Request]:
+def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, Request]:
     """Return a command as a job, and the request with what its options add."""
     if job not in JOBS:
         near = did_you_mean(job, JOBS) or f"there are {', '.join(JOBS)}"
@@ -161,6 +177,8 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Comman
     words = [job, *options]
     words += [word for file in request.shared for word in ("--with", file)]
     words += ["--output", request.output] if request.output else []
+    words += ["--table", request.table] if request.table else []
+    words += ["--overview", request.overview] if request.overview else []
     words += ["--resume"] * request.resume + ["--force"] * request.force
     parser.check_options(words)
     arguments = parser.parse_intermixed_args(words)
@@ -169,6 +187,10 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Comman
         arguments.to = request.to
     found, command = request_of(arguments)
     added = {
-        name: getattr(found, name) for name in ("to", "identity", "shared", "few", "keeps_folders")
+        name: getattr(found, name)
+        for name in (
+            *("paths", "notes", "to", "identity", "shared", "few", "keeps_folders"),
+            *("table", "overview"),
+        )
     }
     return command, replace(request, **added)

@@ -5,16 +5,19 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 
 from viewer.batching.attempts import attempt
 from viewer.batching.items import Item, Result
+from viewer.batching.worker import worker_rank
 from viewer.commands._batch.options import add_batch_arguments
+from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.formats._kept import keeping_figures
 from viewer.loading import bundled_body, bundled_files
+from viewer.media.array_cache import without_cache
 from viewer.phrases import printable
 
 __all__ = ["JOBS", "CommandJob", "JobKind", "add_job_arguments", "job_parser"]
@@ -66,6 +69,7 @@ def job_parser(job: str) -> Parser:
     kind = JOBS[job]
     known = {action.dest for action in parser._actions}
     add_batch_arguments(parser, kind.suffix, kind.writes, "common" in known)
+    add_result_arguments(parser, job)
     if "force" not in known:
         parser.add_argument("--force", action="store_true", help="replace an existing report")
     output = {"always": "-o OUT ", "maybe": "[-o OUT] ", "never": ""}[kind.writes]
@@ -111,13 +115,19 @@ class CommandJob:
     fixed: tuple[str, ...] = ()
     shared: tuple[str, ...] = ()
 
+    @property
+    def uses_gpu(self) -> bool:
+        """Whether clusters hand the job to workers with a graphics card, if there are any."""
+        return self.command == "render"
+
     @cached_property
     def _shared(self) -> list[Path]:
         return [*map(Path, self.shared), bundled_body(), *bundled_files()]
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
-        with keeping_figures(self._shared):
+        # Most files are read once: their numbers would displace those of files that are not.
+        with keeping_figures(self._shared), without_cache():
             result = attempt(item, self._run)
         if result.status == "failed" and not result.message:
             # Commands that report on several files print what is wrong with one of them.
@@ -132,9 +142,20 @@ class CommandJob:
         }
         arguments = argparse.Namespace(**given)
         arguments.files = [*self.fixed, *item.files]
+        if self.uses_gpu and arguments.gpu is None:
+            arguments.gpu = _device()
         if "output" in given:
             arguments.output = item.output or None
         if item.output:
             Path(item.output).parent.mkdir(parents=True, exist_ok=True)
         code: int = import_module(f"viewer.commands.{self.command}").run(arguments)
         return code
+
+
+@cache
+def _device() -> int | None:
+    """Return the graphics device of this worker process; None for the default one."""
+    from viewer.rendering.gpu.egl_devices import device_of_worker
+
+    rank = worker_rank()
+    return None if rank is None else device_of_worker(rank)

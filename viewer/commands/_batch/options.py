@@ -86,6 +86,13 @@ def _add_processes(group: argparse._ArgumentGroup) -> None:
         "per core)",
     )
     group.add_argument(
+        "--cluster",
+        default="",
+        metavar="CLUSTER",
+        help="run on Dask workers: local, an address such as tcp://host:8786, or "
+        "slurm[:partition=gpu,time=2:00:00]",
+    )
+    group.add_argument(
         "--retries",
         type=_whole,
         default=RETRIES,

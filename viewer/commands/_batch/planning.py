@@ -5,14 +5,15 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 from viewer.batching.engines import Limits
+from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.inputs import find_inputs
 from viewer.batching.items import Item
-from viewer.batching.naming import check_outputs, has_fields, items_of, template_of
+from viewer.batching.naming import check_outputs, items_of, output_folder, template_of
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
 from viewer.errors import OutputError, ViewerError
@@ -32,6 +33,7 @@ class Request:
     ``shared``: files that all items read.
     ``few``: largest number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
+    ``notes``: messages about the paths.
     """
 
     paths: Sequence[str]
@@ -51,6 +53,9 @@ class Request:
     timeout: float | None = None
     memory: int | None = None
     report: str = ""
+    notes: Sequence[str] = ()
+    table: str = ""
+    overview: str = ""
 
 
 @dataclass(frozen=True)
@@ -71,7 +76,12 @@ def plan_of(request: Request) -> Plan:
     Raises ViewerError if an input is missing, options contradict each other, or a file would be
     written twice or replaced.
     """
-    inputs = find_inputs(request.paths, request.lists, keeps_folders=request.keeps_folders)
+    inputs = find_inputs(
+        request.paths,
+        request.lists,
+        keeps_folders=request.keeps_folders,
+        output=output_folder(request.output),
+    )
     template = template_of(request.output, request.to) if request.output else ""
     items = items_of(inputs, template)
     check_outputs(items, request.shared)
@@ -86,16 +96,14 @@ def plan_of(request: Request) -> Plan:
     settings = Settings(
         engine, limits, report, _existing(request), request.identity, tuple(request.shared)
     )
-    return Plan(items, settings, (*inputs.notes, *note))
+    return Plan(items, settings, (*request.notes, *inputs.notes, *note))
 
 
 def _report_of(request: Request) -> Path | None:
     """Return the report's path: next to the outputs, unless another one is given."""
     if request.report:
         return Path(request.report)
-    folder = request.output
-    if has_fields(folder):
-        folder = os.path.dirname(folder.partition("{")[0])
+    folder = output_folder(request.output)
     if not folder:
         return None
     part = f".{request.shard.replace('/', '-of-')}" if request.shard else ""
@@ -131,8 +139,10 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
     if timeout is not None and timeout < 0.0:
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
-    limits = Limits(request.workers or 1, request.retries, timeout, request.memory, request.cluster)
+    n_workers = request.workers or _cores()
+    limits = Limits(n_workers, request.retries, timeout, request.memory, request.cluster)
     if request.cluster:
+        parse_cluster(request.cluster)
         return "dask_cluster", limits, []
     is_limited = request.timeout is not None or request.memory is not None
     workers = request.workers
@@ -146,8 +156,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
         raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
     if workers == 0:
         return "sequential", limits, []
-    limits = Limits(max(1, min(workers, len(items))), request.retries, timeout, request.memory)
-    return "processes", limits, []
+    return "processes", replace(limits, workers=max(1, min(workers, len(items)))), []
 
 
 def _size(items: Sequence[Item]) -> int:

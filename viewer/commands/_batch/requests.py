@@ -5,16 +5,20 @@ from __future__ import annotations
 import argparse
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from viewer.batching.engines import Job
+from viewer.batching.submissions import find_submissions
 from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
 from viewer.commands._batch.planning import Request
+from viewer.commands._batch.results import check_results
+from viewer.commands._batch.submitted import submission_job
 from viewer.commands._diff.inputs import input_files
 from viewer.commands._scene import parse_bytes
 from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.models import resolve, save_model_folder
-from viewer.phrases import printable
+from viewer.phrases import listed, printable
 from viewer.version import VERSION
 
 __all__ = ["request_of"]
@@ -23,7 +27,7 @@ _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
 """Arguments on which the content of the outputs does not depend."""
 
 
-def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
+def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     """Return the request and the job of a command line.
 
     ``arguments``: from a parser of ``job_parser``.
@@ -36,10 +40,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
         raise ViewerError(
             f"expected -o OUT, a folder or a template, found none ({name} writes files)"
         )
-    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
-    for file in fixed:
-        if not os.path.exists(file):
-            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
+    fixed = _fixed(arguments)
     command = _command_arguments(arguments)
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a run that was killed.
@@ -47,16 +48,18 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
     memory = (
         parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
     )
+    paths, notes = _inputs(arguments)
     request = Request(
-        paths=arguments.files,
+        paths=paths,
         lists=arguments.from_list,
         output=output,
         to=_suffix(arguments, kind.suffix),
         keeps_folders=kind.is_folder_input,
-        identity=_identity(name, command),
+        identity=_identity(name, command, getattr(arguments, "expect", [])),
         shared=tuple(dict.fromkeys([*fixed, *_files_in(command)])),
         few=kind.few,
         workers=arguments.workers,
+        cluster=arguments.cluster,
         shard=arguments.shard,
         resume=arguments.resume,
         force=arguments.force,
@@ -64,8 +67,35 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, CommandJob]:
         timeout=arguments.timeout,
         memory=memory,
         report=arguments.report or "",
+        notes=notes,
+        table=arguments.table,
+        overview=getattr(arguments, "overview", ""),
     )
-    return request, CommandJob(name, command, tuple(fixed), tuple(request.shared))
+    may_replace = arguments.force or arguments.resume
+    check_results(name, request.table, request.overview, may_replace, output)
+    job: Job = CommandJob(name, command, tuple(fixed), tuple(request.shared))
+    if name == "diff":
+        job = submission_job(job, command.reference, arguments.expect)
+    return request, job
+
+
+def _fixed(arguments: argparse.Namespace) -> list[str]:
+    """Return the files that are opened with every item; raise if one is missing."""
+    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
+    for file in fixed:
+        if not os.path.exists(file):
+            raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
+    return fixed
+
+
+def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
+    """Return the paths of the batch, and messages about those that are left out."""
+    if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
+        return arguments.files, []
+    found = find_submissions(arguments.files)
+    names = listed([printable(path.name, 60) for path in found.ignored])
+    note = f"ignored, as they are neither folders nor archives: {names}"
+    return [*map(str, found.submissions)], [note] if found.ignored else []
 
 
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
@@ -87,10 +117,10 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
     return command
 
 
-def _identity(job: str, command: argparse.Namespace) -> str:
+def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
     """Return job, options and version as text that is equal if the results are."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
-    return json.dumps([job, VERSION, options], sort_keys=True, default=str)
+    return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
 
 def _files_in(command: argparse.Namespace) -> Iterator[str]:

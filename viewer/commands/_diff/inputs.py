@@ -21,7 +21,8 @@ def input_files(text: str) -> list[Path]:
     """
     path = Path(text)
     if not path.exists() and "+" in text:
-        return [Path(part) for part in text.split("+") if part]
+        parts = [part for part in text.split("+") if part]
+        return _existing(parts) or [Path(part) for part in parts]
     if not path.is_dir() or _is_known_folder(path):
         return [path]
     suffixes = [suffix for kind in FORMATS.values() for suffix in kind.suffixes if suffix != ".txt"]
@@ -30,6 +31,17 @@ def input_files(text: str) -> list[Path]:
         known = list(dict.fromkeys(suffixes))
         raise FormatError(Diagnostic("F002.no-rig", path, values={"suffixes": known}))
     return files
+
+
+def _existing(parts: list[str]) -> list[Path] | None:
+    """Return existing files with these names joined; names of folders may contain "+" too."""
+    for count in range(len(parts), 0, -1):
+        path = Path("+".join(parts[:count]))
+        if path.exists():
+            rest = _existing(parts[count:])
+            if rest is not None:
+                return [path, *rest]
+    return None if parts else []
 
 
 def _is_known_folder(path: Path) -> bool:

@@ -22,7 +22,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import animation_files, motion_paths
-from viewer.export._options import GAPS, QUATERNIONS, ROTATION_ORDERS
+from viewer.export._options import QUATERNIONS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import printable
@@ -52,11 +52,6 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
         dest="kind",
         choices=[*EXPORTERS],
         help=f"the format, if the suffix is ambiguous; motions: {', '.join(kinds)}",
-    )
-    group.add_argument(
-        "--gaps",
-        choices=GAPS,
-        help="missing frames (default: omitted from EasyMocap, .obj and arrays, else hold)",
     )
     group.add_argument("--to-unit", choices=METRES, help="unit of the file (default: cm in BVH)")
     group.add_argument(

@@ -9,7 +9,9 @@ CODES = {
         "warning", "joint jumps between frames", "look for a bad frame or a cut at that time"
     ),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
-    "C005": Code("warning", "missing frames", "interpolate them (--fill-gaps) or record again"),
+    "C005": Code(
+        "warning", "missing frames", "interpolate them (--gaps interpolate:1s) or record again"
+    ),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
     "C007": Code("warning", "foot sliding", "lock the feet (--lock-feet of viewer convert)"),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),

@@ -11,6 +11,17 @@ MESSAGES = {
     "C009.clip": "found {n:#channel}, {skeleton:text} {misfit}",
     "F007.unused-rig": "--rig {value:text} has no effect: only Anny has several rigs",
     "F007.unused-lod": "--lod {value:text} has no effect: only MHR has levels of detail",
+    "F007.unused-space": "--space {value} has no effect: no file has results of video motion "
+    "capture",
+    "F007.unused-average-shape": "--average-shape has no effect: no file has a person whose shape "
+    "varies",
+    "F007.unused-video": "--video {value:text} has no effect: no file is a capture",
+    "F007.unused-images": "--images {value:text} has no effect: no file is a capture",
+    "F007.unused-model": "--model {value:text} has no effect: no file has a motion that could "
+    "drive it",
+    "F007.model-of-parameters": "--model has no effect: these people are given by parameters of "
+    "{member}, which only drive a figure if that model is in the model folder (viewer models)",
+    "F007.model-of-points": "--model has no effect: the capture has only keypoints",
     "F007.unused-joint-map": "--joint-map has no effect: no motion of another skeleton drives a "
     "figure",
     "F002.joint-map": 'expected "figure joint = motion joint", found {found:quoted}',
@@ -36,6 +47,7 @@ MESSAGES = {
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
     "F007.own-model": "drawn with {model:text} of the model folder (--model selects another)",
+    "F007.own-carrier": "motion computed with {model:text} of the model folder",
     "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
     "F007.bundled-body": "drawn with the bundled body (--model selects another)",
     "F007.bundled-body-without-shapes": "drawn with the bundled body, without the shape "

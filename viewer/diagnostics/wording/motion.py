@@ -13,7 +13,7 @@ MESSAGES = {
     "F004.mapping-again": "expected each joint of {figure:text} once, found {joint:quoted} again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
-    "{figure:text}: {idle:list8}",
+    "{figure:text}: {idle:list8}; --joint-map can match them",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
@@ -38,8 +38,17 @@ MESSAGES = {
     "overrides it",
     "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
     "{names:list}",
-    "F007.rest-unknown": "zero pose of {motion:text} used as its rest pose, though it is "
-    "not a standing pose: the motion is not upright; --source-rest N uses frame N",
+    "F007.rest-lying": "rest pose of {motion:text}: estimated from its trunk, knees and elbows; "
+    "its zero pose is not a standing pose, and the motion is not upright, so that the slope of "
+    "its feet is assumed; --source-rest overrides it",
+    "F007.feet-planted": "feet of {figure:text} planted in {n:#contact} of {motion:text}: they "
+    "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
+    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "
+    "leaves them as retargeted",
+    "F007.feet-kept": "feet of {figure:text} not planted: they slide as little as those of "
+    "{motion:text}",
+    "F007.feet-no-contacts": "feet of {figure:text} not planted: those of {motion:text} never "
+    "stand",
     "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
@@ -98,7 +107,8 @@ PHRASES = {
     "translation-too-far": "translation: expected at most {most:g}, found {found:g}",
     # Clean-up of captured motions
     "one-euro": "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
-    "savgol": "Savitzky-Golay filter, {n:#frame}, degree {order}",
+    "savgol": "Savitzky-Golay filter, {shortest:+{} to }{n:#frame}, degree {order}{left:+; {}}",
+    "savgol-short": "{n:#run} of too few frames {n:?is|are} unchanged",
     "moved-joints": "joints",
     "moved-points": "points",
     "part-body": "body",

@@ -11,11 +11,16 @@ joint. Poses whose bound is below the tolerance, or below the largest distance s
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 
 from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
+
+# The bounds of the last correctives: a batch writes motions of one body after another.
+_known: tuple[weakref.ref[Floats] | None, Floats] = (None, np.zeros(0))
 
 _NUMBERS = 9  # entries of a joint's rotation matrix, which drive the correctives
 
@@ -27,7 +32,7 @@ class Bounds:
     """
 
     def __init__(self, first: Body, second: Body) -> None:
-        same = first.skin is second.skin
+        same = _are_equal(first.skin, second.skin)
         both = first.skin if same else _joined(first.skin, second.skin, 1.0)
         self._centers, self._radii = _spheres(second, both)
         self._most = float(_sums(first.skin).max(initial=0.0))
@@ -98,6 +103,15 @@ class Bounds:
         return found
 
 
+def _are_equal(first: Skin, second: Skin) -> bool:
+    """Return whether two skins have the same influences."""
+    return first is second or (
+        np.array_equal(first.starts, second.starts)
+        and np.array_equal(first.joints, second.joints)
+        and np.array_equal(first.weights, second.weights)
+    )
+
+
 def _spheres(body: Body, skin: Skin) -> tuple[Floats, Floats]:
     """Return bounding spheres of each joint's vertices: centres (J, 3) and radii (J,)."""
     order = np.argsort(skin.joints, kind="stable")
@@ -144,11 +158,17 @@ def _norms(weights: Floats) -> Floats:
 
 def _stretches(correctives: Floats | None) -> Floats:
     """Return upper bounds of the displacement by nine corrective weights of norm 1: (J,)."""
+    global _known
     if correctives is None:
         return np.zeros(0)
-    squares = np.einsum("pva,pva->pv", correctives, correctives)
-    of_joints = squares.reshape(len(squares) // _NUMBERS, _NUMBERS, -1).sum(axis=1)
-    return np.sqrt(of_joints.max(axis=1, initial=0.0))
+    known, found = _known
+    if known is None or known() is not correctives:
+        squares = np.einsum("pva,pva->pv", correctives, correctives)
+        of_joints = squares.reshape(len(squares) // _NUMBERS, _NUMBERS, -1).sum(axis=1)
+        found = np.sqrt(of_joints.max(axis=1, initial=0.0))
+        if not correctives.flags.writeable:
+            _known = weakref.ref(correctives), found
+    return found
 
 
 def _largest_stretch(palette: Floats) -> Floats:

@@ -38,7 +38,7 @@ from viewer.rig.arrays import Deferred
 __all__ = ["open_npy", "open_npz"]
 
 _MAX_AXES = 32
-_CHUNK = 1 << 20
+_CHUNK = 1 << 16  # bytes, which stay in the cache between inflating and copying
 _LONGEST_HEADER = 1 << 16
 _LEAD = {
     b"\1\0": "<H",

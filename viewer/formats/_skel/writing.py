@@ -9,21 +9,14 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
+from viewer.formats._skel.keywords import KEYWORDS, UNLIMITED
 from viewer.formats._text.numbers import LARGEST
 from viewer.media.saving import as_words, save_text
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["KEYWORDS", "UNLIMITED", "write"]
-
-UNLIMITED = 100_000.0
-"""CSE169's value for "no limit", which some files contain."""
-
-KEYWORDS = frozenset(
-    (b"offset", b"boxmin", b"boxmax", b"pose", b"rotxlimit", b"rotylimit", b"rotzlimit")
-) | {b"balljoint"}
-"""Words that begin an item of a joint, and cannot be part of a name."""
+__all__ = ["write"]
 
 _DEEPEST = 32  # maximum number of tabs at the beginning of a line
 

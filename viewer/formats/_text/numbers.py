@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from viewer.formats._text.decimal_words import parse_decimals, parse_exponentials, parse_short
 from viewer.formats._text.swar import Indices, Words, padded
+from viewer.media.array_cache import slot_of
 from viewer.progress import report_bytes
 from viewer.rig.arrays import Bools, Floats
 
@@ -95,7 +96,7 @@ def is_too_large(word: bytes) -> bool:
     return _NUMBER.fullmatch(word) is not None and to_number(word) is None
 
 
-def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
+def parse_numbers(data: bytes, start: int, end: int, is_kept: bool = True) -> tuple[Floats, int]:
     """Parse white-space-separated numbers.
 
     Parameters
@@ -104,6 +105,8 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
         The file.
     start, end : int
         The part of the data to parse.
+    is_kept : bool
+        Whether the numbers are kept in the user's cache, if all are valid.
 
     Returns
     -------
@@ -115,7 +118,14 @@ def parse_numbers(data: bytes, start: int, end: int) -> tuple[Floats, int]:
     >>> parse_numbers(b"1 -2.5  1e3", 0, 11)[0].tolist()
     [1.0, -2.5, 1000.0]
     """
-    return _parse(data, start, end, whole=False)
+    slot = slot_of("numbers-1", data, start, end) if is_kept else None
+    kept = None if slot is None else slot.load("<f8", 1)
+    if kept is not None:
+        return kept, -1
+    values, bad = _parse(data, start, end, whole=False)
+    if slot is not None and bad < 0:
+        slot.store(values)
+    return values, bad
 
 
 def parse_words(data: bytes, start: int, end: int) -> Floats:

@@ -6,7 +6,6 @@ below ``ERROR``, so that a result that is not within that distance of a tie is c
 
 from __future__ import annotations
 
-from fractions import Fraction
 from functools import cache
 
 import numpy as np
@@ -56,6 +55,8 @@ def times_power(
 @cache
 def _tables() -> tuple[Floats, Floats, Floats, Floats]:
     """Return the powers of ten: nearest float, its error, and its upper and lower half."""
+    from fractions import Fraction  # most files have no number that needs these tables
+
     exact = [Fraction(10) ** exponent for exponent in range(-FARTHEST, FARTHEST + 1)]
     power = np.array([float(value) for value in exact])
     low = [float(value - Fraction(near)) for value, near in zip(exact, power.tolist(), strict=True)]

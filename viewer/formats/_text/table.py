@@ -11,6 +11,7 @@ from viewer.diagnostics import Part, Phrase
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
+from viewer.media.array_cache import slot_of
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_numbers", "read_table"]
@@ -44,11 +45,27 @@ def read_table(
     FormatError
         If a row has more or fewer numbers, or a word is not a number; the error has the line.
     """
-    values, bad = parse_numbers(source.data, 0, len(source.data))
-    if bad < 0 and len(values) and _is_regular(source, columns, len(values)):
-        return values.reshape(-1, columns), lambda row: source.word_offset(0, row * columns)
+    rows = _regular_rows(source, columns)
+    if rows is not None:
+        return rows, lambda row: source.word_offset(0, row * columns)
     rows, offsets = _read_rows(source, columns, part)
     return rows, lambda row: int(offsets[row])
+
+
+def _regular_rows(source: Source, columns: int) -> Floats | None:
+    """Return the rows of a table without errors, (N, columns); None if it has any."""
+    data = source.data
+    slot = slot_of(f"table{columns}-1", data, 0, len(data))
+    kept = None if slot is None else slot.load("<f8", 2)
+    if kept is not None:
+        return kept
+    values, bad = parse_numbers(data, 0, len(data), is_kept=False)
+    if bad >= 0 or len(values) == 0 or not _is_regular(source, columns, len(values)):
+        return None
+    rows = values.reshape(-1, columns)
+    if slot is not None:
+        slot.store(rows)
+    return rows
 
 
 def read_numbers(source: Source) -> Floats:

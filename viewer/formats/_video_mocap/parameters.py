@@ -6,6 +6,7 @@
     places     trans, transl … ; cam_t … in the space of a camera, where y points down
     shape      betas, shape …
     frames     frame_ids, frames …
+    person     person_id, track_id, id …, in dicts of single frames
 
 Dicts may be nested: people by number, frames in a list, or parameters within another dict. AMASS
 and single poses in their own spellings are read by ``amass.py`` and ``pose.py``.
@@ -14,6 +15,7 @@ and single poses in their own spellings are read by ``amass.py`` and ``pose.py``
 from __future__ import annotations
 
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
@@ -33,7 +35,7 @@ from viewer.formats._video_mocap.numbers import (
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 
 __all__ = ["read", "recognises"]
@@ -60,7 +62,9 @@ _SHAPES = (
     *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
+_PEOPLE = ("person_id", "track_id", "tracklet_id", "person", "pid", "id")
 _NAMES = {len(names): names for names in members_by_numbers().values()}
+_LARGEST = 1 << 30  # numbers of frames and people
 _DEEPEST = 3  # dicts inside dicts
 _COST = 20  # frames; looking at a dict takes about as long as reading so many
 _LOOKED_AT = 5000  # dicts of which one must be recognised
@@ -75,10 +79,11 @@ class _Layout:
     place: str
     shape: str
     frames: str
+    person: str
 
     @property
     def keys(self) -> list[str]:
-        others = (self.place, self.shape, self.frames)
+        others = (self.place, self.shape, self.frames, self.person)
         return [key for key, _ in self.poses] + [key for key in others if key]
 
 
@@ -99,7 +104,7 @@ def read(source: Source, archive: Archive) -> Results:
     """Read all people."""
     found = [*_found(archive)]
     layout = found[0][2]
-    people = _people(found)
+    people = _people(source, found)
     is_camera = layout.place in _CAMERA
     space = "camera" if is_camera else "world"
     if not layout.place:
@@ -133,7 +138,11 @@ def _layout(archive: Archive) -> _Layout | None:
     place = _first(archive, (*_WORLD, *_CAMERA), lambda shape: _is_place(shape, count))
     shape = _first(archive, _SHAPES, lambda shape: _is_shape(shape, count))
     frames = _first(archive, _FRAMES, lambda shape: shape == (count,))
-    return _Layout(poses, place, shape, frames)
+    person = ""
+    if count == 1:
+        frames = frames or _first_number(archive, _FRAMES)
+        person = _first_number(archive, _PEOPLE)
+    return _Layout(poses, place, shape, frames, person)
 
 
 def _first_form(
@@ -148,6 +157,20 @@ def _first_form(
 
 def _first(archive: Archive, keys: tuple[str, ...], fits: Callable[[tuple[int, ...]], bool]) -> str:
     return next((key for key in keys if archive.has(key) and fits(shape_of(archive, key))), "")
+
+
+def _first_number(archive: Archive, keys: tuple[str, ...]) -> str:
+    return next((key for key in keys if _number(archive, key) is not None), "")
+
+
+def _number(archive: Archive, key: str) -> int | None:
+    """Return an integer, also as an array of one; None for other values."""
+    value = archive.get(key) if key and archive.has(key) else None
+    if isinstance(value, Deferred) and value.dtype.kind in "iu" and value.shape in ((), (1,)):
+        value = int(value.values().reshape(-1)[0])
+    if not isinstance(value, int) or isinstance(value, bool):
+        return None
+    return value if abs(value) < _LARGEST else None
 
 
 def _is_place(shape: tuple[int, ...], count: int) -> bool:
@@ -177,20 +200,46 @@ def _found(
             )
 
 
-def _people(found: list[tuple[tuple[str, ...], Archive, _Layout]]) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are the frames of one person.
+def _people(
+    source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]]
+) -> dict[int, Track]:
+    """Return the tracks of people: dicts of single frames are the frames of few people.
 
     Single frames with different joints or numbers of coefficients are different people.
     """
     tracks = [_track(archive, layout) for _, archive, layout in found]
     is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
     if is_alike and len(tracks) > 1 and all(len(track.frames) == 1 for track in tracks):
-        return {0: _joined(tracks)}
+        kept = [(archive, layout) for _, archive, layout in found]
+        return _people_of_frames(source, kept, tracks)
     people: dict[int, Track] = {}
     for index, ((path, _, _), track) in enumerate(zip(found, tracks, strict=True)):
         known = (person_number(part) for part in path)
         number = next((each for each in known if each is not None and each >= 0), index)
         people[number if number not in people else _unused(people, index)] = track
+    return people
+
+
+def _people_of_frames(
+    source: Source, found: list[tuple[Archive, _Layout]], tracks: list[Track]
+) -> dict[int, Track]:
+    """Return the people of single frames: by their numbers, else by how often a frame occurs."""
+    persons = [_number(archive, layout.person) for archive, layout in found]
+    known = [person for person in persons if person is not None and person >= 0]
+    if len(known) < len(tracks):
+        known = [0] * len(tracks)
+        if all(layout.frames for _, layout in found):
+            seen: Counter[int] = Counter()
+            for row, track in enumerate(tracks):
+                frame = int(track.frames[0])
+                known[row] = seen[frame]
+                seen[frame] += 1
+    listed: dict[int, list[Track]] = {person: [] for person in sorted(set(known))}
+    for track, person in zip(tracks, known, strict=True):
+        listed[person].append(track)
+    people = {person: _joined(own) for person, own in listed.items()}
+    if len(people) > 1 and not all(layout.person for _, layout in found):
+        source.warn("F007.video-repeated", n=len(people))
     return people
 
 
@@ -210,7 +259,10 @@ def _track(archive: Archive, layout: _Layout) -> Track:
         placed = places(archive, layout.place, count) if single is None else single
     frames = np.arange(count)
     first = frames
-    if layout.frames:
+    number = _number(archive, layout.frames) if count == 1 else None
+    if number is not None:
+        frames = np.array([number])
+    elif layout.frames:
         frames, first = np.unique(frames_of(archive, layout.frames, count), return_index=True)
     coefficients = _coefficients(archive, layout.shape)
     if coefficients is not None and len(coefficients) == count:

@@ -14,10 +14,11 @@ from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraMotion, CameraView
 from viewer.rig.captures.capture import Capture, CapturePart, RestRoots
+from viewer.rig.captures.capture_rate import capture_rate
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
-from viewer.rig.motion.timing import DEFAULT_RATE, Timing
+from viewer.rig.motion.timing import Timing
 
 __all__ = ["Cameras", "Options", "Results", "Track", "capture_of"]
 
@@ -155,13 +156,19 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     first, last = int(np.concatenate(frames).min()), int(np.concatenate(frames).max())
     if first < 0 or last - first >= _MOST_FRAMES or last >= 1 << 30:
         raise source.fault("F002.video-frames", most=_MOST_FRAMES, low=first, high=last)
-    rate = options.frame_rate or results.frame_rate or options.video_rate
-    if rate is None:
-        rate = DEFAULT_RATE
-        if last > first:
-            source.warn("F007.video-no-rate", rate=rate)
+    known = options.frame_rate, results.frame_rate, options.video_rate
+    rate = capture_rate(*known)
+    if not any(known) and last > first:
+        source.warn("F007.video-no-rate", rate=rate)
+    source.used_options |= {"space"} | ({"average-shape"} if _shapes_vary(results) else set())
     capture = _Capture(source, results, options, first, last - first + 1, rate)
     return capture.in_space(space)
+
+
+def _shapes_vary(results: Results) -> bool:
+    """Return whether anyone has a shape that changes over time."""
+    shapes = [track.shape for people in results.people.values() for track in people.values()]
+    return any(shape is not None and bool((shape != shape[:1]).any()) for shape in shapes)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -123,6 +124,15 @@ class ActorBuffers:
         while len(kept) < count:
             kept.append(InstanceBuffers(self.context, self.mesh(figure)))
         return kept
+
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """If the block fails, free the buffers that were created in it."""
+        with ExitStack() as stack:
+            # The last is left first: posed meshes are freed before the meshes that they use.
+            for kept in (self.meshes, self._instanced, self.posed, self.skeletons):
+                stack.enter_context(kept.guard())
+            yield
 
     def keep_only(self, actors: Sequence[Actor]) -> None:
         """Free the buffers of removed actors and of unused figures."""

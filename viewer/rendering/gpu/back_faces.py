@@ -17,10 +17,10 @@ from viewer.rendering.joint_spheres import box_spheres, skin_spheres
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell
-from viewer.rig.inspection.single_vertices import rest_vertices
 from viewer.rig.kinematics import posed_skeleton
-from viewer.rig.mesh import bounding_box
+from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.pose import Pose
+from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import Skinning, skinned
 
 __all__ = ["BackFaces", "Region"]
@@ -45,6 +45,7 @@ class BackFaces:
         self._mesh = mesh
         self._spheres: Floats | None = None
         self._borders: Floats = np.zeros((0, 3))
+        self._around: tuple[Mesh, Skin] | None = None
 
     def update(self, figure: Figure, pose: Pose | None, how: Skinning) -> None:
         """Adopt a pose.
@@ -68,7 +69,23 @@ class BackFaces:
             self._borders = positions[shell.borders]
         elif _has_one_side(figure, pose):
             self._spheres = skin_spheres(figure, pose)
-            self._borders = _posed_vertices(figure, pose, how, shell)
+            self._borders = self._posed_borders(figure, pose, how, shell)
+
+    def _posed_borders(self, figure: Figure, pose: Pose, how: Skinning, shell: Shell) -> Floats:
+        """Return the vertices around openings in a pose, figure space: (B, 3)."""
+        if not len(shell.borders):
+            return np.zeros((0, 3))
+        from viewer.rig.inspection.single_vertices import rest_vertices
+
+        skin = figure.require_skin()
+        palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
+        if self._around is None:
+            mesh = figure.require_mesh()
+            places, normals = mesh.positions[shell.borders], mesh.normals[shell.borders]
+            around = Mesh(places, normals, np.zeros((0, 3), dtype=np.int32))
+            self._around = around, skin_rows(skin, shell.borders)
+        rest = rest_vertices(figure, pose, shell.borders, how.correctives)
+        return skinned(*self._around, rest, palette, how)[0]
 
     def regions(
         self, model_view: Floats, projection: Floats, viewport: Region
@@ -120,12 +137,3 @@ def _has_one_side(figure: Figure, pose: Pose) -> bool:
     palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
     volumes = np.linalg.det(palette[:, :3, :3])
     return bool((volumes > 0.0).all() or (volumes < 0.0).all())
-
-
-def _posed_vertices(figure: Figure, pose: Pose, how: Skinning, shell: Shell) -> Floats:
-    if not len(shell.borders):
-        return np.zeros((0, 3))
-    mesh, skin = figure.require_mesh(), figure.require_skin()
-    palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
-    rest = rest_vertices(figure, pose, shell.borders, how.correctives)
-    return skinned(mesh, skin, rest, palette, how, shell.borders)[0]

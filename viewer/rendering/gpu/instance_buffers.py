@@ -25,6 +25,7 @@ from viewer.rendering.gpu.upload import (
     as_uniform,
     float32,
     matrix_texture,
+    reserved,
     rigid_texture,
     write_stacked,
 )
@@ -137,7 +138,7 @@ class InstanceBuffers:
         room = max(count, len(self._rows) * 3 // 2)
         self._release_textures()
         self._palette = matrix_texture(self.context, room * self._n_joints)
-        self._instances = self.context.buffer(reserve=4 * _FLOATS * room, dynamic=True)
+        self._instances = reserved(self.context, 4 * _FLOATS * room, "instances")
         more = room - len(self._rows)
         empty = np.zeros((more, self._n_joints, 5, 4), "f4")
         self._rows = np.concatenate([self._rows, empty[:, :, :3]])

@@ -66,6 +66,16 @@ class Kept(Generic[_Key, _Item]):
                 before(item)
             item.release()
 
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """If the block fails, free the items that were created in it."""
+        before = [of for of, _ in self._items.values()]
+        try:
+            yield
+        except BaseException:
+            self.keep_only(before)
+            raise
+
     def keep_only(
         self, those: Sequence[_Key], before: Callable[[_Item], object] | None = None
     ) -> None:

@@ -10,10 +10,11 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
+from viewer.errors import RenderError
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
-from viewer.rendering.gpu.upload import float32, pair_texture, write_pairs
+from viewer.rendering.gpu.upload import float32, pair_texture, reserved, write_pairs
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
@@ -99,10 +100,12 @@ class RestBuffers:
         shape = figure.require_mesh()
         if self._own is None:
             size = self.mesh.positions.size
-            self._own = (
-                self.context.buffer(reserve=size, dynamic=True),
-                self.context.buffer(reserve=size, dynamic=True),
-            )
+            positions = reserved(self.context, size, "a shaped mesh")
+            try:
+                self._own = positions, reserved(self.context, size, "a shaped mesh")
+            except RenderError:
+                positions.release()
+                raise
             self.positions, self.normals = self._own
             normals = True
         rest = float32(shape.positions - self.mesh.center)

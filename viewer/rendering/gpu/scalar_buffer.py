@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
-from viewer.rendering.gpu.upload import float32, ramp_texture
+from viewer.rendering.gpu.upload import float32, ramp_texture, reserved
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, pose_key
 from viewer.rig.scalars import compute, find_quantity, missing_part
@@ -87,7 +87,7 @@ class ScalarBuffer:
         else:
             self.numbers = compute(name, figure, pose, skinning)
         if self.values is None:
-            self.values = self.context.buffer(reserve=4 * self.mesh.n_vertices, dynamic=True)
+            self.values = reserved(self.context, 4 * self.mesh.n_vertices, "scalar values")
         self.values.write(float32(self.numbers[self.mesh.sources]))
         self.range = float(np.min(self.numbers)), float(np.max(self.numbers))
         self.span = typical_span(self.numbers) if quantity.robust else self.range

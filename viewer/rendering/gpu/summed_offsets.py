@@ -87,6 +87,7 @@ class SummedOffsets:
         if self._list is None or self._list.width * self._list.height < len(indices):
             if self._list is not None:
                 self._list.release()
+                self._list = None
             self._list = pair_texture(self.context, indices, weights)
         else:
             write_pairs(self._list, indices, weights)
@@ -105,6 +106,7 @@ class SummedOffsets:
         if self._summed is None or self._summed.width * self._summed.height < texels:
             if self._summed is not None:
                 self._summed.release()
+                self._summed = None
             self._summed = empty_offsets(self.context, texels)
         write_stacked(self._summed, self._sums[:count])
         self.n_summed = 1

@@ -14,6 +14,9 @@ from viewer.rig.arrays import Bytes
 __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 
 
+_OPAQUE = 0xFF000000  # smallest opaque pixel as a little-endian number
+
+
 def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
     """Raise for an image size that the driver cannot draw; ``what`` begins the message.
 
@@ -169,6 +172,8 @@ def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
 def straight(pixels: Bytes) -> Bytes:
     """Return colours with straight instead of premultiplied alpha: (H, W, 4), a copy."""
     pixels = pixels.copy()
+    if pixels.size and pixels.view("<u4").min() >= _OPAQUE:
+        return pixels
     alpha = pixels[..., 3]
     partial = (alpha > 0) & (alpha < 255)
     if partial.any():

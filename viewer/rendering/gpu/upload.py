@@ -25,6 +25,7 @@ __all__ = [
     "pair_texture",
     "picture_texture",
     "ramp_texture",
+    "reserved",
     "rigid_texture",
     "write_matrices",
     "write_pairs",
@@ -46,6 +47,12 @@ def buffer(context: moderngl.Context, values: Any, dtype: str) -> moderngl.Buffe
     """Return a vertex or index buffer; one byte long if it is empty."""
     data = np.ascontiguousarray(values, dtype=dtype).tobytes() or b"\0"
     return checked(context, context.buffer(data), f"a mesh buffer of {len(data) / 1e6:.1f} MB")
+
+
+def reserved(context: moderngl.Context, size: int, what: str) -> moderngl.Buffer:
+    """Return a buffer of ``size`` bytes that is written often; ``what`` names it in errors."""
+    made = context.buffer(reserve=max(size, 1), dynamic=True)
+    return checked(context, made, f"{what} of {size / 1e6:.1f} MB")
 
 
 def checked(context: moderngl.Context, item: _Item, what: str) -> _Item:

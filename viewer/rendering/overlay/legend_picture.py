@@ -9,17 +9,16 @@ import numpy as np
 from viewer.phrases import printable
 from viewer.rendering.overlay.legend import Legend
 from viewer.rendering.overlay.legend_columns import legend_columns
+from viewer.rendering.overlay.typeface import Typeface
 from viewer.rig.arrays import Bytes
 
 if TYPE_CHECKING:
-    from PIL import ImageDraw, ImageFont
-
-    Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
+    from PIL import ImageDraw
 
 __all__ = ["legend_pixels"]
 
 _SIZES = 9, 40  # height of letters, pixels: smallest and largest
-_LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 56.0
+_LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 46.0
 _SMALLER = 0.6  # factor to which the text height of many items may shrink
 _MOST = 0.9  # maximum fraction of the image's width and height
 # Fractions of the image's width for several columns. Figures are in the middle, so the text
@@ -65,15 +64,14 @@ class _Drawing:
     def __init__(
         self, legend: Legend, letters: int, size: tuple[int, int], fraction: float
     ) -> None:
-        from PIL import Image, ImageDraw, ImageFont
+        from PIL import Image, ImageDraw
 
         self.legend, self.letters, self.size = legend, letters, size
-        self.font: Font = ImageFont.load_default(letters)
+        self.font = Typeface(letters)
         self.gap = max(letters // 2, 3)
         self.line = round(1.35 * letters)
         self.new = Image.new
         self.draw_on = ImageDraw.Draw
-        self._ruler = ImageDraw.Draw(Image.new("L", (1, 1)))
         self.texts = [printable(entry.text, _LONGEST) for entry in legend.entries]
         self.bar_height = letters + self.gap + self.line if len(legend.colors) else 0
         rest = self.line * (2 if legend.note else 1) + self.bar_height + 2 * self.gap
@@ -98,7 +96,7 @@ class _Drawing:
         image = self.new("RGBA", whole, _PANEL)
         draw = self.draw_on(image)
         y = gap
-        draw.text((gap, y), legend.heading, _TEXT, self.font)
+        self.font.draw(draw, (gap, y), legend.heading, _TEXT)
         y += self.line
         if self.bar_height:
             self._draw_bar(draw, gap, y, width)
@@ -106,7 +104,7 @@ class _Drawing:
         self._draw_entries(draw, y)
         y += self.columns.rows * self.line
         if legend.note:
-            draw.text((gap, y), legend.note, _FAINT, self.font)
+            self.font.draw(draw, (gap, y), legend.note, _FAINT)
         return np.array(image)
 
     def _columns_width(self) -> int:
@@ -145,7 +143,7 @@ class _Drawing:
             x = first + round(tick.place * (length - 1))
             draw.line([(x, bottom), (x, bottom + self.gap // 2)], _TEXT)
             corner = (x - self._width(tick.text) / 2, bottom + self.gap // 2)
-            draw.text(corner, tick.text, _TEXT, self.font)
+            self.font.draw(draw, corner, tick.text, _TEXT)
 
     def _draw_entry(
         self,
@@ -159,7 +157,7 @@ class _Drawing:
         if color is not None:
             edge = top + 0.15 * side
             draw.rectangle([(left, edge), (left + side, edge + side)], color, _FAINT)
-        draw.text((left + 1.6 * side, top), text, _TEXT if color else _FAINT, self.font)
+        self.font.draw(draw, (left + 1.6 * side, top), text, _TEXT if color else _FAINT)
 
     def _width(self, text: str) -> int:
-        return int(np.ceil(self._ruler.textlength(text, self.font)))
+        return int(np.ceil(self.font.length(text)))

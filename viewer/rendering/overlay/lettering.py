@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.rendering.overlay.typeface import Typeface
 from viewer.rig.arrays import Bytes, Ints
 
 __all__ = ["Lettering", "shelves"]
@@ -26,10 +27,8 @@ class Lettering:
     """
 
     def __init__(self, letters: int) -> None:
-        from PIL import ImageFont
-
         self.letters = letters
-        self._font = ImageFont.load_default(letters)
+        self._font = Typeface(letters)
         self._widths: dict[str, int] = {}
         self._pixels: dict[str, Bytes] = {}
 
@@ -39,7 +38,7 @@ class Lettering:
             self._widths.clear()
         for text in texts:
             if text not in self._widths:
-                self._widths[text] = int(np.ceil(self._font.getlength(text))) + 2 * _RIM
+                self._widths[text] = int(np.ceil(self._font.length(text))) + 2 * _RIM
         widths = [min(self._widths[text], _WIDEST) for text in texts]
         heights = [self._height] * len(texts)
         return np.array([widths, heights], dtype=np.int32).reshape(2, -1).T
@@ -58,8 +57,8 @@ class Lettering:
             width, height = self.sizes([text])[0].tolist()
             rim, inside = Image.new("L", (width, height)), Image.new("L", (width, height))
             place = _RIM, _RIM
-            ImageDraw.Draw(rim).text(place, text, _DARK, self._font, stroke_width=_RIM)
-            ImageDraw.Draw(inside).text(place, text, 255, self._font)
+            self._font.draw(ImageDraw.Draw(rim), place, text, _DARK, _RIM)
+            self._font.draw(ImageDraw.Draw(inside), place, text, 255)
             white = np.array(inside)
             self._pixels[text] = np.dstack([white, np.maximum(white, np.array(rim))])
         return self._pixels[text]

@@ -1,4 +1,4 @@
-"""Pass that draws the background and the ground grid."""
+"""Pass that draws the ground grid."""
 
 from __future__ import annotations
 
@@ -7,19 +7,16 @@ import math
 import moderngl
 import numpy as np
 
-from viewer.errors import ViewerError
-from viewer.rendering.gpu.draw_state import without_depth_test, without_depth_writes
+from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.options import BACKGROUNDS
+from viewer.rendering.passes.background_pass import parse_color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import box_size
 
-__all__ = ["GroundPass", "grid_step", "parse_color"]
+__all__ = ["GroundPass", "grid_step"]
 
-_BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
-_NAMED = {"gradient": (_BOTTOM, _TOP), "white": ((1.0, 1.0, 1.0),) * 2}
 _LINE_COLOR = (0.20, 0.25, 0.32)
 _LINE_ON_DARK = (0.62, 0.67, 0.73)
 _EXTENT = 6.0  # half the side length of the grid, relative to the scene's size
@@ -37,27 +34,8 @@ def grid_step(box: Floats) -> float:
     return float(f"{step * power:.6g}")
 
 
-def parse_color(text: str) -> tuple[float, float, float]:
-    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
-
-    Raises
-    ------
-    ViewerError
-        If the text does not have this form.
-
-    >>> parse_color("#ff0000")
-    (1.0, 0.0, 0.0)
-    """
-    digits = text.removeprefix("#")
-    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
-        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
-        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
-    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
-    return red, green, blue
-
-
 class GroundPass:
-    """Draws the background and the ground grid.
+    """Draws the ground grid.
 
     Parameters
     ----------
@@ -71,19 +49,6 @@ class GroundPass:
         self.context, self.programs = context, programs
         self._corners = buffer(context, [[-1, -1], [1, -1], [-1, 1], [1, 1]], "f4")
         self._ground: moderngl.VertexArray | None = None
-        self._background: moderngl.VertexArray | None = None
-
-    def draw_background(self, background: str) -> None:
-        """Fill the image; "transparent" leaves it cleared."""
-        if background == "transparent":
-            return
-        program = self.programs.drawing("fullscreen", fragment="background")
-        bottom, top = _NAMED.get(background) or (parse_color(background),) * 2
-        program["u_bottom"], program["u_top"] = bottom, top
-        if self._background is None:
-            self._background = self.context.vertex_array(program, [])
-        with without_depth_test(self.context):
-            self._background.render(moderngl.TRIANGLES, vertices=3)
 
     def draw_grid(self, view: View, box: Floats, background: str) -> None:
         """Draw the grid under a box.
@@ -124,7 +89,7 @@ class GroundPass:
 
     def release(self) -> None:
         """Free vertex arrays and buffers."""
-        for item in (self._ground, self._background, self._corners):
+        for item in (self._ground, self._corners):
             if item is not None:
                 item.release()
 

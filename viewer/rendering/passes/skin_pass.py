@@ -84,9 +84,9 @@ class PosedMesh:
         self._n_joints = skin.n_joints if skin else 0
         with self._owner.guard():
             self._palette = self._owner.keep(matrix_texture(context, self._n_joints))
+            self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self._rigid: moderngl.Texture | None = None
         self.back_faces = BackFaces(mesh)
-        self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None

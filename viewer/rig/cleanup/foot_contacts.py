@@ -7,7 +7,7 @@ import numpy as np
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.frame_rows import runs_of
 
-__all__ = ["contacts"]
+__all__ = ["contacts", "mean_speeds"]
 
 # Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
 _LOW, _HIGH = 0.02, 0.035  # above the lowest positions: a contact begins, and ends
@@ -44,7 +44,7 @@ def contacts(positions: Floats, present: Bools, rate: float, size: float, up: in
     heights = positions[:, up] - np.quantile(positions[present, up], _LOWEST)
     flat = [axis for axis in range(3) if axis != up]
     for start, stop in runs_of(present):
-        speeds = _speeds(positions[start:stop][:, flat], rate)
+        speeds = mean_speeds(positions[start:stop][:, flat], rate)
         above = heights[start:stop]
         begins = (above < _LOW * size) & (speeds < _SLOW * size)
         lasts = (above < _HIGH * size) & (speeds < _FAST * size)
@@ -55,7 +55,7 @@ def contacts(positions: Floats, present: Bools, rate: float, size: float, up: in
     return result
 
 
-def _speeds(places: Floats, rate: float) -> Floats:
+def mean_speeds(places: Floats, rate: float) -> Floats:
     """Return speeds (N,) averaged over a window around each frame."""
     half = max(1, round(0.5 * _WINDOW * rate))
     frames = np.arange(len(places))

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rig.arrays import Bools
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.sampled_clip import SampledClip
 
-__all__ = ["Captured", "in_frame_order", "is_shared", "runs_of", "with_rows"]
+__all__ = ["Captured", "in_frame_order", "is_shared", "points_between", "runs_of", "with_rows"]
 
 Captured = SampledClip | PointClip
 """Clips of frames: of joints, or of points."""
@@ -67,6 +67,28 @@ def is_shared(clip: Captured, name: str) -> bool:
         return False
     rows = getattr(clip, name)
     return rows is not None and len(rows) == 1
+
+
+def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:
+    """Return points (T, K, 4), interpolated where they are visible on both sides.
+
+    Other points have the values of the row before; ``interpolate``: across gaps, where other points
+    are invisible.
+
+    Parameters
+    ----------
+    clip : PointClip
+        Points.
+    times : (T,)
+        Seconds.
+    interpolate : bool
+        See above.
+    """
+    before, after, fraction = clip.timing.locate(times, interpolate)
+    start, end = clip.points[before], clip.points[after]
+    mixed = start + fraction[:, None, None] * (end - start)
+    both = (start[..., 3:] > 0.0) & (end[..., 3:] > 0.0)
+    return np.where(both, mixed, 0.0 if interpolate else start)
 
 
 def in_frame_order(clip: Captured) -> Captured:

@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import Captured, is_shared, runs_of
+from viewer.rig.cleanup.frame_rows import Captured, is_shared, points_between, runs_of
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 
 __all__ = ["Gaps", "inner_gaps", "interpolate_gaps"]
@@ -69,7 +69,7 @@ def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captur
     rows[frames] = count + np.arange(len(frames), dtype=np.int32)
     whole = replace(timing, rows=rows)
     if isinstance(clip, PointClip):
-        points = np.concatenate([clip.points, _points(clip, times)])
+        points = np.concatenate([clip.points, points_between(clip, times, interpolate=True)])
         return replace(clip, timing=whole, points=points), Gaps(closed, left)
     return replace(_extended(clip, times), timing=whole), Gaps(closed, left)
 
@@ -94,11 +94,3 @@ def _extended(clip: SampledClip, times: Floats) -> SampledClip:
         longer("shape_weights"),
         longer("scales"),
     )
-
-
-def _points(clip: PointClip, times: Floats) -> Floats:
-    """Return points (T, K, 4): those visible on both sides of their gap, the others unseen."""
-    before, after, fraction = clip.timing.locate(times, interpolate=True)
-    start, end = clip.points[before], clip.points[after]
-    mixed = start + fraction[:, None, None] * (end - start)
-    return np.where((start[..., 3:] > 0.0) & (end[..., 3:] > 0.0), mixed, 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,16 @@ from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 
 __all__ = ["OneEuro"]
 
+_SETTLED = 1e-4  # remaining weight of the first value
+_LONGEST = 1000  # frames added at each end
+
 
 @dataclass(frozen=True, slots=True)
 class OneEuro:
     """One Euro filter, applied forwards and then backwards, so that the delays cancel.
 
-    They remain within about 1 / (2 pi f) seconds of both ends: a pass starts at its first value, so
-    values that are changing there are pulled inwards.
+    Before, the motion is continued beyond both ends by its point reflection there, until a pass has
+    settled: uniform motion is unchanged up to its ends, and the end values are kept.
 
     Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
     is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
@@ -40,13 +44,21 @@ class OneEuro:
 
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
         """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
-        once = self._turned(continuous(quaternions), rate)
-        return self._turned(once[::-1], rate)[::-1]
+        count = self._settling(rate)
+        longer, inner = _continued(continuous(quaternions), count, _opposite_rotations)
+        once = self._turned(longer, rate)
+        return self._turned(once[::-1], rate)[::-1][inner]
 
     def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
         """Return filtered positions (N, ..., 3); ``metres``: length of their unit."""
-        once = self._shifted(positions, rate, metres)
-        return self._shifted(once[::-1], rate, metres)[::-1]
+        longer, inner = _continued(positions, self._settling(rate), _opposite_positions)
+        once = self._shifted(longer, rate, metres)
+        return self._shifted(once[::-1], rate, metres)[::-1][inner]
+
+    def _settling(self, rate: float) -> int:
+        """Return after how many frames the initial value of a pass hardly matters."""
+        slowest = float(_factor(min(self.cutoff, self.speed_cutoff), rate))
+        return min(int(np.ceil(np.log(_SETTLED) / np.log1p(-slowest))), _LONGEST)
 
     def _turned(self, quaternions: Floats, rate: float) -> Floats:
         found = quaternions.copy()
@@ -72,6 +84,34 @@ class OneEuro:
         speed = speed + _factor(self.speed_cutoff, rate) * (measured - speed)
         size = np.linalg.norm(speed, axis=-1, keepdims=True)
         return speed, _factor(self.cutoff + self.beta * size, rate)
+
+
+def _continued(
+    values: Floats, count: int, opposite: Callable[[Floats, Floats], Floats]
+) -> tuple[Floats, slice]:
+    """Return frames (N, ...) continued beyond both ends, and where the original ones are.
+
+    ``count``: frames to add at each end.
+    ``opposite``: reflects values in a value.
+    """
+    total = len(values)
+    added = 0
+    while added < count and len(values) > 1:
+        step = min(count - added, len(values) - 1)
+        before = opposite(values[0], values[step:0:-1])
+        after = opposite(values[-1], values[-2 : -step - 2 : -1])
+        values = np.concatenate([before, values, after])
+        added += step
+    return values, slice(added, added + total)
+
+
+def _opposite_rotations(middle: Floats, quaternions: Floats) -> Floats:
+    """Return rotations by the opposite angle from the middle: b exp(-v) of b exp(v)."""
+    return moved(middle, -relative_vectors(middle, quaternions))
+
+
+def _opposite_positions(middle: Floats, positions: Floats) -> Floats:
+    return 2.0 * middle - positions
 
 
 def _factor(cutoff: Floats | float, rate: float) -> Floats:

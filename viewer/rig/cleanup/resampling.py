@@ -9,7 +9,7 @@ import numpy as np
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip
-from viewer.rig.cleanup.frame_rows import Captured, is_shared
+from viewer.rig.cleanup.frame_rows import Captured, is_shared, points_between
 from viewer.rig.motion.sampled_clip import SampledClip, sample_rows
 from viewer.rig.motion.timing import Timing
 
@@ -50,7 +50,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
     rows: Ints = np.where(present, np.cumsum(present) - 1, -1).astype(np.int32)
     again = replace(timing, frame_rate=rate, rows=rows, first_frame=0)
     if isinstance(clip, PointClip):
-        return replace(clip, timing=again, points=_points(clip, times[present]))
+        return replace(clip, timing=again, points=points_between(clip, times[present]))
     found = sample_rows(clip, times[present])
     return SampledClip(
         clip.name,
@@ -76,12 +76,3 @@ def _present(timing: Timing, times: Floats) -> Bools:
     after = np.clip(np.ceil(place).astype(int), 0, last)
     both: Bools = timing.present[before] & timing.present[after]
     return both
-
-
-def _points(clip: PointClip, times: Floats) -> Floats:
-    """Return points (T, K, 4), interpolated where they are visible on both sides."""
-    before, after, fraction = clip.timing.locate(times)
-    start, end = clip.points[before], clip.points[after]
-    mixed = start + fraction[:, None, None] * (end - start)
-    both = (start[..., 3:] > 0.0) & (end[..., 3:] > 0.0)
-    return np.where(both, mixed, start)

@@ -42,6 +42,11 @@ class SavitzkyGolay:
         half = max(round(0.5 * _SECONDS * rate), (self.order + 1) // 2)
         return 2 * half + 1
 
+    def used_frames(self, count: int, rate: float) -> int:
+        """Return the window used for a run of frames, 0 if it is too short to be filtered."""
+        window = min(self.frames(rate), count - 1 + count % 2)
+        return window if window > self.order else 0
+
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
         """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
         known = continuous(quaternions)
@@ -61,8 +66,8 @@ class SavitzkyGolay:
 
         ``at`` returns the values at one frame of each window, relative to the window's own frame.
         """
-        window = min(self.frames(rate), count - 1 + count % 2)
-        if window <= self.order:
+        window = self.used_frames(count, rate)
+        if not window:
             return None
         start = np.clip(np.arange(count) - window // 2, 0, count - window)
         weights = _smoothing_matrix(window, self.order)[np.arange(count) - start]

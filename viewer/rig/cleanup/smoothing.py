@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frame_rows import Captured, in_frame_order, runs_of
 
-__all__ = ["Filter", "smoothed"]
+__all__ = ["Filter", "run_lengths", "smoothed"]
 
 
 class Filter(Protocol):
@@ -64,6 +64,21 @@ def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
         translations=filtered(ordered.translations),
         figure_translations=None if place is None else place[:, 0],
     )
+
+
+def run_lengths(clip: Captured) -> list[int]:
+    """Return the lengths of the runs of frames that are filtered separately.
+
+    Parameters
+    ----------
+    clip : SampledClip or PointClip
+        Any clip; each of its points has runs of its own.
+    """
+    if not isinstance(clip, PointClip):
+        return [stop - start for start, stop in runs_of(clip.timing.present)]
+    rows = clip.timing.rows
+    seen = (clip.points[rows, :, 3] > 0.0) & (rows >= 0)[:, None]
+    return [stop - start for each in seen.T for start, stop in runs_of(each)]
 
 
 def _rows_of_runs(present: Bools) -> list[slice]:

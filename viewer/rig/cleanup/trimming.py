@@ -10,22 +10,29 @@ from viewer.rig.cleanup.frame_rows import Captured, with_rows
 __all__ = ["trimmed"]
 
 
-def trimmed(clip: Captured, first: int, stop: int) -> Captured:
+def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
     """Return some frames of a clip, which keep their times and numbers.
 
     Parameters
     ----------
     clip : SampledClip or PointClip
         Any clip.
-    first, stop : int
-        First frame and end frame (exclusive), counted from 0.
+    first, stop : int, optional
+        First frame and end frame (exclusive), by the numbers of the file; the clip's own ends if
+        omitted.
 
     Raises
     ------
     RigError
         If the range is empty or exceeds the clip.
     """
-    count = clip.timing.n_frames
-    if not 0 <= first < stop <= count:
-        raise RigError(f"frames: expected a range within 0 to {count}, found {first} to {stop}")
-    return with_rows(clip, np.arange(first, stop))
+    low = clip.timing.first_frame
+    high = low + clip.timing.n_frames
+    start, end = low if first is None else first, high if stop is None else stop
+    if not low <= start < end <= high:
+        asked = ":".join("" if number is None else str(number) for number in (first, stop))
+        raise RigError(
+            f"frames to keep: expected a range within {low}:{high} (frames {low} to {high - 1}), "
+            f"found {asked}"
+        )
+    return with_rows(clip, np.arange(start - low, end - low))

@@ -67,7 +67,8 @@ def quaternion_to_matrix(quaternions: Floats) -> Floats:
     >>> bool(np.allclose(rotated, [0, 1, 0]))
     True
     """
-    x, y, z, w = np.moveaxis(np.asarray(quaternions, dtype=np.float64), -1, 0)
+    quaternions = np.asarray(quaternions, dtype=np.float64)
+    x, y, z, w = (quaternions[..., number] for number in range(4))
     scale = 2.0 / (x * x + y * y + z * z + w * w)
     matrices = np.empty((*x.shape, 3, 3))
     matrices[..., 0, 0] = 1.0 - scale * (y * y + z * z)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from viewer.rig.shape import rest_joints
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, owners
 
-__all__ = ["Soles", "extent", "soles_of"]
+__all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
 
 _STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
 _TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot while walking and on tiptoe
@@ -62,12 +63,15 @@ class Soles:
         (F, N)
             Heights along the scene's up axis.
         """
-        rows = np.einsum("a,fpab->fpb", axis[:3], world[:, self.movers, :3])
-        heights = np.einsum("fpb,pb->fp", rows[..., :3], self.places) + rows[..., 3] + axis[3]
-        heights -= scale * self.above
-        result = np.empty((len(world), len(self.joints)))
-        for foot in range(len(self.joints)):
-            result[:, foot] = heights[:, self.feet == foot].min(axis=1)
+        points = np.append(self.places, np.ones((len(self.places), 1)), axis=1)
+        result = np.full((len(world), len(self.joints)), np.inf)
+        for mover in set(self.movers.tolist()):
+            row = np.einsum("a,fab->fb", axis[:3], world[:, mover, :3])
+            for foot in range(len(self.joints)):
+                own = (self.movers == mover) & (self.feet == foot)
+                if own.any():
+                    heights = row @ points[own].T + (axis[3] - scale * self.above[own])
+                    result[:, foot] = np.minimum(result[:, foot], heights.min(axis=1))
         return result
 
 
@@ -103,8 +107,22 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     for side in ("left", "right"):
         found = [names.index(name) for name in (f"{side}_foot", f"{side}_ankle") if name in names]
         feet.append(found)
-    if not all(feet):
-        return None
+    return soles_of_feet(figure, feet, is_bound) if all(feet) else None
+
+
+def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool) -> Soles:
+    """Return the soles of given feet of a figure with a skeleton.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure in the shape in which it is animated.
+    feet : sequence of sequence of int
+        For each foot, the joint nearest to the ground, and further joints that belong to it.
+    is_bound : bool
+        Whether its bindings are valid; otherwise joints are used instead of the mesh.
+    """
+    skeleton = figure.require_skeleton()
     sole, _ = extent(figure)
     parts = []
     for number, found in enumerate(feet):
@@ -121,10 +139,10 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
     return Soles(nearest, every.astype(np.int32), movers.astype(np.int32), places, above)
 
 
-def _whole_foot(skeleton: Skeleton, found: list[int]) -> Bools:
+def _whole_foot(skeleton: Skeleton, found: Sequence[int]) -> Bools:
     """Return the joints of a foot: the ankle, or the ball, and all joints below it. (J,)."""
     result = np.zeros(skeleton.n_joints, dtype=np.bool_)
-    result[found] = True
+    result[list(found)] = True
     for joint, parent in enumerate(skeleton.parents.tolist()):
         result[joint] |= parent >= 0 and bool(result[parent])
     return result

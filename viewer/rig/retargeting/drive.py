@@ -26,6 +26,10 @@ class Drive:
         The requested match of joints; None for the automatic one.
     keeps_up : bool
         Whether the result keeps the up axis of the motion's world instead of the figure's.
+    plants_feet : bool
+        Whether feet are kept where those of the source stand.
+    hangs : bool
+        Whether the up axis of the motion points down.
     finish : callable or None
         Changes the resulting clip further, as clean-up does.
     """
@@ -34,4 +38,6 @@ class Drive:
     source_rest: int | str = "zero"
     joint_map: JointMap | None = None
     keeps_up: bool = False
+    plants_feet: bool = True
+    hangs: bool = False
     finish: Callable[[SampledClip], SampledClip] | None = None

@@ -13,9 +13,11 @@ from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.feet_notes import feet_notes
 from viewer.rig.retargeting.joint_map import JointMap, joint_map_of
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
-from viewer.rig.retargeting.retarget import retarget
+from viewer.rig.retargeting.planted_feet import plant_feet
+from viewer.rig.retargeting.retarget import retargeted
 
 __all__ = ["driven_clip", "full_map", "matches_of"]
 
@@ -44,13 +46,17 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     RigError
         As ``retarget`` does.
     """
-    found, notes = retarget(drive.motion, figure, drive.joint_map, drive.source_rest)
+    found = retargeted(drive.motion, figure, drive.joint_map, drive.source_rest)
+    clip, notes = found.clip, found.notes
+    if drive.plants_feet:
+        clip, changes = plant_feet(found, figure, drive.hangs)
+        notes = notes + feet_notes(changes, found, figure)
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
-        return found, notes
+        return clip, notes
     # The retargeted figure stands along its own up axis: it is rotated back to that of the world.
     rotation = _Z_TO_Y if figure.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
-    return _rotated(found, figure, rotation), notes
+    return _rotated(clip, figure, rotation), notes
 
 
 def matches_of(drive: Drive, figure: Figure) -> Matches:

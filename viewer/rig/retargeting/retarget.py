@@ -14,11 +14,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
-from viewer.diagnostics import Diagnostic, Phrase
+from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -31,6 +30,7 @@ from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
+from viewer.rig.retargeting.path_scale import path_scale
 from viewer.rig.retargeting.rest_poses import (
     RestPose,
     alignment,
@@ -41,15 +41,9 @@ from viewer.rig.retargeting.rest_poses import (
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
 from viewer.rig.skeleton import Skeleton, joint_label
 
-__all__ = ["retarget", "scaled_motion"]
+__all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
 
-_ROUNDING = 1e-9  # a ratio this close to 1 counts as 1
 _STILL = 1e-6  # fraction of the skeleton's size; position channels with less motion are ignored
-_LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
-_ARMS = (
-    ("left_shoulder", "left_elbow", "left_wrist"),
-    ("right_shoulder", "right_elbow", "right_wrist"),
-)
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
@@ -87,6 +81,34 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
             figure_translations=None if place is None else place * factor,
         ),
     )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Retargeted:
+    """Result of a retargeting, and how the two skeletons relate.
+
+    Attributes
+    ----------
+    clip : SampledClip
+        Motion of the figure.
+    notes : list of Diagnostic
+        Messages, as of ``retarget``.
+    source : SkeletonMotion
+        The motion, with the rest pose that was used.
+    matches : Matches
+        Joints of the source for those of the figure.
+    to_target : (3, 3)
+        Rotation from the source's axes to the figure's.
+    scale : float
+        Scale of the path.
+    """
+
+    clip: SampledClip
+    notes: list[Diagnostic]
+    source: SkeletonMotion
+    matches: Matches
+    to_target: Floats
+    scale: float
 
 
 def retarget(
@@ -129,6 +151,17 @@ def retarget(
     RigError
         If too few joints match, the mapping names a missing joint, or a frame is missing.
     """
+    found = retargeted(motion, figure, mapping, source_rest)
+    return found.clip, found.notes
+
+
+def retargeted(
+    motion: SkeletonMotion,
+    figure: Figure,
+    mapping: Mapping[str, str] | JointMap | None = None,
+    source_rest: SourceRest = "zero",
+) -> Retargeted:
+    """Return the result of ``retarget``, with the match of the two skeletons."""
     source, target = motion.figure.skeleton, figure.skeleton
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
@@ -141,7 +174,7 @@ def retarget(
         job = _job(motion, motion.figure.skeleton or source, (target, figure.up), matches)
     worlds = _source_rotations(job)
     rotations = _target_rotations(job, worlds)
-    scale, by = _scale(job)
+    scale, by = path_scale(*job.rests, job.matches)
     shifts, notes = _shifts(job, worlds, rotations, scale)
     roots = np.flatnonzero(target.parents < 0)
     place: Floats | None = None
@@ -157,7 +190,8 @@ def retarget(
         shape_weights=weights,
     )
     scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
-    return clip, [*matches.notes, *rested, scaled, *notes, *missing]
+    notes = [*matches.notes, *rested, scaled, *notes, *missing]
+    return Retargeted(clip, notes, motion, matches, job.to_target, scale)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,44 +251,6 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
     signs = np.einsum("nja,nja->nj", local[1:], local[:-1]) < 0.0
     local[1:][np.logical_xor.accumulate(signs, axis=0)] *= -1.0
     return local
-
-
-def _scale(job: _Job) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and what was compared."""
-    partners, names = job.matches.partners, job.matches.names
-    source, target = job.rests
-    place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}
-
-    def length(pairs: list[tuple[int, int]]) -> tuple[float, float]:
-        ends = np.array(pairs, dtype=np.int32).reshape(-1, 2).T
-        mine = target.points[ends[1]] - target.points[ends[0]]
-        theirs = source.points[partners[ends[1]]] - source.points[partners[ends[0]]]
-        return float(np.linalg.norm(mine, axis=1).sum()), float(
-            np.linalg.norm(theirs, axis=1).sum()
-        )
-
-    matched = np.flatnonzero(partners >= 0)
-    bones = [(int(matched[0]), int(joint)) for joint in matched[1:]]
-    choices = [
-        ("ratio-of-legs", _pairs(_LEGS, place)),
-        ("ratio-of-arms", _pairs(_ARMS, place)),
-        ("ratio-of-bones", bones),
-    ]
-    for what, pairs in choices:
-        mine, theirs = length(pairs)
-        if mine > 0.0 and theirs > 0.0:
-            ratio = mine / theirs
-            return (1.0 if abs(ratio - 1.0) < _ROUNDING else ratio), Phrase(what)
-    return 1.0, Phrase("ratio-of-nothing")
-
-
-def _pairs(limbs: tuple[tuple[str, ...], ...], place: dict[str, int]) -> list[tuple[int, int]]:
-    return [
-        (place[start], place[end])
-        for limb in limbs
-        for start, end in pairwise(limb)
-        if start in place and end in place
-    ]
 
 
 def _shifts(

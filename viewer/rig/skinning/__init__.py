@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import import_module
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import rest_positions, shaped
-from viewer.rig.skin import Skin, limit_influences, normalized, skin_rows
+
+if TYPE_CHECKING:
+    from viewer.rig.skin import Skin
 
 __all__ = [
     "METHODS",
@@ -188,6 +191,8 @@ def skinned(
     positions, normals : (N, 3)
         Figure units, before the figure's own scale and translation; unit length.
     """
+    from viewer.rig.skin import skin_rows
+
     used, normals = skin_used(skin, skinning), mesh.normals
     if vertices is not None:
         used, normals = skin_rows(used, vertices), normals[vertices]
@@ -263,6 +268,8 @@ _varied: Memo[Skin, Skin] = Memo(kept=4)
 
 def skin_used(skin: Skin, skinning: Skinning) -> Skin:
     """Return the effective influences: as stored, or pruned and normalised as requested."""
+    from viewer.rig.skin import limit_influences, normalized
+
     count, normalize = skinning.max_influences, skinning.normalize
     if not count and not normalize:
         return skin

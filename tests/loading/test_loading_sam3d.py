@@ -1,12 +1,14 @@
 """Results of SAM 3D Body with the Momentum Human Rig: the figure lies on the file's vertices."""
 
 import numpy as np
-from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, NAMES, forward, write
+from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, N_JOINTS, NAMES, forward, write
 from formats.video_mocap.tool_files import wham_file
+from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
 from viewer.loading import MotionSettings, load
 from viewer.models import family_model, save_model_folder
+from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.skinning import deform
 
 DOWN = np.array([1.0, -1.0, -1.0])  # the files' y points down, and z away from the camera
@@ -75,3 +77,23 @@ def test_points_are_shown_without_the_model(tmp_path):
     np.savez(tmp_path / "img.npz", **arrays)
     (actor,) = load(tmp_path / "img.npz").actors
     assert actor.figure.points is not None
+
+
+def test_parameters_drive_another_figure_by_way_of_the_model_in_the_folder(tmp_path):
+    hero = tmp_path / "hero.vrm"
+    hero.write_bytes(swinging(turn=False).glb())
+    skeleton = load(hero).actors[0].figure.skeleton
+    pairs = [(skeleton.names[skeleton.humanoid.joints["leftLowerArm"]], "joint_3")]
+    settings = MotionSettings(find_model=family_model, model=hero, joint_map=JointMap(tuple(pairs)))
+    (actor,) = (scene := load(files(tmp_path), motion=settings)).actors
+    assert actor.figure.name == "hero" and actor.drive.motion.figure.skeleton.n_joints == N_JOINTS
+    keys = [note.key for note in scene.diagnostics]
+    assert "F007.own-carrier" in keys and "F007.model-of-parameters" not in keys
+
+
+def test_a_figure_that_parameters_cannot_drive_is_reported(tmp_path):
+    hero = tmp_path / "hero.vrm"
+    hero.write_bytes(swinging(turn=False).glb())
+    scene = load(files(tmp_path), motion=MotionSettings(model=hero))
+    assert [actor.figure.points is not None for actor in scene.actors] == [True]
+    assert "F007.model-of-parameters" in [note.key for note in scene.diagnostics]

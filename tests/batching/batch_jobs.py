@@ -1,0 +1,55 @@
+"""Jobs that worker processes import, and that misbehave as their item's name says."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+from pathlib import Path
+
+from viewer.batching.items import Item
+from viewer.errors import ViewerError
+
+
+def misbehave(item: Item) -> dict[str, int]:
+    """Return the process; crash, hang, allocate 1 GB or raise where the item says so."""
+    if item.name == "crash.txt":
+        os._exit(3)
+    if item.name == "term.txt":
+        os.kill(os.getpid(), signal.SIGTERM)  # as batch systems do at the end of a job's time
+    if item.name in ("hang.txt", "term.txt"):
+        time.sleep(100)
+    if item.name == "hog.txt":
+        data = bytearray(1 << 30)
+        data[:: 1 << 12] = b"1" * (1 << 18)
+    if item.name == "raise.txt":
+        raise KeyError("left knee")
+    if item.files:
+        add_numbers(item)
+    return {"process": os.getpid()}
+
+
+def add_numbers(item: Item) -> None:
+    """Write the sum of the numbers in a file."""
+    words = Path(item.files[0]).read_text().split()
+    try:
+        text = f"{sum(map(int, words))}"
+    except ValueError:
+        raise ViewerError(f"{item.files[0]}:1: expected numbers") from None
+    if item.output:
+        Path(item.output).parent.mkdir(exist_ok=True)
+        Path(item.output).write_text(text)
+
+
+def items_called(*names: str) -> list[Item]:
+    """Return items without files."""
+    return [Item(index, (), "", name) for index, name in enumerate(names)]
+
+
+def write_numbers(folder: Path, count: int) -> list[str]:
+    """Write small files, one in 20 of them broken; return the names of the broken ones."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for index in range(count):
+        text = "1 zero" if index % 20 == 7 else f"1 {index}"
+        (folder / f"pose{index}.txt").write_text(text)
+    return [f"pose{index}.txt" for index in range(7, count, 20)]

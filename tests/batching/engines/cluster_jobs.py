@@ -1,0 +1,50 @@
+"""Jobs that workers of test clusters run."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from viewer.batching.items import Item, Result
+from viewer.batching.worker import worker_rank
+
+
+@dataclass
+class Job:
+    """Append a line to the item's file; some names crash, hang or fail."""
+
+    uses_gpu: bool = False
+    seconds: float = 0.0
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item."""
+        if item.output:
+            with Path(item.output).open("a") as file:
+                file.write(f"{os.getpid()}\n")
+        if item.name == "crash":
+            os._exit(3)
+        if item.name == "hang":
+            time.sleep(60)
+        if item.name == "raise":
+            raise ZeroDivisionError("in the job")
+        time.sleep(self.seconds)
+        return Result(item, "done", text=str(worker_rank()))
+
+
+class Missing:
+    """A job that can be pickled, but not unpickled: the worker lacks a module."""
+
+    def __reduce__(self):
+        return fail, ()
+
+
+def fail() -> None:
+    raise ModuleNotFoundError("No module named 'viewer.batching'", name="viewer.batching")
+
+
+def items(count: int, **names: int) -> list[Item]:
+    """Return items, some with names by their index."""
+    by_index = {index: name for name, index in names.items()}
+    return [Item(n, (), "", by_index.get(n, f"{n}.x")) for n in range(count)]

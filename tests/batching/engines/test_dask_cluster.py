@@ -1,0 +1,137 @@
+"""Batches on Dask workers: real schedulers, real processes, some of which die."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections import Counter
+from dataclasses import replace
+
+import pytest
+
+from tests.batching.engines.cluster_jobs import Job, Missing, items
+from viewer.batching.engines import Limits
+from viewer.errors import ViewerError
+from viewer.version import VERSION
+
+pytest.importorskip("distributed")
+from viewer.batching.engines import dask_cluster
+
+pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
+
+
+@pytest.fixture(scope="module")
+def address():
+    """Start a scheduler with two worker processes, of which the second declares a GPU."""
+    from distributed import Nanny, Scheduler, SpecCluster
+
+    common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None}
+    workers = {
+        0: {"cls": Nanny, "options": common},
+        1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
+    }
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
+    scheduler = {"cls": Scheduler, "options": options}
+    with SpecCluster(workers, scheduler, silence_logs=50) as cluster:
+        yield cluster.scheduler_address
+
+
+def finished(job, some, limits, on_result=lambda result: None):
+    """Run items; check that nothing is lost or double; return results by index."""
+    results = []
+    for result in dask_cluster.run(some, job, limits):
+        results.append(result)
+        on_result(result)
+    counts = Counter(result.item.index for result in results)
+    assert counts == Counter(item.index for item in some)
+    return {result.item.index: result for result in results}
+
+
+def test_cluster_of_this_machine_reports_crashes_hangs_and_defects() -> None:
+    some = items(40, crash=5, hang=11, **{"raise": 20})
+    found = finished(Job(), some, Limits(2, retries=0, timeout=0.5, cluster="local"))
+    assert {n: one.status for n, one in found.items() if one.status != "done"} == {
+        5: "crashed",
+        11: "timeout",
+        20: "failed",
+    }
+    assert found[11].message == "no result after 0.5 s"
+    assert found[20].message == "ZeroDivisionError: in the job"
+    assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
+
+
+def test_items_of_a_killed_worker_run_elsewhere(address, tmp_path) -> None:
+    some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
+    first = []
+
+    def kill(result):
+        if not first and result.item.index > 10:
+            first.append(int((tmp_path / str(result.item.index)).read_text()))
+            os.kill(first[0], signal.SIGKILL)
+
+    found = finished(Job(seconds=0.02), some, Limits(2, cluster=address), kill)
+    assert {one.status for one in found.values()} == {"done"} and first
+    runs = [len(path.read_text().split()) for path in tmp_path.iterdir()]
+    assert len(runs) == 60
+    # Only what the killed worker had, at most, was run again.
+    assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
+
+
+def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
+    from distributed import Client
+
+    some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
+    finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
+    assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
+    with Client(address) as client:  # an earlier test may have killed one of them
+        client.wait_for_workers(2, timeout=60)
+    finished(Job(seconds=0.05), some, Limits(2, cluster=address))
+    assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
+
+
+def test_shards_together_are_the_whole(address) -> None:
+    whole = items(30)
+    parts = [finished(Job(), whole[shard::3], Limits(cluster=address)) for shard in range(3)]
+    assert sorted(n for part in parts for n in part) == list(range(30))
+
+
+def test_stopping_finishes_what_runs_and_starts_no_more(address) -> None:
+    results = []
+    stopping = Limits(2, cluster=address, is_stopping=lambda: len(results) >= 3)
+    for result in dask_cluster.run(iter(items(1000)), Job(seconds=0.02), stopping):
+        results.append(result)
+    assert 3 <= len(results) <= 3 + 2 * dask_cluster._PER_WORKER
+    assert {one.status for one in results} == {"done"}
+
+
+def test_workers_without_the_package_or_of_another_version(address, monkeypatch) -> None:
+    def refusal(job):
+        with pytest.raises(ViewerError) as caught:
+            list(dask_cluster.run(items(5), job, Limits(cluster=address)))
+        return str(caught.value)
+
+    assert f"a worker has no viewer {VERSION} (No module named 'viewer.batching')" in refusal(
+        Missing()
+    )
+    monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
+    assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
+
+
+def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
+    from distributed import Scheduler, SpecCluster
+
+    monkeypatch.setattr(dask_cluster, "_ALONE", 0.1)
+    monkeypatch.setattr(dask_cluster, "_COUNT_EVERY", 0.1)
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
+    with SpecCluster({}, {"cls": Scheduler, "options": options}, silence_logs=50) as cluster:
+        limits = Limits(cluster=cluster.scheduler_address)
+        with pytest.raises(ViewerError, match=r"has had no workers for 0\.1 s; start some with: "):
+            list(dask_cluster.run(items(3), Job(), limits))
+
+
+def test_address_without_a_scheduler(monkeypatch) -> None:
+    from viewer.batching.engines import _clusters
+
+    monkeypatch.setattr(_clusters, "_CONNECT", 0.3)
+    with pytest.raises(ViewerError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1 "):
+        next(dask_cluster.run(items(1), Job(), Limits(cluster="tcp://127.0.0.1:1")))

@@ -1,0 +1,107 @@
+"""Inputs of a batch: what is found, in which order, and what is refused."""
+
+from __future__ import annotations
+
+import io
+import sys
+
+import pytest
+
+from viewer.batching.inputs import find_inputs, natural_key
+from viewer.errors import ViewerError
+
+
+@pytest.fixture
+def data(tmp_path, monkeypatch):
+    """Return a folder with motions, a note, a hidden file and a recording."""
+    for name in ("b/walk10.npz", "b/walk9.npz", "a.bvh", "b/notes.txt", ".old/x.bvh", "b/.x.bvh"):
+        (tmp_path / "data" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "data" / name).touch()
+    (tmp_path / "data" / "take" / "smpl").mkdir(parents=True)
+    (tmp_path / "data" / "take" / "smpl" / "000000.json").touch()
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "data"
+
+
+def test_folder_is_searched_in_natural_order(data):
+    found = find_inputs(["data"])
+    assert found.paths == ("data/a.bvh", "data/b/walk9.npz", "data/b/walk10.npz", "data/take")
+    assert found.folders == {"data/take"}  # a recording is one input
+    assert found.base == str(data)
+    assert len(found.notes) == 1 and found.notes[0].startswith("1 file ")
+
+
+def test_pattern_finds_files_in_all_folders(data):
+    assert find_inputs(["data/**/*.npz"]).paths == ("data/b/walk9.npz", "data/b/walk10.npz")
+    assert find_inputs(["data/*"]).paths == ("data/a.bvh", "data/take")
+    assert find_inputs(["data/*"], keeps_folders=True).paths == (
+        *("data/a.bvh", "data/b", "data/take"),
+    )
+
+
+def test_structure_does_not_depend_on_what_a_pattern_matches(data):
+    assert find_inputs(["data/**/*9.npz"]).base == str(data)
+    assert find_inputs(["data/b/walk9.npz"]).base == str(data / "b")
+    assert find_inputs(["data/b/walk9.npz", "data/a.bvh"]).base == str(data)
+
+
+def test_lists_are_read_from_files_and_standard_input(data, monkeypatch):
+    (data / "list").write_bytes(b"data/a.bvh\r\n\ndata/b/walk9.npz\n")
+    zeros = io.TextIOWrapper(io.BytesIO(b"data/b/walk10.npz\0data/a.bvh\0"))
+    monkeypatch.setattr(sys, "stdin", zeros)
+    assert find_inputs(["@data/list"]).paths == ("data/a.bvh", "data/b/walk9.npz")
+    assert find_inputs([], ["data/list"]).paths == ("data/a.bvh", "data/b/walk9.npz")
+    assert find_inputs(["-"]).paths == ("data/a.bvh", "data/b/walk10.npz")
+
+
+def test_duplicates_are_used_once_and_counted(data):
+    (data / "b" / "loop").symlink_to(data)
+    found = find_inputs(["data/a.bvh", "./data/a.bvh", "data/b/walk*.npz", "data/**/*.npz"])
+    assert found.paths == ("data/a.bvh", "data/b/walk9.npz", "data/b/walk10.npz")
+    assert len(found.notes) == 1
+    assert find_inputs(["data"]).paths[0] == "data/a.bvh"  # ends, despite the loop
+
+
+def test_outputs_of_an_earlier_run_are_no_inputs(data):
+    (data / "out" / "b").mkdir(parents=True)
+    (data / "out" / "b" / "walk9.bvh").touch()
+    for words in (["data"], ["data/**/*.bvh"]):
+        found = find_inputs(words, output="data/out")
+        assert "data/out/b/walk9.bvh" not in found.paths and "data/a.bvh" in found.paths
+        assert any("1 file in the folder of the outputs" in note for note in found.notes)
+    assert find_inputs(["data/out"], output="data/out").paths == ("data/out/b/walk9.bvh",)
+    assert "data/out/b/walk9.bvh" in find_inputs(["data"], output="data/ou").paths
+
+
+def test_names_that_exist_are_no_patterns(data):
+    (data / "walk[1].bvh").touch()
+    (data / "@x").touch()
+    assert find_inputs(["data/walk[1].bvh"]).paths == ("data/walk[1].bvh",)
+    assert find_inputs(["data/@x"]).paths == ("data/@x",)
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        ([], "found none"),
+        (["data/c.bvh"], "data/c.bvh: no such"),
+        (["data/*.fbx"], "data/*.fbx: no file matches"),
+        (["@data/list"], "data/list: No such file"),
+        (["@data/a.bvh"], "data/a.bvh: expected one path per line"),
+        (["data/take/smpl", "data/b/*.fbx"], "no file matches"),
+    ],
+)
+def test_missing_inputs_are_refused(data, words, part):
+    with pytest.raises(ViewerError, match=part.replace("*", r"\*")):
+        find_inputs(words)
+
+
+def test_folder_without_known_files_is_refused(data):
+    (data / "empty").mkdir()
+    with pytest.raises(ViewerError, match="empty: no file"):
+        find_inputs(["data/empty"])
+
+
+def test_numbers_sort_by_value_within_each_folder():
+    names = ["x/10", "x/9a", "X/9", "x-y/1", "x/9/2"]
+    assert sorted(names, key=natural_key) == ["X/9", "x/9/2", "x/9a", "x/10", "x-y/1"]

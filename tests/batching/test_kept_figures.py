@@ -1,0 +1,67 @@
+"""Figures kept between the runs of one process."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from app.tiny import SKEL
+
+from viewer.formats import Source, read
+from viewer.formats._kept import keeping_figures
+
+
+@pytest.fixture
+def skel(tmp_path) -> Path:
+    """Return a skeleton whose reader warns about it: its last brace is missing."""
+    path = tmp_path / "tiny.skel"
+    path.write_text(SKEL.rstrip().removesuffix("}"))
+    return path
+
+
+def opened(path: Path):
+    source = Source.open(path)
+    return read(source), [found.key for found in source.diagnostics]
+
+
+def test_figure_is_read_once_and_its_warnings_are_repeated(skel):
+    with keeping_figures([skel]):
+        first, warnings = opened(skel)
+    assert warnings
+    with keeping_figures([skel.parent / "." / skel.name]):
+        again, repeated = opened(skel)
+    assert again is first and repeated == warnings
+
+
+def test_changed_file_is_read_again(skel):
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+        skel.write_text(SKEL.replace("arm", "leg"))
+        second, warnings = opened(skel)
+        assert second.skeleton.names[-1] == "leg" and not warnings
+        # Neither the size nor the name tells.
+        skel.write_text(SKEL)
+        os.utime(skel, ns=(1, 1))
+        assert opened(skel)[0].skeleton.names == first.skeleton.names
+
+
+def test_only_wanted_files_are_kept_and_only_as_long_as_they_are(skel, tmp_path):
+    first, _ = opened(skel)
+    assert opened(skel)[0] is not first
+    with keeping_figures([tmp_path / "other"]):
+        assert opened(skel)[0] is not opened(skel)[0]
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+    with keeping_figures([]):
+        pass
+    with keeping_figures([skel]):
+        assert opened(skel)[0] is not first
+
+
+def test_options_of_the_reader_count(skel):
+    with keeping_figures([skel]):
+        first, _ = opened(skel)
+        source = Source.open(skel)
+        source.options = {"rig": "mixamo"}
+        assert read(source) is not first

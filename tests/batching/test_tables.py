@@ -1,0 +1,82 @@
+"""Tables of a batch: numbers, order, and text that a spreadsheet must not run."""
+
+from __future__ import annotations
+
+import csv
+import math
+
+from viewer.batching.items import Item, Result
+from viewer.batching.tables import save_table
+
+
+def measure(name, maximum, mean, relative, item, step):
+    return {"name": name, "maximum": maximum, "mean": mean, "relative": relative, "item": item,
+            "step": step}  # fmt: skip
+
+
+def compared(*measures, within=True, mismatches=(), **others):
+    actor = {"name": "arm", "size": 2.0, "unit": "m", "mismatches": [*mismatches],
+             "measures": [*measures]}  # fmt: skip
+    row = {"name": "x", "error": None, "within": within, "mismatches": [], "actors": [actor]}
+    return {"comparisons": [row | others]}
+
+
+def saved(path, job, results):
+    assert save_table(path, job, results) == len(results)
+    with path.open(encoding="utf-8-sig", newline="") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_rows_of_diff_name_the_worst_vertex_and_pose(tmp_path) -> None:
+    worse = measure("vertices", 0.5, 0.125, 0.25, "vertex 7", "pose 3")
+    better = measure("surface, from the first", 0.25, 0.0, 0.125, "vertex 1", "pose 1")
+    rotated = measure("joint orientations", math.pi / 2, math.pi / 4, 0.0, "elbow", "own pose")
+    same = measure("weights", 0.0, 0.0, 0.0, "vertex 0", "")
+    values = compared(better, worse, rotated, same, within=False, mismatches=["1 joint"])
+    rows = saved(
+        tmp_path / "t.csv",
+        "diff",
+        [
+            Result(Item(1, (), "", "bob.zip"), "done", 1, 0.25, values=values),
+            Result(Item(0, (), "", "ann"), "failed", 2, message="expected a .skin file"),
+        ],
+    )
+    assert [row["name"] for row in rows] == ["ann", "bob.zip"]
+    ann, bob = rows
+    assert (ann["status"], ann["exit_code"], ann["message"]) == (
+        *("failed", "2"),
+        "expected a .skin file",
+    )
+    assert ann["vertices_max"] == ann["size"] == ann["within"] == ann["mismatches"] == ""
+    assert (bob["within"], bob["mismatches"], bob["differs_in"]) == ("no", "1", "1 joint")
+    assert (bob["vertices_max"], bob["vertices_mean"]) == ("0.5", "0.125")
+    assert bob["vertices_max_percent_of_size"] == "25"
+    assert (bob["vertices_worst"], bob["vertices_worst_pose"]) == ("vertex 7", "pose 3")
+    assert (bob["orientations_max_degrees"], bob["orientations_mean_degrees"]) == ("90", "45")
+    assert (bob["weights_max"], bob["weights_worst"]) == ("0", "")
+    assert bob["joints_max"] == ""
+    assert (bob["size"], bob["unit"], bob["seconds"]) == ("2", "m", "0.25")
+
+
+def test_an_input_that_cannot_be_compared_has_its_own_message(tmp_path) -> None:
+    values = compared(error="a.skin:3: expected 3 numbers") | {}
+    values["comparisons"][0]["actors"] = []
+    result = Result(Item(0, (), "", "x"), "failed", 2, message="last line", values=values)
+    assert saved(tmp_path / "t.csv", "diff", [result])[0]["message"].startswith("a.skin:3")
+
+
+def test_names_are_no_formulas_and_keep_their_letters(tmp_path) -> None:
+    names = ["=cmd|'/c calc'!A0", "-2+3", "@x", 'Zoë, "Z"']
+    results = [Result(Item(n, (), "", name), "done") for n, name in enumerate(names)]
+    rows = saved(tmp_path / "t.csv", "convert", results)
+    assert [row["name"] for row in rows] == [*(f"'{name}" for name in names[:3]), names[3]]
+    assert (tmp_path / "t.csv").read_bytes().startswith(b"\xef\xbb\xbf")
+
+
+def test_rows_of_lint_count_findings(tmp_path) -> None:
+    findings = [{"code": "W002"}, {"code": "S004"}, {"code": "W002"}]
+    values = {"findings": findings, "counts": {"error": 2, "warning": 1, "note": 0}}
+    result = Result(Item(0, (), "", "x"), "done", 1, values=values)
+    row = saved(tmp_path / "t.csv", "lint", [result])[0]
+    assert (row["errors"], row["warnings"], row["notes"]) == ("2", "1", "0")
+    assert row["codes"] == "S004 W002"

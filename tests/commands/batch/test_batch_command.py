@@ -1,0 +1,184 @@
+"""``viewer batch``: items as the command's own runs, exit codes, and refusals before the start."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import numpy as np
+import pytest
+from app.tiny import SKEL, skin_text, write_rig
+
+from viewer.batching.report import read_results
+from viewer.cli import run
+
+BROKEN = "balljoint root {\noffset 0 zero 0\n}"
+
+
+@pytest.fixture
+def rigs(tmp_path, monkeypatch) -> Path:
+    """Return a folder with three skeletons in two folders, the last of them broken."""
+    for name, text in (("a/one", SKEL), ("b/two", SKEL), ("b/bad", BROKEN)):
+        (tmp_path / "in" / f"{name}.skel").parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "in" / f"{name}.skel").write_text(text)
+    (tmp_path / "tiny.skin").write_text(skin_text())
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def test_items_are_written_as_the_command_writes_them(rigs, capsys):
+    assert run(["convert", "in/a/one.skel", "tiny.skin", "-o", "one.npz"]) == 0
+    command = ["batch", "convert", "in", "--with", "tiny.skin", "--to", "npz", "-o", "out"]
+    assert run(command) == 1
+    out = capsys.readouterr().out
+    assert "3 items" in out and "2 done, 1 failed" in out
+    assert "b/bad.skel" in out and "report: out/report.jsonl" in out
+    with (
+        np.load("one.npz") as one,
+        np.load("out/a/one.npz") as same,
+        np.load("out/b/two.npz") as two,
+    ):
+        for name in one.files:
+            assert (one[name] == same[name]).all() and (one[name] == two[name]).all()
+    by_name = {one.item.name: one for one in read_results(Path("out/report.jsonl"))}
+    bad = by_name.pop("b/bad.skel")
+    assert (bad.status, bad.exit_code, bad.outputs) == ("failed", 2, ())
+    assert bad.message.startswith("in/b/bad.skel:2: ")
+    assert bad.diagnostics[-1]["line"] == 2
+    assert {one.outputs for one in by_name.values()} == {("out/a/one.npz",), ("out/b/two.npz",)}
+
+
+def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
+    rows = "".join(f"v {n}.25 {n}.5 1\n" for n in range(4000)) + "f 1 2 3\n"
+    for name in "ab":
+        (tmp_path / f"{name}.obj").write_text(rows)
+    assert run(["batch", "info", str(tmp_path / "*.obj")]) == 0
+    assert not (tmp_path / "cache").exists()
+    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert (tmp_path / "cache").exists()
+
+
+def test_resume_runs_only_what_is_not_done(rigs, capsys):
+    command = [
+        "batch",
+        "convert",
+        "in/**/*.skel",
+        "--with",
+        "tiny.skin",
+        "-o",
+        "{parent}-{stem}.obj",
+    ]
+    assert run([*command, "--report", "r.jsonl"]) == 1
+    written = Path("a-one.obj").stat().st_mtime_ns
+    capsys.readouterr()
+    assert run([*command, "--report", "r.jsonl"]) == 5
+    assert "2 outputs already exist" in capsys.readouterr().err
+    Path("in/b/bad.skel").write_text(SKEL)
+    assert run([*command, "--report", "r.jsonl", "--resume"]) == 0
+    assert "1 done, 2 unchanged" in capsys.readouterr().out
+    assert Path("a-one.obj").stat().st_mtime_ns == written and Path("b-bad.obj").exists()
+    # Other options give other results, as do other shared files.
+    assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
+    assert "3 done" in capsys.readouterr().out
+    Path("tiny.skin").write_text(skin_text() + "\n")
+    assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
+    assert "3 done" in capsys.readouterr().out
+
+
+def test_text_is_printed_in_the_order_of_the_inputs(rigs, capsys):
+    assert run(["batch", "lint", "in/*/*.skel", "--report", "r.jsonl"]) == 1
+    out = capsys.readouterr().out
+    assert out.index("a/one.skel:\n") < out.index("b/bad.skel:\n") < out.index("b/two.skel:\n")
+    assert "3 done, 1 with findings" in out
+    by_name = {one.item.name: one for one in read_results(Path("r.jsonl"))}
+    assert by_name["b/bad.skel"].exit_code == 1
+    assert by_name["b/bad.skel"].values["counts"]["error"] == 1
+    assert by_name["a/one.skel"].values["counts"]["error"] == 0
+
+
+def test_diff_compares_folders_with_one_reference(rigs, capsys):
+    for name in ("same", "moved", "empty"):
+        (rigs / "all" / name).mkdir(parents=True)
+    write_rig(rigs / "all" / "same")
+    write_rig(rigs / "all" / "moved")
+    moved = rigs / "all" / "moved" / "tiny.skel"
+    moved.write_text(SKEL.replace("offset 0 1 0", "offset 0 2 0"))
+    command = ["batch", "diff", "all/same", "all/*", "--tolerance", "1e-6", "--report", "r.jsonl"]
+    assert run(command) == 1
+    by_name = {one.item.name: one for one in read_results(Path("r.jsonl"))}
+    found = {name: (one.status, one.exit_code) for name, one in by_name.items()}
+    assert found == {"same": ("done", 0), "moved": ("done", 1), "empty": ("failed", 2)}
+    assert "all/empty" in by_name["empty"].message
+    measures = by_name["moved"].values["comparisons"][0]["actors"][0]["measures"]
+    assert max(each["maximum"] for each in measures) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_warnings_are_recorded_as_data(rigs, capsys):
+    (rigs / "in" / "a" / "one.skel").write_text(SKEL.rstrip().removesuffix("}"))
+    assert run(["batch", "info", "in/a", "--report", "r.jsonl"]) == 0
+    said = capsys.readouterr()
+    assert not said.err and "warning" not in said.out
+    (found,) = read_results(Path("r.jsonl"))[0].diagnostics
+    assert found["code"] == "F006" and found["severity"] == "warning"
+    assert run(["info", "in/a/one.skel", "--json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out)["diagnostics"] == [found]
+    assert said.err == f"warning: in/a/one.skel: {found['message']}\n"
+
+
+@pytest.mark.slow
+def test_pictures_are_drawn_by_workers(rigs):
+    from PIL import Image
+
+    command = ["batch", "render", "in/a", "--with", "tiny.skin", "-o", "out", "--size", "32x24"]
+    assert run([*command, "--quality", "draft", "--workers", "1"]) == 0
+    with Image.open("out/one.png") as picture:
+        assert picture.size == (32, 24)
+
+
+def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
+    from viewer.commands import info
+
+    monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
+    assert run(["batch", "info", "in"]) == 130
+    assert "2 items left" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "part"),
+    [
+        ([], "expected a job"),
+        (["conver", "in"], "did you mean convert?"),
+        (["convert", "in"], "expected -o OUT"),
+        (["convert", "-o", "out", "--to", "obj"], "found none"),
+        (["convert", "in", "-o", "out"], "--to SUFFIX"),
+        (
+            ["convert", "in", "-o", "all.obj", "--to", "obj", "--with", "no.skin"],
+            "no.skin: no such",
+        ),
+        (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
+        (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
+        (["lint", "in", "--resume"], "--report FILE"),
+        (["lint", "in", "--workers", "-1"], "expected a number"),
+        (["lint", "in", "--workers", "0", "--timeout", "3"], "--workers 1 or more"),
+        (["lint", "in", "--timeout", "-3"], "--timeout: expected 0 or more"),
+        (["lint", "in", "--limit-memory", "5X"], "--limit-memory: expected"),
+        (["lint", "in", "--shard", "2/2"], "--array=0-1"),
+        (["lint", "in", "--shard", "0/2", "--up", "w"], "expected one of"),
+        (["lint", "in", "--sharp"], "did you mean"),
+    ],
+)
+def test_wrong_usage_is_refused_before_the_start(rigs, capsys, words, part):
+    assert run(["batch", *words]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1 and part in said.err, said.err
+    assert not said.out and not (rigs / "out").exists()
+
+
+def test_help_of_a_job_has_the_options_of_its_command(capsys):
+    with pytest.raises(SystemExit):
+        run(["batch", "render", "--help"])
+    out = capsys.readouterr().out
+    assert "--turntable" in out and "--shard" in out and "PATHS" in out

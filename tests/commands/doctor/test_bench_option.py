@@ -1,0 +1,53 @@
+"""``viewer doctor --bench`` measures what it says, here with small numbers."""
+
+from __future__ import annotations
+
+import pytest
+
+from viewer.commands import _benchmarks, doctor
+from viewer.commands._benchmarks import Measured, measured
+from viewer.errors import RenderError
+
+pytestmark = pytest.mark.slow
+
+
+def test_every_figure_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    commands: list[list[str]] = []
+    monkeypatch.setattr(_benchmarks, "_process", lambda words, _: lambda: commands.append([*words]))
+    for name, value in (("_SIZE", (32, 24)), ("_FRAMES", 1), ("_STARTS", 2), ("_INSTANCES", 2)):
+        monkeypatch.setattr(_benchmarks, name, value)
+    found = [*measured()]
+    assert all(one.milliseconds > 0.0 for one in found)
+    assert [one.subject.partition(":")[0] for one in found].count("start to end") == 6
+    assert len(found) == 11
+    compared = [one.to for one in found if one.to]
+    assert compared == ["import numpy", *3 * ["OpenGL context"], *2 * ["a still body"]]
+    assert len(commands) == 3 * 6  # a first round and two that count
+
+
+def test_relative_figures_name_what_they_are_relative_to() -> None:
+    assert str(Measured("a", 2.0)).split() == ["a", "2.00", "ms"]
+    assert str(Measured("a", 2.0, 1.5, "b")).split() == ["a", "2.00", "ms", "1.50", "times", "b"]
+
+
+def test_failure_of_a_program_is_one_line() -> None:
+    run = _benchmarks._process(["-c", "import sys; print('x'); sys.exit('no\\nOpenGL')"], {})
+    with pytest.raises(RenderError, match=r"^OpenGL$"):
+        run()
+
+
+def test_programs_get_the_environment() -> None:
+    _benchmarks._process(["-c", "import os; assert os.environ['A'] == 'b'"], {"A": "b"})()
+
+
+def test_doctor_measures_only_if_asked(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    from viewer.cli import run
+
+    monkeypatch.setattr(doctor, "examine", lambda: iter(()))
+    monkeypatch.setattr(_benchmarks, "measured", lambda: iter([Measured("a", 2.0)]))
+    assert run(["doctor"]) == 0
+    assert capsys.readouterr().out == ""
+    assert run(["doctor", "--bench"]) == 0
+    assert capsys.readouterr().out.split() == ["bench", "a", "2.00", "ms"]

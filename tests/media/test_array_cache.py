@@ -1,0 +1,228 @@
+"""Arrays come back from the cache only for exactly the bytes that they were made from."""
+
+from __future__ import annotations
+
+import os
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from viewer.cli import run
+from viewer.formats._text import numbers
+from viewer.formats._text.numbers import parse_numbers
+from viewer.media import array_cache, image
+from viewer.media.array_cache import Slot, cache_folder, cache_use, slot_of
+from viewer.media.image import decode_picture
+from viewer.media.png import encode_png
+
+TEXT = b"".join(b"%d.5 -%d\n" % (number, number) for number in range(4000))
+VALUES = np.stack([np.arange(4000) + 0.5, -np.arange(4000.0)], axis=1).ravel()
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def slot(text: bytes = TEXT) -> Slot:
+    found = slot_of("numbers-1", text, 0, len(text))
+    assert found is not None
+    return found
+
+
+def entry(folder: Path) -> Path:
+    (path,) = folder.iterdir()
+    return path
+
+
+def forbid(monkeypatch: pytest.MonkeyPatch, module: object, name: str) -> None:
+    """Fail if a function is called."""
+    monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail(f"{name} was called"))
+
+
+def test_second_run_parses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    data = b"positions " + TEXT + b"}"
+    for _ in range(2):
+        values, bad = parse_numbers(data, 10, 10 + len(TEXT))
+        assert bad == -1
+        np.testing.assert_array_equal(values, VALUES)
+        forbid(monkeypatch, numbers, "_parse")
+    values[0] = 7.0  # callers own what they get
+    assert parse_numbers(TEXT, 0, len(TEXT))[0][0] == 0.5
+
+
+def test_changed_text_is_parsed_again(folder: Path) -> None:
+    parse_numbers(TEXT, 0, len(TEXT))
+    changed = TEXT.replace(b"17.5", b"18.5", 1)
+    assert len(changed) == len(TEXT)
+    assert parse_numbers(changed, 0, len(changed))[0][34] == 18.5
+
+
+def test_same_checksum_and_length_is_not_enough(folder: Path) -> None:
+    slot().store(VALUES)
+    other = slot(TEXT.replace(b"17.5", b"18.5", 1))
+    other.path = entry(folder)  # as if the checksums of both texts were equal
+    assert other.load("<f8", 1) is None
+
+
+def test_text_with_a_fault_is_not_kept(folder: Path) -> None:
+    faulty = TEXT + b"x 1"
+    for _ in range(2):
+        assert parse_numbers(faulty, 0, len(faulty))[1] == len(VALUES)
+    assert not folder.exists()
+
+
+def test_short_texts_are_not_kept(folder: Path) -> None:
+    parse_numbers(b"1 2 3", 0, 5)
+    assert not folder.exists()
+
+
+@pytest.mark.parametrize("place", [0, 17, 24, 33, 40, 60, -9, -1])
+def test_damaged_entry_is_ignored_and_replaced(folder: Path, place: int) -> None:
+    slot().store(VALUES)
+    data = bytearray(entry(folder).read_bytes())
+    data[place] ^= 1
+    entry(folder).write_bytes(data)
+    assert slot().load("<f8", 1) is None
+    parse_numbers(TEXT, 0, len(TEXT))
+    np.testing.assert_array_equal(slot().load("<f8", 1), VALUES)
+
+
+@pytest.mark.parametrize("size", [0, 10, 56, 1000, -1])
+def test_truncated_entry_is_ignored(folder: Path, size: int) -> None:
+    slot().store(VALUES)
+    entry(folder).write_bytes(entry(folder).read_bytes()[:size])
+    assert slot().load("<f8", 1) is None
+
+
+def test_entry_of_another_version_type_or_shape_is_ignored(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    slot().store(VALUES)
+    assert slot().load("|u1", 1) is None
+    assert slot().load("<f8", 2) is None
+    monkeypatch.setattr(array_cache, "_MAGIC", b"viewer 99".ljust(16, b"\0"))
+    assert slot().load("<f8", 1) is None
+
+
+def test_only_the_user_can_read_or_write_entries(folder: Path) -> None:
+    slot().store(VALUES)
+    assert folder.stat().st_mode & 0o777 == 0o700
+    assert entry(folder).stat().st_mode & 0o777 == 0o600
+    entry(folder).chmod(0o622)
+    assert slot().load("<f8", 1) is None
+
+
+def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
+    slot().store(VALUES)
+    path = entry(folder)
+    path.rename(tmp_path / "moved")
+    path.symlink_to(tmp_path / "moved")
+    assert slot().load("<f8", 1) is None
+
+
+@pytest.mark.parametrize("what", ["file", "below a file", "no room"])
+def test_unusable_folder_is_silent(
+    what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tiny_disk: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    places = {"file": tmp_path / "file", "below a file": tmp_path / "file/x", "no room": tiny_disk}
+    monkeypatch.setenv("VIEWER_CACHE", str(places[what]))
+    values, bad = parse_numbers(TEXT, 0, len(TEXT))
+    assert (len(values), bad) == (len(VALUES), -1)
+    assert not [*tiny_disk.iterdir()]
+    assert cache_use() == (0, 0)
+
+
+def test_oldest_entries_go_when_there_are_too_many(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = 56 + len(TEXT) + VALUES.nbytes
+    monkeypatch.setattr(array_cache, "LIMIT", 4 * size)
+    texts = [TEXT[:-5] + b"%04d\n" % number for number in range(5)]
+    for age, text in enumerate(texts[:4]):
+        slot(text).store(VALUES)
+        os.utime(slot(text).path, (1000 + age, 1000 + age))
+    assert slot(texts[0]).load("<f8", 1) is not None  # now it is the one that was used last
+    slot(texts[4]).store(VALUES)
+    kept = [slot(text).load("<f8", 1) is not None for text in texts]
+    assert kept == [True, False, False, True, True]
+    assert cache_use() == (3, 3 * size)
+
+
+def test_threads_that_write_at_once_leave_one_valid_entry(folder: Path) -> None:
+    threads = [threading.Thread(target=slot().store, args=(VALUES,)) for _ in range(8)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    np.testing.assert_array_equal(slot().load("<f8", 1), VALUES)
+    assert entry(folder) == slot().path
+
+
+def test_pixels_of_an_image_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pixels = np.random.default_rng(0).integers(0, 256, (100, 120, 4), dtype=np.uint8)
+    data = encode_png(pixels)
+    for _ in range(2):
+        found = decode_picture(Path("a.png"), data)
+        np.testing.assert_array_equal(found, pixels)
+        assert not found.flags.writeable
+        forbid(monkeypatch, image, "decode_pictures")
+
+
+def test_option_and_variable_switch_it_off(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    rows = b"".join(b"v %d.25 %d.5 1\n" % (n, n) for n in range(4000)) + b"f 1 2 3\n"
+    (tmp_path / "a.obj").write_bytes(rows)
+    command = ["info", str(tmp_path / "a.obj")]
+    assert run([*command, "--no-cache"]) == 0
+    plain = capsys.readouterr().out
+    monkeypatch.setenv("VIEWER_CACHE", "off")
+    assert run(command) == 0
+    assert cache_folder() is None
+    assert not folder.exists()
+    monkeypatch.setenv("VIEWER_CACHE", str(folder))
+    for _ in range(2):
+        assert run(command) == 0
+        assert [*folder.iterdir()]
+    assert capsys.readouterr().out == 3 * plain
+
+
+@pytest.mark.skipif(os.name != "posix", reason="locations on Linux")
+def test_default_folder_is_that_of_platformdirs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import platformdirs
+
+    monkeypatch.delenv("VIEWER_CACHE")
+    for value in (str(tmp_path), "", "  "):
+        monkeypatch.setenv("XDG_CACHE_HOME", value)
+        expected = Path(platformdirs.user_cache_dir("viewer", appauthor=False)) / "arrays"
+        assert cache_folder() == expected
+
+
+def test_folder_may_be_relative_or_below_the_home_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for value in ("kept", "~/kept"):
+        monkeypatch.setenv("VIEWER_CACHE", value)
+        assert cache_folder() == tmp_path / "kept"
+
+
+def test_doctor_shows_the_folder_and_its_size(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer.commands import doctor
+
+    slot().store(VALUES)
+    found = doctor._examine_cache().found
+    assert str(folder) in found
+    assert "1 array, 0.1 of at most 537 MB" in found
+    monkeypatch.setenv("VIEWER_CACHE", "off")
+    assert "VIEWER_CACHE" in doctor._examine_cache().found

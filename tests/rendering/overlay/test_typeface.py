@@ -1,0 +1,64 @@
+"""Fonts for text: letters of other scripts, and letters that no font has."""
+
+from __future__ import annotations
+
+import shutil
+
+import numpy as np
+import pytest
+from PIL import Image, ImageDraw, ImageFont
+
+from viewer.rendering.overlay import typeface
+from viewer.rendering.overlay.typeface import Typeface, interface_font, system_fonts
+
+CJK, EMPTY = "\u95a2\u7bc0", "\U000f1234"  # two ideographs; a code point for private use
+
+
+@pytest.fixture
+def no_fonts(monkeypatch):
+    """A system without fonts."""
+    monkeypatch.setattr(typeface, "system_fonts", lambda: ())
+
+
+def _drawn(text):
+    image = Image.new("L", (300, 40))
+    Typeface(20).draw(ImageDraw.Draw(image), (2, 2), text, 255)
+    return np.array(image)
+
+
+def test_ascii_is_drawn_in_the_built_in_font():
+    image = Image.new("L", (300, 40))
+    ImageDraw.Draw(image).text((2, 2), "left_knee 12", 255, ImageFont.load_default(20))
+    assert (_drawn("left_knee 12") == np.array(image)).all()
+    assert Typeface(20).length("ab") == ImageFont.load_default(20).getlength("ab")
+
+
+def test_greek_and_cyrillic_come_from_the_font_of_the_panels(no_fonts):
+    font = ImageFont.truetype(str(interface_font()), 20)
+    for text in ("\u03b1\u03b2", "\u041f\u0440\u0438"):
+        assert Typeface(20).length(text) == font.getlength(text)
+
+
+def test_letters_without_a_font_are_escaped(no_fonts):
+    plain = "a\\u95a2\\u7bc0\\U000f1234"
+    assert Typeface(20).length("a" + CJK + EMPTY) == Typeface(20).length(plain)
+    assert (_drawn("a" + CJK) == _drawn("a\\u95a2\\u7bc0")).all()
+
+
+def test_installed_fonts_are_found_in_the_user_folder(tmp_path, monkeypatch):
+    folder = tmp_path / "fonts" / "truetype"
+    folder.mkdir(parents=True)
+    for name in ("DroidSansFallbackFull.ttf", "wqy-microhei.ttc", "Loma.ttf", "Other.ttf"):
+        shutil.copy(interface_font(), folder / name)
+    monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
+    monkeypatch.setenv("XDG_DATA_DIRS", str(tmp_path / "none"))
+    monkeypatch.setattr("sys.platform", "linux")
+    # One font of each group, the preferred one.
+    assert [path.name for path in system_fonts()] == ["DroidSansFallbackFull.ttf", "Loma.ttf"]
+
+
+def test_unreadable_font_is_skipped(tmp_path, monkeypatch):
+    (tmp_path / "broken.ttf").write_bytes(b"no font")
+    paths = (tmp_path / "broken.ttf",)
+    monkeypatch.setattr(typeface, "system_fonts", lambda: paths)
+    assert Typeface(20).length(CJK) == Typeface(20).length("\\u95a2\\u7bc0")

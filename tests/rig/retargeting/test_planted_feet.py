@@ -1,0 +1,228 @@
+"""Feet of driven figures, kept where those of the source stand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.testing import assert_allclose
+from rig.retargeting.rest_twins import NAMES, PERSON, Y, along_x, t_pose, written
+from rig.retargeting.two_people import figure_of, places
+from rig.retargeting.walking import N_WALK, RATE, stands, walk
+
+from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
+from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.drive import Drive
+from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.planted_feet import plant_feet
+from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.shape import rest_joints
+
+SIDES = ("Left", "Right")
+PLATEAU = 8  # frames of a stance during which the foot already rolls off or still lands
+EXACT = 1e-9  # cm
+
+
+def person(thigh: float, shin: float, foot: float, hips: float) -> Figure:
+    """Return a person whose thighs, shins, feet and hips are scaled by factors."""
+    table = {name: (parent, np.array(place, float)) for name, (parent, place) in PERSON.items()}
+    old = {name: place.copy() for name, (_, place) in table.items()}
+
+    def bone(end: str, start: str, factor: float) -> None:
+        place = table[start][1] + factor * (old[end] - old[start])
+        table[end] = (table[end][0], place)
+
+    for side in SIDES:
+        hip = table[f"{side}UpLeg"]
+        table[f"{side}UpLeg"] = (hip[0], hip[1] * [hips, 1.0, 1.0])
+        bone(f"{side}Leg", f"{side}UpLeg", thigh)
+        bone(f"{side}Foot", f"{side}Leg", shin)
+        bone(f"{side}ToeBase", f"{side}Foot", foot)
+    names = {name: f"{name}_" for name in table}  # another hierarchy: joints match by meaning
+    return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
+
+
+# Thighs longer, shins shorter than those of the source, with longer feet and wider hips.
+OTHER = person(1.15, 0.85, 1.3, 1.4)
+
+
+def planted(figure: Figure = OTHER, axes: Floats | None = None, **how: float):
+    motion = written(t_pose() if axes is None else axes, *walk(**how), rate=RATE)
+    found = retargeted(motion, figure, source_rest="auto")
+    return found, *plant_feet(found, figure)
+
+
+def parents(figure: Figure) -> list[str]:
+    names = figure.skeleton.names
+    return ["" if parent < 0 else names[parent] for parent in figure.skeleton.parents]
+
+
+def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floats]:
+    """Return how far the balls move horizontally in the middle of every stance."""
+    where, result = places(figure, clip), []
+    for side, name in zip(SIDES, names, strict=True):
+        flags = stands(side)
+        for start in np.flatnonzero(flags[1:] & ~flags[:-1]) + 1:
+            part = where[name][start + PLATEAU : start + 60 - PLATEAU]
+            if len(part) == 60 - 2 * PLATEAU:
+                result.append(np.ptp(part[:, [0, 2]], axis=0))
+    return result
+
+
+TOES = ("LeftToeBase_", "RightToeBase_")
+
+
+def test_standing_feet_stay_in_place_on_the_ground() -> None:
+    found, clip, changes = planted()
+    before, after = slid(OTHER, found.clip, TOES), slid(OTHER, clip, TOES)
+    assert len(after) == 3 and np.max(before) > 1.0
+    assert_allclose(after, 0.0, atol=EXACT)
+    assert changes.n_contacts == 6 and changes.after < changes.source < changes.before
+    # The soles of a skeleton are its lowest joints: the balls, which rest at height 0.
+    where = places(OTHER, clip)
+    for side, name in zip(SIDES, TOES, strict=True):
+        flags = stands(side) & np.roll(stands(side), PLATEAU) & np.roll(stands(side), -PLATEAU)
+        assert_allclose(where[name][flags][:, 1], 0.0, atol=EXACT)
+        assert where[name][:, 1].min() > -EXACT
+    assert changes.gap_after < EXACT < changes.gap_before
+
+
+def test_legs_keep_their_lengths_and_feet_and_trunk_their_orientation() -> None:
+    found, clip, _ = planted()
+    assert_allclose(np.linalg.norm(clip.rotations, axis=-1), 1.0, atol=1e-9)
+    old, new = places(OTHER, found.clip), places(OTHER, clip)
+    for start, end in (("LeftUpLeg_", "LeftLeg_"), ("LeftLeg_", "LeftFoot_")):
+        length = np.linalg.norm(old[end] - old[start], axis=1)
+        assert_allclose(np.linalg.norm(new[end] - new[start], axis=1), length, atol=1e-9)
+    for start, end in (("LeftFoot_", "LeftToeBase_"), ("Hips_", "Head_")):
+        assert_allclose(new[end] - new[start], old[end] - old[start], atol=1e-9)
+
+
+def test_knees_accelerate_hardly_more_than_in_the_source() -> None:
+    found, clip, _ = planted()
+    where = places(OTHER, clip), places(found.source.figure, found.source.clip)
+    peaks = []
+    for points, tail in zip(where, ("_", ""), strict=True):
+        hip, knee, ankle = (points[f"Left{part}{tail}"] for part in ("UpLeg", "Leg", "Foot"))
+        cosines = np.einsum("fa,fa->f", hip - knee, ankle - knee) / (
+            np.linalg.norm(hip - knee, axis=1) * np.linalg.norm(ankle - knee, axis=1)
+        )
+        peaks.append(np.abs(np.diff(np.arccos(cosines), 2)).max())
+    assert peaks[0] < 1.2 * peaks[1]
+
+
+def test_every_step_of_stairs_has_its_own_height() -> None:
+    found, clip, changes = planted(rise=8.0)
+    assert changes.is_better
+    where = places(OTHER, clip)
+    for side, name in zip(SIDES, TOES, strict=True):
+        own = where[name][stands(side)][:, 1]
+        steps = np.unique(np.round(own / (8.0 * found.scale), 2))
+        assert_allclose(steps, np.round(steps), atol=0.05)
+        assert len(np.unique(np.round(steps))) > 1
+    assert_allclose(slid(OTHER, clip, TOES), 0.0, atol=EXACT)
+
+
+def test_the_rest_pose_of_the_file_does_not_matter() -> None:
+    clips = [planted(axes=axes)[1] for axes in (t_pose(), along_x())]
+    first, second = (places(OTHER, clip) for clip in clips)
+    for name in ("LeftLeg_", "RightFoot_", "LeftToeBase_"):
+        assert_allclose(first[name], second[name], atol=0.5)  # cm: the rest pose is estimated
+
+
+def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
+    over = axis_rotations(0, np.asarray(np.pi / 2))
+    joints = zip(parents(OTHER), rest_joints(OTHER), strict=True)
+    table = dict(zip(OTHER.skeleton.names, joints, strict=True))
+    figure = figure_of(table, "z", over, up="z")
+    upright, found = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    for name in TOES:
+        assert_allclose(found[name], upright[name] @ over.T, atol=1e-9)
+
+
+def test_a_root_with_a_scale_is_understood() -> None:
+    skeleton = OTHER.skeleton
+    moved, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
+    moved[0] *= 0.01
+    scales[0] = 0.01
+    small = replace(skeleton, rest_translations=moved, rest_scales=scales)
+    figure = replace(OTHER, skeleton=small)
+    first, second = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    for name in TOES:
+        assert_allclose(100.0 * second[name], first[name], atol=1e-9)
+
+
+def test_a_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
+    twin = figure_of({f"{n}_": (p and f"{p}_", q) for n, (p, q) in PERSON.items()}, "same")
+    found, clip, changes = planted(twin)
+    assert changes is None and clip is found.clip
+
+
+def test_a_source_that_never_stands_is_left_alone() -> None:
+    rotations, path = walk()
+    path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s, as on a bicycle
+    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    clip, changes = plant_feet(found, OTHER)
+    assert clip is found.clip and changes.n_contacts == 0
+
+
+def test_a_foot_held_still_in_the_air_does_not_stand() -> None:
+    rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
+    swing = 0.2 * np.sin(np.linspace(0.0, 6.0, 60))
+    rotations[:, 0] = axis_rotations(1, swing)  # the body rotates about its standing left foot
+    for name in NAMES[1:]:
+        rotations[:, NAMES.index(name)] = rotations[:, 0]
+    bent = axis_rotations(0, np.asarray(1.5))
+    for name in ("RightLeg", "RightFoot", "RightToeBase"):
+        rotations[:, NAMES.index(name)] = rotations[:, 0] @ bent
+    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    clip, changes = plant_feet(found, OTHER)
+    old, new = places(OTHER, found.clip), places(OTHER, clip)
+    assert changes.n_contacts == 1
+    # It follows the body, apart from the lowering for the other leg, which is straight.
+    away = (new["RightToeBase_"] - old["RightToeBase_"]) - (new["Hips_"] - old["Hips_"])
+    assert_allclose(away[:, [0, 2]], 0.0, atol=1e-9)
+    assert away[:, 1].min() > -1e-9 and away[:, 1].max() < changes.lowered + 1e-9
+
+
+def test_motions_of_two_frames_and_with_gaps_are_understood() -> None:
+    motion = written(t_pose(), *walk(), rate=RATE)
+    rows = np.arange(N_WALK)
+    rows[100:110] = -1
+    for timing in (
+        replace(motion.clip.timing, rows=rows),
+        replace(motion.clip.timing, rows=rows[:2]),
+    ):
+        moving = replace(motion, clip=replace(motion.clip, timing=timing))
+        clip, _ = plant_feet(retargeted(moving, OTHER), OTHER)
+        assert (clip.timing.present == timing.present).all()
+
+
+def test_an_upside_down_world_gives_the_same_feet() -> None:
+    rotations, path = walk()
+    over = axis_rotations(0, np.asarray(np.pi))
+    # The hips rest at a height of 100, from where their path is measured.
+    moved = (path + 100.0 * Y) @ over.T - 100.0 * Y
+    motion = written(t_pose(), over @ rotations, moved, rate=RATE)
+    straight, _ = driven_clip(Drive(written(t_pose(), rotations, path, rate=RATE)), OTHER)
+    turned, _ = driven_clip(Drive(motion, hangs=True), OTHER)
+    first, second = places(OTHER, straight), places(OTHER, turned)
+    assert_allclose(second["LeftToeBase_"] @ over, first["LeftToeBase_"], atol=1e-6)
+
+
+def test_planting_can_be_switched_off_and_is_reported() -> None:
+    motion = written(t_pose(), *walk(), rate=RATE)
+    clip, notes = driven_clip(Drive(motion, plants_feet=False), OTHER)
+    assert not any(note.key.startswith("F007.feet") for note in notes)
+    assert_allclose(clip.rotations, retargeted(motion, OTHER).clip.rotations, atol=0.0)
+    _, notes = driven_clip(Drive(motion), OTHER)
+    text = str(next(note for note in notes if note.key == "F007.feet-planted"))
+    assert "planted in 6 contacts of twin" in text and "--feet off" in text
+
+
+def test_the_rotations_of_the_arms_are_untouched() -> None:
+    found, clip, _ = planted()
+    arms = [OTHER.skeleton.names.index(f"{side}Arm_") for side in SIDES]
+    assert (clip.rotations[:, arms] == found.clip.rotations[:, arms]).all()

@@ -1,0 +1,26 @@
+"""Switch for the feet of driven figures, which stay on the ground where those of the motion do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from viewer.app.core.state import AppState
+from viewer.app.retargeting.drive_changes import change_drive, no_edit
+
+__all__ = ["plants_feet", "toggle_feet"]
+
+
+def plants_feet(state: AppState) -> bool:
+    """Return whether the feet of the chosen actor are kept on the ground."""
+    drive = state.actor.drive
+    return drive is not None and drive.plants_feet
+
+
+def toggle_feet(state: AppState) -> None:
+    """Switch the correction of the chosen actor's feet on or off, also for its whole capture."""
+    if no_edit(state):
+        state.say_status(no_edit(state))
+        return
+    is_on = not plants_feet(state)
+    if change_drive(state, lambda drive: replace(drive, plants_feet=is_on)):
+        state.say_status(f"Feet: {'kept on the ground' if is_on else 'as retargeted'}")

@@ -1,0 +1,127 @@
+"""One item on a worker of a cluster: version check, warm job, time and memory limits."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from viewer.batching.engines import Job
+from viewer.batching.items import Item, Result
+from viewer.batching.worker import name_worker
+from viewer.version import VERSION
+
+__all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
+
+ENDED = "viewer-ended"
+"""Topic of events on the scheduler: attempts that their time limit ended."""
+
+_SETTLE = 0.5  # seconds in which the last event leaves a worker that ends itself
+_FAILED = 70  # exit code of such a worker
+
+# A worker runs one item at a time even if it has several threads: output is captured, and
+# diagnostics are recorded, for the process as a whole.
+_lock = threading.Lock()
+_jobs: dict[bytes, Job] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """What a worker is asked to do; pickled, because another version may not understand it.
+
+    Attributes
+    ----------
+    job, item : bytes
+        Pickled.
+    timeout, memory : float, int, optional
+        As in ``Limits``.
+    """
+
+    job: bytes
+    item: bytes
+    timeout: float | None = None
+    memory: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class OtherVersion:
+    """The answer of a worker that has another version of the package."""
+
+    worker: str
+    version: str
+
+
+def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVersion:
+    """Run one item in a thread of a worker.
+
+    Parameters
+    ----------
+    version : str
+        That of the program which runs the batch.
+    key : str
+        Name of the attempt, for events.
+    call : tuple
+        Values of a ``Call``.
+    """
+    from distributed import get_worker
+
+    worker = get_worker()
+    if version != VERSION:
+        return OtherVersion(worker.address, VERSION)
+    asked = Call(*call)
+    with _lock:
+        item: Item = pickle.loads(asked.item)
+        name_worker(worker.name)
+        if asked.memory is not None:
+            limit_memory(asked.memory)
+        with _ended_after(asked.timeout, worker, key):
+            return _job(asked.job)(item)
+
+
+def _job(pickled: bytes) -> Job:
+    """Return the job; it stays as warm as it made itself for the item before."""
+    if pickled not in _jobs:
+        _jobs.clear()
+        _jobs[pickled] = pickle.loads(pickled)
+    return _jobs[pickled]
+
+
+@contextmanager
+def _ended_after(timeout: float | None, worker: Any, key: str) -> Iterator[None]:
+    """End this process unless the block ends in time: a thread can't be interrupted."""
+    if timeout is None:
+        yield
+        return
+
+    def end() -> None:
+        worker.log_event(ENDED, {"key": key, "status": "timeout"})
+        time.sleep(_SETTLE)
+        os._exit(_FAILED)
+
+    timer = threading.Timer(timeout, end)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+
+
+def limit_memory(size: int) -> None:
+    """Limit the memory that this process may allocate, in bytes; further calls change nothing."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    # On Linux, the address space also has mapped files and reserves of drivers, which cost nothing.
+    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
+    soft, most = resource.getrlimit(kind)
+    limit = size if most == resource.RLIM_INFINITY else min(size, most)
+    if soft != limit:
+        resource.setrlimit(kind, (limit, most))

@@ -1,0 +1,215 @@
+"""Tables of a batch: one row per item, as CSV for spreadsheets and statistics."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from viewer.batching.items import Result
+from viewer.media.saving import save_bytes
+
+__all__ = [
+    "MEASURES",
+    "comparisons",
+    "mismatches_of",
+    "ordered",
+    "row_message",
+    "save_table",
+    "table_rows",
+    "worst_measure",
+]
+
+Cell = str | int | float | None
+
+MEASURES = {
+    "joints": ("joint positions", "captured points"),
+    "orientations": ("joint orientations",),
+    "vertices": ("vertices", "surface, from the first", "surface, from the second"),
+    "weights": ("weights",),
+}
+"""Groups of columns, and the measures of ``diff`` that they show the worst of."""
+
+_FORMULAS = ("=", "+", "-", "@", "\t", "\r")
+
+
+def ordered(results: Iterable[Result]) -> list[Result]:
+    """Return results in the order of the inputs."""
+    return sorted(results, key=lambda result: result.item.index)
+
+
+def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
+    """Write one row per item as CSV (RFC 4180, UTF-8); return the number of rows.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file; it is replaced as a whole, or not at all.
+    job : str
+        Name of the command, which has its own columns.
+    results : iterable of Result
+        Results in any order; rows are in the order of the inputs.
+
+    Raises
+    ------
+    OutputError
+        If it cannot be written.
+    """
+    rows = table_rows(job, results)
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream)
+    writer.writerow(_columns(job))
+    writer.writerows([[_safe(cell) for cell in row] for row in rows])
+    text = stream.getvalue()
+    # Excel takes a file without this mark for one in the system's encoding.
+    mark = b"" if text.isascii() else b"\xef\xbb\xbf"
+    save_bytes(path, mark + text.encode("utf-8", "backslashreplace"))
+    return len(rows)
+
+
+def table_rows(job: str, results: Iterable[Result]) -> list[list[Cell]]:
+    """Return the rows of a table, without the head."""
+    cells_of = _CELLS.get(job, _output_cells)
+    return [
+        [
+            result.item.name,
+            result.status,
+            result.exit_code,
+            *cells_of(result),
+            row_message(result),
+            round(result.seconds, 3),
+        ]
+        for result in ordered(results)
+    ]
+
+
+def _columns(job: str) -> list[str]:
+    own = _COLUMNS.get(job, ["attempts", "outputs"])
+    return ["name", "status", "exit_code", *own, "message", "seconds"]
+
+
+def _safe(cell: Cell) -> Cell:
+    """Return a cell that no spreadsheet takes for a formula: names come from other people."""
+    if isinstance(cell, str):
+        return f"'{cell}" if cell.startswith(_FORMULAS) else cell
+    if isinstance(cell, float):
+        return f"{cell:.7g}" if math.isfinite(cell) else ""
+    return cell
+
+
+def row_message(result: Result) -> str:
+    """Return why an item failed, in one line; empty if it did not."""
+    errors = [one.get("error") or "" for one in comparisons(result)]
+    return "; ".join(filter(None, errors)) or result.message
+
+
+def comparisons(result: Result) -> list[Mapping[str, Any]]:
+    """Return the comparisons of an item of ``diff``; none if it failed before."""
+    found = result.values.get("comparisons")
+    return found if isinstance(found, list) else []
+
+
+def worst_measure(result: Result, group: str) -> tuple[Mapping[str, Any], Mapping[str, Any]] | None:
+    """Return the largest measure of a group, relative to each figure's size, and its actor.
+
+    Parameters
+    ----------
+    result : Result
+        Result of an item of ``diff``.
+    group : str
+        A key of ``MEASURES``.
+    """
+    pairs = [
+        (measure, actor)
+        for comparison in comparisons(result)
+        for actor in comparison.get("actors", ())
+        for measure in actor.get("measures", ())
+        if measure["name"] in MEASURES[group]
+    ]
+    return max(pairs, key=lambda pair: _number(pair[0]["relative"]), default=None)
+
+
+def _number(value: object) -> float:
+    """Return a number; those that JSON lacks are written as text."""
+    if isinstance(value, int | float):
+        return float(value)
+    return math.nan if value is None else float(str(value))
+
+
+def _diff_cells(result: Result) -> list[Cell]:
+    found = comparisons(result)
+    within = [one.get("within") for one in found if one.get("within") is not None]
+    mismatches = mismatches_of(result)
+    cells: list[Cell] = [
+        "" if not within else "yes" if all(within) else "no",
+        len(mismatches) if found else None,
+    ]
+    for group in MEASURES:
+        cells += _measure_cells(group, worst_measure(result, group))
+    actors = [actor for one in found for actor in one.get("actors", ())]
+    sizes = [_number(actor["size"]) for actor in actors]
+    units = {actor.get("unit") or "" for actor in actors}
+    return [*cells, max(sizes, default=None), " ".join(sorted(units)), "; ".join(mismatches)]
+
+
+def mismatches_of(result: Result) -> list[str]:
+    """Return what only one of the two sides has."""
+    return [
+        text
+        for one in comparisons(result)
+        for part in (one, *one.get("actors", ()))
+        for text in part.get("mismatches", ())
+    ]
+
+
+def _measure_cells(
+    group: str, found: tuple[Mapping[str, Any], Mapping[str, Any]] | None
+) -> list[Cell]:
+    if found is None:
+        return [None] * len(_measure_columns(group))
+    measure, _ = found
+    to_shown = math.degrees if group == "orientations" else float
+    most, mean = (to_shown(_number(measure[key])) for key in ("maximum", "mean"))
+    # Without any difference, no element is the worst one.
+    place = [measure["item"], measure["step"] or ""] if most > 0.0 else ["", ""]
+    relative = 100.0 * _number(measure["relative"])
+    return [most, mean, *([relative] if group in _LENGTHS else []), *place]
+
+
+_LENGTHS = ("joints", "vertices")
+
+
+def _measure_columns(group: str) -> list[str]:
+    unit = "_degrees" if group == "orientations" else ""
+    percent = [f"{group}_max_percent_of_size"] if group in _LENGTHS else []
+    return [
+        f"{group}_max{unit}",
+        f"{group}_mean{unit}",
+        *percent,
+        f"{group}_worst",
+        f"{group}_worst_pose",
+    ]
+
+
+def _lint_cells(result: Result) -> list[Cell]:
+    counts = result.values.get("counts", {})
+    codes = sorted({finding["code"] for finding in result.values.get("findings", ())})
+    return [*(counts.get(kind) for kind in ("error", "warning", "note")), " ".join(codes)]
+
+
+def _output_cells(result: Result) -> list[Cell]:
+    return [result.attempts, "; ".join(result.outputs)]
+
+
+_COLUMNS: dict[str, Sequence[str]] = {
+    "diff": [
+        *("within", "mismatches"),
+        *(column for group in MEASURES for column in _measure_columns(group)),
+        *("size", "unit", "differs_in"),
+    ],
+    "lint": ["errors", "warnings", "notes", "codes"],
+}
+_CELLS: dict[str, Callable[[Result], list[Cell]]] = {"diff": _diff_cells, "lint": _lint_cells}

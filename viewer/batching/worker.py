@@ -1,0 +1,30 @@
+"""The number of this worker process among those of its batch."""
+
+from __future__ import annotations
+
+import multiprocessing
+import re
+
+__all__ = ["name_worker", "worker_rank"]
+
+_name = ""
+
+
+def name_worker(name: object) -> None:
+    """Set the name of this process, as a cluster calls it; a number at its end is the rank."""
+    global _name
+    _name = str(name)
+
+
+def worker_rank() -> int | None:
+    """Return the number of this worker, which workers share out graphics cards by.
+
+    Returns
+    -------
+    int or None
+        None in the process that runs the batch. Replaced workers get new numbers.
+    """
+    if not _name and multiprocessing.parent_process() is None:
+        return None
+    number = re.search(r"\d+$", _name or multiprocessing.current_process().name)
+    return int(number.group()) if number else 0

@@ -1,0 +1,94 @@
+"""Files about all items that are written when a batch ends: a table and an overview."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from viewer.batching.items import Result
+from viewer.batching.overview import PAGES, check_overview, save_overview
+from viewer.batching.tables import save_table
+from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
+from viewer.phrases import counted, printable
+
+__all__ = ["add_result_arguments", "check_results", "save_results"]
+
+_OVERVIEWS = {"render": "sheet.png", "lint": "page.html", "diff": "page.html"}
+_DRAWN = ("render", "diff")
+
+
+def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
+    """Add the options.
+
+    ``parser``: parser of a job.
+    ``job``: its name.
+    """
+    group = parser.add_argument_group("results")
+    group.add_argument("--table", default="", metavar="FILE.csv", help="write one row per input")
+    if job in _OVERVIEWS:
+        kinds = "a page (.html)"
+        if job in _DRAWN:
+            kinds += ", or contact sheets of the images (.png, .jpg)"
+        group.add_argument(
+            "--overview",
+            default="",
+            metavar="FILE",
+            help=f"write {kinds} of all inputs, such as {_OVERVIEWS[job]}; failed ones are marked",
+        )
+    if job == "diff":
+        group.add_argument(
+            "--expect",
+            action="append",
+            default=[],
+            metavar="PATTERN",
+            help="compare this file of each folder or zip archive, such as student.skel or "
+            "'*.skin'; repeat it for several (default: files with the suffixes of the reference)",
+        )
+
+
+def check_results(job: str, table: str, overview: str, may_replace: bool, output: str = "") -> None:
+    """Check the names of the files, before the batch starts.
+
+    ``table``, ``overview``: the files; empty for none.
+    ``may_replace``: whether they may exist.
+    ``output``: folder that the batch creates if it is missing.
+    Raises ViewerError if a suffix is wrong, or a file exists or has no folder.
+    """
+    if table and Path(table).suffix.lower() != ".csv":
+        raise UnsupportedFormatError(
+            f'--table: {printable(table, 300)}: expected .csv, found "{Path(table).suffix}"'
+        )
+    if overview:
+        check_overview(overview)
+        if job not in _DRAWN and Path(overview).suffix.lower() not in PAGES:
+            raise ViewerError(
+                f'--overview: {job} draws nothing: expected .html, found "{Path(overview).suffix}"'
+            )
+    for path in filter(None, (table, overview)):
+        if not may_replace and os.path.lexists(path):
+            raise OutputError(f"{printable(path, 300)}: already exists (--force replaces it)")
+        parent = Path(path).absolute().parent
+        is_made = bool(output) and parent.is_relative_to(Path(output).absolute())
+        if not (parent.is_dir() or is_made):
+            folder = printable(Path(path).parent, 300)
+            raise OutputError(f"{printable(path, 300)}: the folder {folder} does not exist")
+
+
+def save_results(job: str, table: str, overview: str, results: Sequence[Result]) -> list[str]:
+    """Write the files; return a line about each.
+
+    ``table``, ``overview``: the files; empty for none.
+    Raises OutputError if one cannot be written.
+    """
+    lines = []
+    for path in filter(None, (table, overview)):
+        try:
+            Path(path).absolute().parent.mkdir(parents=True, exist_ok=True)
+        except OSError as problem:
+            raise OutputError(f"{printable(path, 300)}: {problem.strerror}") from None
+    if table:
+        n_rows = save_table(table, job, results)
+        lines.append(f"{printable(table, 300)}: table of {counted(n_rows, 'item')}")
+    return lines + (save_overview(overview, job, results) if overview else [])

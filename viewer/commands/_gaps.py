@@ -1,0 +1,87 @@
+"""The option for gaps in captures, frames in which a person is absent."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from collections.abc import Sequence
+from typing import Any
+
+from viewer.phrases import printable
+
+__all__ = ["ONE_SECOND", "add_gap_arguments"]
+
+ONE_SECOND = 0
+"""Value of ``fill_gaps`` for gaps of up to a second."""
+
+_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|1s)%s)?"
+_PATTERNS = {
+    "view": re.compile(_LIMIT % ""),
+    "check": re.compile("interpolate"),
+    "write": re.compile(rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}"),
+}
+_WHAT = {
+    "view": "gaps of captures: interpolate all, or those of up to N frames or a second (1s)",
+    "check": "gaps of captures: interpolate all",
+    "write": "gaps of captures: hold the last pose, split the file, or interpolate all or those of "
+    "up to N frames or a second (1s), as in interpolate:10,split (default: omitted from EasyMocap, "
+    ".obj and arrays, else hold)",
+}
+_METAVAR = {
+    "view": "interpolate[:N]",
+    "check": "interpolate",
+    "write": "hold|split|interpolate[:N]",
+}
+
+
+def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
+    """Add ``--gaps``, and older names for its values, which help does not list.
+
+    ``group``: options of a command.
+    ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.
+    Parsing gives ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
+      are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, in frames,
+      ``ONE_SECOND`` or None.
+    """
+    group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
+    hidden = argparse.SUPPRESS
+    group.add_argument("--interpolate-gaps", action="store_true", help=hidden)
+    if use == "check":
+        return
+    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=ONE_SECOND, help=hidden)
+
+
+class _Gaps(argparse.Action):
+    """Parses the value of ``--gaps`` into the results of all three options."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: str | Sequence[Any] | None,
+        option_string: str | None = None,
+    ) -> None:
+        """Store the results, or raise ArgumentError."""
+        text, use = str(values), str(self.const)
+        found = _PATTERNS[use].fullmatch(text)
+        if found is None:
+            raise argparse.ArgumentError(
+                self, f"expected {_METAVAR[use]}, found {printable(text, 60)}"
+            )
+        parts = found.groupdict()
+        namespace.gaps = parts.get("alone") or parts.get("rest")
+        limit = parts.get("limit")
+        namespace.interpolate_gaps = limit is None and parts.get("alone") is None
+        if use != "check":
+            frames = ONE_SECOND if limit == "1s" else int(limit or 0)
+            namespace.fill_gaps = None if limit is None else frames
+
+
+def _longest(text: str) -> int:
+    """Return the length of the longest gap in frames."""
+    if not re.fullmatch(r"[1-9]\d{0,8}", text, re.ASCII):
+        raise argparse.ArgumentTypeError(
+            f"expected a number of frames, or no value and the files before the option, found "
+            f"{printable(text, 60)}"
+        )
+    return int(text)

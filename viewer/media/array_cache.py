@@ -1,0 +1,252 @@
+"""Arrays made from files' text or pixels, kept between runs in the user's cache folder.
+
+An entry contains the bytes that it was made from, and is used only if they are equal to the bytes
+at hand: it cannot be out of date. Its name is their checksum, so no two processes need to agree on
+anything. An entry that is damaged, foreign or from another version is replaced; a folder that
+cannot be read or written is the same as none.
+
+::
+
+    entry   header (56 bytes) · bytes that were read · array, little-endian
+    header  version · checksum of the array · length of the bytes · item type · axes (up to 3)
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import stat
+import struct
+import sys
+import threading
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.version import VERSION
+
+__all__ = ["LIMIT", "VARIABLE", "Slot", "cache_folder", "cache_use", "slot_of", "without_cache"]
+
+VARIABLE = "VIEWER_CACHE"
+"""Environment variable: a folder for the cache, or ``off``."""
+
+LIMIT = 1 << 29
+"""Bytes of all entries; those that were not used for longest are removed beyond it."""
+
+_OFF = ("off", "0", "no", "none")
+_LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
+_LARGEST = 1 << 27  # bytes of an entry
+_SUFFIX = ".array"
+_HEADER = struct.Struct("<16sIQ4s3Q")
+_BINARY = getattr(os, "O_BINARY", 0)
+_MAGIC = f"viewer {VERSION}".encode()[:15].ljust(16, b"\0")
+_is_off = False
+
+
+def cache_folder() -> Path | None:
+    """Return the folder of the cache, which need not exist; None if it is switched off."""
+    asked = os.environ.get(VARIABLE, "")
+    if _is_off or asked.lower() in _OFF:
+        return None
+    if asked:
+        return Path(os.path.abspath(os.path.expanduser(asked)))  # noqa: PTH100, PTH111
+    if sys.platform.startswith("linux"):
+        # As platformdirs would say, whose import takes longer than reading a small entry.
+        base = os.environ.get("XDG_CACHE_HOME", "").strip()
+        home = base if os.path.isabs(base) else os.path.expanduser("~/.cache")  # noqa: PTH111, PTH117
+        return Path(home) / "viewer" / "arrays"
+    import platformdirs
+
+    return Path(platformdirs.user_cache_dir("viewer", appauthor=False)) / "arrays"
+
+
+@contextlib.contextmanager
+def without_cache() -> Iterator[None]:
+    """Use no cache in the block, in any thread."""
+    global _is_off
+    before, _is_off = _is_off, True
+    try:
+        yield
+    finally:
+        _is_off = before
+
+
+def cache_use() -> tuple[int, int]:
+    """Return the number of entries, and their size in bytes."""
+    folder = cache_folder()
+    entries = [] if folder is None else _entries(folder)
+    return len(entries), sum(size for _, size, _ in entries)
+
+
+def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
+    """Return the place of an array in the cache; None if it would not pay, or there is no cache.
+
+    Parameters
+    ----------
+    kind : str
+        What is made of the bytes, for the name of a file; changes when the result does.
+    data : bytes
+        A file.
+    start, end : int
+        The part of the file that the array is made from.
+    """
+    if not _LEAST <= end - start <= _LARGEST // 2:
+        return None
+    folder = cache_folder()
+    if folder is None:
+        return None
+    return Slot(folder, kind, bytes(data[start:end]))
+
+
+class Slot:
+    """Place of one array in the cache.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder of the cache, which need not exist.
+    kind : str
+        What is made of the bytes.
+    content : bytes
+        The bytes that the array is made from.
+    """
+
+    __slots__ = ("_content", "path")
+
+    def __init__(self, folder: Path, kind: str, content: bytes) -> None:
+        self._content = content
+        self.path = folder / f"{zlib.crc32(content):08x}-{len(content):x}-{kind}{_SUFFIX}"
+
+    def load(self, kind: str, n_axes: int) -> NDArray[Any] | None:
+        """Return the array, which may be written to; None if there is no valid entry.
+
+        Parameters
+        ----------
+        kind : "<f8" or "|u1"
+            Type of its items.
+        n_axes : int
+            Number of its axes.
+        """
+        try:
+            # A link could lead to a device, or to a file of somebody else.
+            number = os.open(self.path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | _BINARY)
+            with open(number, "rb", buffering=0) as stream:  # noqa: PTH123
+                status = os.fstat(number)
+                if not _is_own(status):
+                    return None
+                values = self._read(stream, status.st_size, kind, n_axes)
+        except OSError:
+            return None
+        if values is not None:
+            with contextlib.suppress(OSError):  # a folder that cannot be written to
+                os.utime(self.path)
+        return values
+
+    def _read(self, stream: Any, size: int, kind: str, n_axes: int) -> NDArray[Any] | None:
+        """Return the array of an open entry; every byte of it is checked."""
+        header = stream.read(_HEADER.size)
+        if len(header) < _HEADER.size:
+            return None
+        magic, checksum, length, found, *axes = _HEADER.unpack(header)
+        if (magic, length, found) != (_MAGIC, len(self._content), _code(kind, n_axes)):
+            return None
+        if any(axes[n_axes:]):
+            return None
+        shape, dtype = axes[:n_axes], np.dtype(kind)
+        if _HEADER.size + length + math.prod(shape) * dtype.itemsize != size:
+            return None
+        if stream.read(length) != self._content:
+            return None
+        values = np.empty(shape, dtype)
+        flat = values.reshape(-1).view(np.uint8).data
+        if stream.readinto(flat) != len(flat) or zlib.crc32(flat) != checksum:
+            return None
+        return values
+
+    def store(self, values: NDArray[Any]) -> None:
+        """Keep an array; nothing happens if that is impossible, as the cache is dispensable.
+
+        Parameters
+        ----------
+        values : (...) float64 or uint8
+            At most three axes.
+        """
+        values = np.ascontiguousarray(values)
+        total = _HEADER.size + len(self._content) + values.nbytes
+        if total > _LARGEST:
+            return
+        flat = values.reshape(-1).view(np.uint8).data
+        code = _code(values.dtype.str, values.ndim)
+        axes = (*values.shape, 0, 0, 0)[:3]
+        header = _HEADER.pack(_MAGIC, zlib.crc32(flat), len(self._content), code, *axes)
+        mark = f"{os.getpid()}-{threading.get_ident()}"
+        temporary = self.path.with_name(f".{self.path.name}.{mark}")
+        try:
+            _make_folder(self.path.parent)
+            flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _BINARY
+            with open(os.open(temporary, flags, 0o600), "wb") as stream:  # noqa: PTH123
+                stream.writelines((header, self._content, flat))
+            temporary.replace(self.path)
+        except OSError:
+            _remove(temporary)
+            return
+        except BaseException:  # including Ctrl-C
+            _remove(temporary)
+            raise
+        # Listing the folder at each entry would slow down the reading of thousands of files.
+        if zlib.crc32(header) % 16 == 0 or total > LIMIT // 64:
+            _limit_size(self.path.parent)
+
+
+def _code(kind: str, n_axes: int) -> bytes:
+    """Return type and number of axes as in a header."""
+    return f"{kind}{n_axes}".encode()
+
+
+def _make_folder(folder: Path) -> None:
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        folder.mkdir(mode=0o700)
+
+
+def _is_own(status: os.stat_result) -> bool:
+    """Return whether an entry is a regular file of this user that nobody else may write to."""
+    if not stat.S_ISREG(status.st_mode):
+        return False
+    own = getattr(os, "getuid", None)
+    return own is None or (status.st_uid == own() and not status.st_mode & 0o022)
+
+
+def _entries(folder: Path) -> list[tuple[float, int, Path]]:
+    """Return time of last use, size and path of each entry, and of what crashes left behind."""
+    found = []
+    with contextlib.suppress(OSError), os.scandir(folder) as listing:
+        for entry in listing:
+            with contextlib.suppress(OSError):
+                if _SUFFIX in entry.name and entry.is_file(follow_symlinks=False):
+                    status = entry.stat(follow_symlinks=False)
+                    found.append((status.st_mtime, status.st_size, Path(entry.path)))
+    return found
+
+
+def _limit_size(folder: Path) -> None:
+    """Remove the entries that were not used for longest, until three quarters of the limit."""
+    entries = sorted(_entries(folder))
+    total = sum(size for _, size, _ in entries)
+    if total <= LIMIT:
+        return
+    for _, size, path in entries:
+        if total <= 0.75 * LIMIT:
+            return
+        _remove(path)
+        total -= size
+
+
+def _remove(path: Path) -> None:
+    with contextlib.suppress(OSError):
+        path.unlink()

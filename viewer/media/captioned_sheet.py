@@ -1,0 +1,175 @@
+"""Contact sheets with names below the pictures, and cells for missing ones.
+
+Pillow is imported on first use.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from viewer.media.picture_sinks import sheet_layout
+from viewer.rig.arrays import Bytes
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw, ImageFont
+
+    Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
+
+__all__ = ["CaptionedCell", "captioned_sheet", "elided", "wrapped"]
+
+_WIDTH = 240  # of a cell, pixels
+_HEIGHTS = 120, 320  # of a cell's picture, smallest and largest
+_CAPTION = 24  # height of a caption
+_GAP = 16  # between cells, and around all
+_LETTERS = 13  # height of letters
+_LINE = 18  # height of a line in a cell without a picture
+_PAPER, _INK = (255, 255, 255, 255), (40, 44, 52, 255)
+_EMPTY, _EDGE = (243, 244, 246, 255), (222, 225, 230, 255)
+_FAILED, _FAILED_EDGE, _FAILED_INK = (253, 236, 234, 255), (214, 69, 58, 255), (150, 28, 20, 255)
+_ELLIPSIS = "…"
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CaptionedCell:
+    """A cell of a sheet.
+
+    Attributes
+    ----------
+    caption : str
+        Name, below the picture; shortened in the middle if it is too long.
+    pixels : (H, W, 4) uint8 or None
+        Picture; None for a cell with a text.
+    text : str
+        Text in a cell without a picture; its first line is a title.
+    is_failed : bool
+        Whether the cell is marked in red.
+    """
+
+    caption: str
+    pixels: Bytes | None = None
+    text: str = ""
+    is_failed: bool = False
+
+
+def captioned_sheet(cells: Sequence[CaptionedCell]) -> Bytes:
+    """Return an image of cells in rows, whose width is about 4/3 of its height.
+
+    Parameters
+    ----------
+    cells : sequence of CaptionedCell
+        At least one. Pictures are centred, and reduced already: 240 pixels wide at most.
+
+    Returns
+    -------
+    (H, W, 4) uint8
+        First row at the top, opaque.
+    """
+    from PIL import Image, ImageDraw, ImageFont
+
+    tallest = max((cell.pixels.shape[0] for cell in cells if cell.pixels is not None), default=0)
+    height = min(max(tallest, _HEIGHTS[0]), _HEIGHTS[1])
+    across, down = _WIDTH + _GAP, height + _CAPTION + _GAP
+    columns, rows = sheet_layout((4, 3), len(cells), across / down)
+    sheet = Image.new("RGBA", (columns * across + _GAP, rows * down + _GAP), _PAPER)
+    draw = ImageDraw.Draw(sheet)
+    font = ImageFont.load_default(_LETTERS)
+    for index, cell in enumerate(cells):
+        row, column = divmod(index, columns)
+        left, top = _GAP + column * across, _GAP + row * down
+        box = (left, top, left + _WIDTH - 1, top + height - 1)
+        if cell.pixels is None:
+            _draw_text(draw, cell, box, font)
+        else:
+            draw.rectangle(box, _EMPTY)
+            picture = Image.fromarray(cell.pixels[:height, :_WIDTH])
+            offset = (_WIDTH - picture.width) // 2, (height - picture.height) // 2
+            sheet.alpha_composite(picture, (left + offset[0], top + offset[1]))
+        color = _FAILED_INK if cell.is_failed else _INK
+        text = elided(cell.caption, _WIDTH, font.getlength)
+        draw.text((left, top + height + _CAPTION / 2), text, color, font, anchor="lm")
+    return np.array(sheet)
+
+
+def _draw_text(
+    draw: ImageDraw.ImageDraw, cell: CaptionedCell, box: tuple[int, int, int, int], font: Font
+) -> None:
+    """Draw a cell without a picture."""
+    fill, edge = (_FAILED, _FAILED_EDGE) if cell.is_failed else (_EMPTY, _EDGE)
+    draw.rectangle(box, fill, edge, 1)
+    left, top, right, bottom = box
+    n_lines = (bottom - top - _GAP) // _LINE
+    title, _, rest = cell.text.partition("\n")
+    lines = [title, *wrapped(rest, right - left - _GAP, n_lines - 1, font.getlength)]
+    for number, line in enumerate(lines):
+        color = _FAILED_INK if cell.is_failed and number == 0 else _INK
+        where = left + _GAP / 2, top + _GAP / 2 + number * _LINE
+        draw.text(where, line, color, font)
+
+
+def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
+    """Return a text that fits, without its middle if it is too long.
+
+    Parameters
+    ----------
+    text : str
+        One line.
+    width : float
+        Largest length.
+    length_of : callable
+        Returns the length of a text.
+
+    >>> elided("walks/subject_07.npz", 12, len)
+    'walks/…7.npz'
+    """
+    if length_of(text) <= width:
+        return text
+    for count in range(len(text) - 1, 0, -1):
+        tail = count // 2
+        short = f"{text[: count - tail]}{_ELLIPSIS}{text[len(text) - tail :]}"
+        if length_of(short) <= width:
+            return short
+    return _ELLIPSIS
+
+
+def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], float]) -> list[str]:
+    """Return the lines of a text; long words are broken, and what has no room is left out.
+
+    >>> wrapped("expected 3 numbers", 10, 2, len)
+    ['expected 3', 'numbers']
+    >>> wrapped("expected 3 numbers, found 2", 10, 2, len)
+    ['expected 3', 'numbers,…']
+    """
+    lines: list[str] = []
+    left = text.split()
+    while left:
+        if len(lines) == n_lines:
+            if lines:
+                lines[-1] = elided_end(lines[-1], width, length_of)
+            break
+        line = left.pop(0)
+        if length_of(line) > width:
+            count = max(
+                n for n in range(1, len(line) + 1) if n == 1 or length_of(line[:n]) <= width
+            )
+            left.insert(0, line[count:])
+            line = line[:count]
+        else:
+            while left and length_of(f"{line} {left[0]}") <= width:
+                line = f"{line} {left.pop(0)}"
+        lines.append(line)
+    return lines
+
+
+def elided_end(text: str, width: float, length_of: Callable[[str], float]) -> str:
+    """Return a text with an ellipsis at its end, shortened until it fits.
+
+    >>> elided_end("numbers", 7, len)
+    'number…'
+    """
+    while text and length_of(text + _ELLIPSIS) > width:
+        text = text[:-1]
+    return text + _ELLIPSIS

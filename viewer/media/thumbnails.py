@@ -1,0 +1,84 @@
+"""Small copies of images and videos, as pixels or within a page.
+
+Pillow is imported on first use.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+from pathlib import Path
+
+import numpy as np
+
+from viewer.errors import FormatError, ViewerError
+from viewer.media.image import decode_picture, is_picture
+from viewer.media.video_frames import VideoFrames
+from viewer.media.video_kinds import VIDEOS
+from viewer.rig.arrays import Bytes
+
+__all__ = ["data_uri", "thumbnail"]
+
+_QUALITY = 82  # of JPEG
+_MOST_BYTES = 256 << 20  # of a file
+
+
+def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:
+    """Return an image, or the middle frame of a video, reduced to fit into a box.
+
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    size : (int, int)
+        Largest width and height, pixels. Small images are not enlarged.
+
+    Returns
+    -------
+    (H, W, 4) uint8 or None
+        First row at the top; None if the file is neither, or unreadable.
+    """
+    pixels = _pixels(Path(path))
+    if pixels is None:
+        return None
+    from PIL import Image
+
+    picture = Image.fromarray(pixels)
+    # Premultiplied, so that transparent pixels have no influence on the colours next to them.
+    premultiplied = picture.convert("RGBa")
+    premultiplied.thumbnail(size, Image.Resampling.LANCZOS, reducing_gap=3.0)
+    return np.array(premultiplied.convert("RGBA"))
+
+
+def _pixels(path: Path) -> Bytes | None:
+    try:
+        if path.suffix.lower() in VIDEOS:
+            frames = VideoFrames(path)
+            middle = frames.n_frames // 2 / frames.rate
+            return frames.at(middle) if frames.n_frames else frames.at(0.0)
+        if not path.is_file() or path.stat().st_size > _MOST_BYTES:
+            return None
+        data = path.read_bytes()
+        return decode_picture(path, data) if is_picture(data[:16]) else None
+    except (OSError, FormatError, ViewerError):
+        return None
+
+
+def data_uri(pixels: Bytes) -> str:
+    """Return an image as a URI that contains it, as JPEG, or as PNG if it is transparent.
+
+    Parameters
+    ----------
+    pixels : (H, W, 4) uint8
+        First row at the top.
+    """
+    from PIL import Image
+
+    stream = io.BytesIO()
+    if (pixels[..., 3] == 255).all():
+        kind = "jpeg"
+        Image.fromarray(pixels).convert("RGB").save(stream, "JPEG", quality=_QUALITY)
+    else:
+        kind = "png"
+        Image.fromarray(pixels).save(stream, "PNG")
+    return f"data:image/{kind};base64,{base64.b64encode(stream.getvalue()).decode('ascii')}"

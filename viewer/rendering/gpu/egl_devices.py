@@ -1,0 +1,112 @@
+"""EGL devices: which of them are graphics cards, and which one a worker process uses."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+__all__ = ["EglDevice", "device_of_worker", "egl_devices"]
+
+_MOST = 64  # devices
+_EXTENSIONS = 0x3055
+_CUDA_DEVICE = 0x323A  # EGL_NV_device_cuda
+_SOFTWARE = "EGL_MESA_device_software"
+
+
+@dataclass(frozen=True, slots=True)
+class EglDevice:
+    """A device that EGL lists.
+
+    Attributes
+    ----------
+    index : int
+        Index in EGL's list, as ``--gpu`` takes it.
+    cuda : int or None
+        Index of the same graphics card in CUDA; None for other makers.
+    is_software : bool
+        Whether it renders on the processor.
+    """
+
+    index: int
+    cuda: int | None = None
+    is_software: bool = False
+
+
+def egl_devices() -> list[EglDevice]:
+    """Return the devices that EGL lists; none if there is no EGL or it has no such list."""
+    if not sys.platform.startswith("linux"):
+        return []
+    try:
+        egl = ctypes.CDLL("libEGL.so.1")
+    except OSError:
+        return []
+    query = _function(egl, "eglQueryDevicesEXT", ctypes.c_uint)
+    text_of = _function(egl, "eglQueryDeviceStringEXT", ctypes.c_char_p)
+    number_of = _function(egl, "eglQueryDeviceAttribEXT", ctypes.c_uint)
+    if query is None or text_of is None:
+        return []
+    handles, count = (ctypes.c_void_p * _MOST)(), ctypes.c_int()
+    if not query(_MOST, handles, ctypes.byref(count)):
+        return []
+    found = []
+    for index, handle in enumerate(handles[: count.value]):
+        device = ctypes.c_void_p(handle)
+        extensions = (text_of(device, _EXTENSIONS) or b"").decode("ascii", "replace").split()
+        value = ctypes.c_ssize_t()
+        is_cuda = "EGL_NV_device_cuda" in extensions and number_of is not None
+        if is_cuda and number_of is not None:
+            is_cuda = bool(number_of(device, _CUDA_DEVICE, ctypes.byref(value)))
+        cuda = value.value if is_cuda else None
+        found.append(EglDevice(index, cuda, _SOFTWARE in extensions))
+    return found
+
+
+def _function(egl: ctypes.CDLL, name: str, result: Any) -> Any:
+    """Return an extension function, or None if there is none."""
+    find = egl.eglGetProcAddress
+    find.restype = ctypes.c_void_p
+    address = find(name.encode())
+    return ctypes.CFUNCTYPE(result)(address) if address else None
+
+
+def device_of_worker(
+    rank: int, devices: Sequence[EglDevice] | None = None, visible: str | None = None
+) -> int | None:
+    """Return the EGL device that a worker process draws on.
+
+    The first device of ``CUDA_VISIBLE_DEVICES`` is used, which EGL itself ignores and schedulers
+    set for each job. Without it, workers take the graphics cards in turn.
+
+    Parameters
+    ----------
+    rank : int
+        Number of the worker on its machine.
+    devices : sequence of EglDevice, optional
+        Devices; those of this machine if omitted.
+    visible : str, optional
+        Value of ``CUDA_VISIBLE_DEVICES``; that of the environment if omitted.
+
+    Returns
+    -------
+    int or None
+        Index of an EGL device; None if there is no graphics card.
+    """
+    cards = [one for one in (devices or egl_devices()) if not one.is_software]
+    if visible is None:
+        visible = os.environ.get("CUDA_VISIBLE_DEVICES", "")
+    if not cards:
+        return None
+    entries = [entry.strip() for entry in visible.split(",") if entry.strip()]
+    if entries and entries[0].isdecimal():
+        known = [one for one in cards if one.cuda is not None]
+        # Where the driver counts only visible cards, it has no number for the others.
+        is_relative = len(known) == len(entries) < len(cards)
+        wanted = 0 if is_relative else int(entries[0])
+        for card in known:
+            if card.cuda == wanted:
+                return card.index
+    return cards[rank % len(cards)].index

@@ -1,0 +1,208 @@
+"""Fonts for text in pictures and panels: built in, or the system's for other scripts.
+
+Panels show Arabic and Hebrew letter by letter from left to right, because ImGui does not join or
+order letters; pictures do where Pillow has the Raqm library.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from PIL import ImageDraw, ImageFont
+
+    Font = ImageFont.ImageFont | ImageFont.FreeTypeFont
+
+__all__ = ["Typeface", "interface_font", "system_fonts"]
+
+# One font of each group is used; the first that is installed.
+_GROUPS = (
+    (
+        "NotoSansCJK-Regular.ttc",
+        "NotoSansCJKjp-Regular.otf",
+        "NotoSansCJKsc-Regular.otf",
+        "SourceHanSans-Regular.ttc",
+        "DroidSansFallbackFull.ttf",
+        "DroidSansFallback.ttf",
+        "wqy-microhei.ttc",
+        "wqy-zenhei.ttc",
+        "Hiragino Sans GB.ttc",
+        "msyh.ttc",
+        "YuGothR.ttc",
+    ),
+    ("NanumGothic.ttf", "AppleSDGothicNeo.ttc", "malgun.ttf"),
+    (
+        "NotoSansArabic-Regular.ttf",
+        "NotoNaskhArabic-Regular.ttf",
+        "GeezaPro.ttc",
+        "segoeui.ttf",
+    ),
+    ("NotoSansHebrew-Regular.ttf",),
+    ("NotoSansDevanagari-Regular.ttf", "Lohit-Devanagari.ttf", "Nirmala.ttf"),
+    ("NotoSansThai-Regular.ttf", "Loma.ttf", "LeelawUI.ttf"),
+    ("DejaVuSans.ttf", "Arial Unicode.ttf", "FreeSans.ttf"),
+)
+_NOWHERE = "\uffff"  # not a character: every font draws its box for missing glyphs
+
+
+def interface_font() -> Path | None:
+    """Return the font of the panels, which has Latin, Greek and Cyrillic letters."""
+    # Pictures are also drawn where ImGui is not imported.
+    spec = find_spec("imgui_bundle")
+    for folder in (spec.submodule_search_locations or ()) if spec is not None else ():
+        path = Path(folder, "assets", "fonts", "DroidSans.ttf")
+        if path.is_file():
+            return path
+    return None
+
+
+def system_fonts() -> tuple[Path, ...]:
+    """Return the installed fonts for scripts that the built-in fonts lack, most useful first."""
+    return _installed(tuple(_folders()))
+
+
+def _folders() -> Iterator[Path]:
+    """Yield the folders in which systems and users install fonts."""
+    if sys.platform == "win32":
+        yield Path(os.environ.get("WINDIR", "C:/Windows"), "Fonts")
+        return
+    data = os.environ.get("XDG_DATA_HOME") or "~/.local/share"
+    shared = os.environ.get("XDG_DATA_DIRS") or "/usr/local/share:/usr/share"
+    for folder in (data, *shared.split(":")):
+        yield Path(os.path.expanduser(folder), "fonts")  # noqa: PTH111  without a home, no error
+    if sys.platform == "darwin":
+        yield from map(Path, ("/Library/Fonts", "/System/Library/Fonts"))
+
+
+@cache
+def _installed(folders: tuple[Path, ...]) -> tuple[Path, ...]:
+    wanted = {name for group in _GROUPS for name in group}
+    found: dict[str, Path] = {}
+    for top in folders:
+        for folder, _, names in os.walk(top, followlinks=False):
+            for name in wanted.intersection(names):
+                path = Path(folder, name)
+                if os.access(path, os.R_OK):
+                    found.setdefault(name, path)
+    firsts = (next((found[name] for name in group if name in found), None) for group in _GROUPS)
+    return tuple(path for path in firsts if path is not None)
+
+
+class Typeface:
+    """Text of one size, each letter in the first font that has it, for pictures.
+
+    Letters that no font has are written as escape sequences.
+
+    Parameters
+    ----------
+    letters : int
+        Height of the text, pixels.
+    """
+
+    def __init__(self, letters: int) -> None:
+        from PIL import ImageFont
+
+        self.letters = letters
+        self._fonts: list[Font] = [ImageFont.load_default(letters)]
+        self._missing = [_glyph(self._fonts[0], _NOWHERE)]
+        self._found: dict[str, int] = {}
+        self._others = _opened(letters)
+
+    def length(self, text: str) -> float:
+        """Return the width of a text, pixels."""
+        return sum(font.getlength(part) for font, part in self._runs(text))
+
+    def draw(
+        self,
+        draw: ImageDraw.ImageDraw,
+        place: tuple[float, float],
+        text: str,
+        fill: object,
+        rim: int = 0,
+    ) -> None:
+        """Draw a text, with an outline of a given width in pixels.
+
+        Parameters
+        ----------
+        draw : ImageDraw
+            Draws on an image.
+        place : (float, float)
+            Left end of the base line's ascender, pixels.
+        text : str
+            One line.
+        fill : colour
+            Colour in the mode of the image.
+        rim : int
+            Width of the outline, pixels.
+        """
+        (x, top), base = place, self._fonts[0]
+        for font, part in self._runs(text):
+            # All fonts share the base line of the first.
+            y = top if font is base else top + _ascent(base) - _ascent(font)
+            draw.text((x, y), part, fill, font, stroke_width=rim)  # type: ignore[arg-type]
+            x += font.getlength(part)
+
+    def _runs(self, text: str) -> list[tuple[Font, str]]:
+        """Return the parts of a text with their fonts."""
+        runs: list[tuple[int, str]] = []
+        for letter in text:
+            number = self._font_of(letter)
+            shown = letter if number >= 0 else letter.encode("unicode_escape").decode()
+            number = max(number, 0)
+            if runs and runs[-1][0] == number:
+                runs[-1] = number, runs[-1][1] + shown
+            else:
+                runs.append((number, shown))
+        return [(self._fonts[number], part) for number, part in runs]
+
+    def _font_of(self, letter: str) -> int:
+        """Return the index of the first font with a letter, or -1; fonts are opened as needed."""
+        if letter.isascii() or letter.isspace():
+            return 0
+        if letter not in self._found:
+            self._found[letter] = next(self._fonts_with(letter), -1)
+        return self._found[letter]
+
+    def _fonts_with(self, letter: str) -> Iterator[int]:
+        number = 0
+        while number < len(self._fonts) or self._open_next():
+            if _glyph(self._fonts[number], letter) != self._missing[number]:
+                yield number
+            number += 1
+
+    def _open_next(self) -> bool:
+        font = next(self._others, None)
+        if font is None:
+            return False
+        self._fonts.append(font)
+        self._missing.append(_glyph(font, _NOWHERE))
+        return True
+
+
+def _opened(letters: int) -> Iterator[Font]:
+    """Yield further fonts in a size; files that cannot be read are skipped."""
+    from PIL import ImageFont
+
+    own = interface_font()
+    for path in (*([] if own is None else [own]), *system_fonts()):
+        try:
+            yield ImageFont.truetype(str(path), letters)
+        except OSError:
+            continue
+
+
+def _glyph(font: Font, letter: str) -> tuple[object, bytes]:
+    """Return a key of a letter's picture: fonts draw all letters that they lack alike."""
+    mask = font.getmask(letter)
+    return mask.size, bytes(mask)
+
+
+def _ascent(font: Font) -> float:
+    metrics = getattr(font, "getmetrics", None)
+    return float(metrics()[0]) if metrics is not None else 0.0

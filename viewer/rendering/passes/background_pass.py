@@ -1,0 +1,141 @@
+"""Background of an image: a colour, or a gradient that is drawn once per size and then copied."""
+
+from __future__ import annotations
+
+import moderngl
+
+from viewer.errors import ViewerError
+from viewer.rendering.gpu.draw_state import without_colors
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.target import Target
+from viewer.rendering.gpu.upload import checked
+from viewer.rendering.options import BACKGROUNDS
+
+__all__ = ["BackgroundPass", "parse_color"]
+
+_BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
+_CLEARED = {
+    "white": (1.0, 1.0, 1.0, 1.0),
+    "transparent": (0.0, 0.0, 0.0, 0.0),
+    "environment": (0.0, 0.0, 0.0, 0.0),  # drawn by another pass
+}
+_MOST_PIXELS = 1 << 23  # larger gradients are drawn each time, to save memory
+
+
+def parse_color(text: str) -> tuple[float, float, float]:
+    """Return the colour of ``#rrggbb``, sRGB from 0 to 1.
+
+    Raises
+    ------
+    ViewerError
+        If the text does not have this form.
+
+    >>> parse_color("#ff0000")
+    (1.0, 0.0, 0.0)
+    """
+    digits = text.removeprefix("#")
+    if not text.startswith("#") or len(digits) != 6 or set(digits) - set("0123456789abcdefABCDEF"):
+        names = ", ".join(f'"{name}"' for name in BACKGROUNDS)
+        raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
+    red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
+    return red, green, blue
+
+
+class BackgroundPass:
+    """Clears a target and fills it with its background.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the shader programs.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs) -> None:
+        self.context, self.programs = context, programs
+        self._gradient: moderngl.VertexArray | None = None
+        self._picture: _Picture | None = None
+        self._last_size = 0, 0
+
+    def draw(self, target: Target, background: str) -> None:
+        """Clear depth and colours of a target, which must be bound.
+
+        Parameters
+        ----------
+        target : Target
+            The target.
+        background : str
+            An entry of ``BACKGROUNDS`` or ``"#rrggbb"``; ``"environment"`` clears to transparent.
+        """
+        if background != "gradient":
+            color = _CLEARED.get(background) or (*parse_color(background), 1.0)
+            target.framebuffer.clear(*color, depth=1.0)
+            return
+        with without_colors(self.context):
+            target.framebuffer.clear(depth=1.0)
+        self.context.disable(moderngl.DEPTH_TEST | moderngl.BLEND)
+        self._draw_gradient(target)
+        self.context.enable(moderngl.DEPTH_TEST | moderngl.BLEND)
+
+    def _draw_gradient(self, target: Target) -> None:
+        size = target.size
+        if self._picture is not None and self._picture.size != size:
+            self._picture.release()
+            self._picture = None
+        # The first image of a size is often the only one: a window is resized, a file is rendered.
+        if self._picture is None and size == self._last_size and size[0] * size[1] <= _MOST_PIXELS:
+            self._picture = _Picture(self.context, self.programs, size)
+            with self.context.scope(self._picture.framebuffer):
+                self._compute()
+            target.framebuffer.use()
+        self._last_size = size
+        if self._picture is None:
+            self._compute()
+        else:
+            self._picture.copy_to(target)
+
+    def _compute(self) -> None:
+        program = self.programs.drawing("fullscreen", fragment="background")
+        set_uniforms(program, {"u_bottom": _BOTTOM, "u_top": _TOP})
+        if self._gradient is None:
+            self._gradient = self.context.vertex_array(program, [])
+        self._gradient.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free vertex array and picture."""
+        for item in (self._gradient, self._picture):
+            if item is not None:
+                item.release()
+
+
+class _Picture:
+    """An image that is copied instead of being computed again."""
+
+    def __init__(
+        self, context: moderngl.Context, programs: Programs, size: tuple[int, int]
+    ) -> None:
+        self.context, self.size = context, size
+        self._owner = Owner()
+        keep = self._owner.keep
+        with self._owner.guard():
+            what = f"a background of {size[0]} x {size[1]} pixels"
+            self._texture = keep(checked(context, context.texture(size, 4), what))
+            self.framebuffer = keep(context.framebuffer([self._texture]))
+            program = programs.drawing("fullscreen", fragment="average")
+            self._array = keep(context.vertex_array(program, []))
+
+    def copy_to(self, target: Target) -> None:
+        """Replace the colours of a target of the same size, which is bound."""
+        if not target.samples:
+            self.context.copy_framebuffer(target.framebuffer, self.framebuffer)
+            return
+        # Drawing is faster than copying where software drivers have several samples per pixel.
+        set_uniforms(self._array.program, {"u_texture": 0, "u_factor": 1.0})
+        self._texture.use(0)
+        self._array.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free everything."""
+        self._owner.release()

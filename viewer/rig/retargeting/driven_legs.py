@@ -1,0 +1,295 @@
+"""Legs of a driven figure and of the motion that drives it, in every frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.foot_lock import legs_of
+from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.leg_ik import Leg, reach
+from viewer.rig.figure import Figure
+from viewer.rig.inspection.soles import Soles, extent, soles_of_feet
+from viewer.rig.motion.evaluation import rest_translations_of
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.motion.timing import Timing
+from viewer.rig.retargeting.chain_worlds import Chains, chain_worlds, chains_to
+from viewer.rig.retargeting.leg_chains import animal_legs
+from viewer.rig.retargeting.rest_poses import rest_of
+from viewer.rig.retargeting.retarget import Retargeted
+from viewer.rig.retargeting.source_contacts import FootPath
+from viewer.rig.scene import figure_pose
+from viewer.rig.shape import shaped
+
+__all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
+
+_ALIKE = 1e-4  # relative to the body
+_STEEP = 0.9  # sine of the steepest foot of somebody who stands
+
+
+@dataclass(frozen=True, slots=True)
+class LegPair:
+    """A leg of the figure, and the joints of the source's foot that drives it.
+
+    Attributes
+    ----------
+    leg : Leg
+        Joints of the figure.
+    hip, ankle, toe : int
+        Joints of the source; ankle and toe are equal if its foot has no ball.
+    is_digitigrade : bool
+        Whether the foot stands on its toes, as that of an animal, and never on its heel.
+    """
+
+    leg: Leg
+    hip: int
+    ankle: int
+    toe: int
+    is_digitigrade: bool = False
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrivenLegs:
+    """Legs of a driven figure.
+
+    Attributes
+    ----------
+    chains : Chains
+        Joints of the legs, of the feet, and above them.
+    legs : tuple of Leg
+        The legs, as indices into ``chains``.
+    soles : Soles
+        Soles of the feet, as indices into ``chains``.
+    heels : (L, 4)
+        A point of the sole below each ankle, in the ankle's space, homogeneous.
+    level : (L, 3)
+        The direction that points up in a standing foot, in the ankle's space.
+    rests : (2, J, 3)
+        Rest translations and scales of the skeleton.
+    extensions : (L,)
+        Distance from hip to ankle in the rest pose, as a fraction of the leg's length.
+    size : float
+        About the height of the body.
+    clearance : float
+        Height of the balls above the soles in the rest pose.
+    """
+
+    chains: Chains
+    legs: tuple[Leg, ...]
+    soles: Soles
+    heels: Floats
+    level: Floats
+    rests: Floats
+    extensions: Floats
+    size: float
+    clearance: float
+
+    def worlds(self, clip: SampledClip) -> Floats:
+        """Return the world matrices of the chains: (N, K, 4, 4)."""
+        return chain_worlds(clip, self.chains, *self.rests)
+
+    def heights(self, worlds: Floats, up: Floats) -> Floats:
+        """Return the height of the lowest point of each foot: (N, L)."""
+        scale = float(np.linalg.norm(worlds[0, self.legs[0].ankle, :3, 0]))
+        return self.soles.heights(worlds, np.append(up, 0.0), scale)
+
+    def facing(self, worlds: Floats, up: Floats) -> Floats:
+        """Return the cosine of the angle between each sole and the ground: (N, L)."""
+        ankles = worlds[:, [leg.ankle for leg in self.legs], :3, :3]
+        normals = np.einsum("nlab,lb->nla", ankles, self.level)
+        return normals @ up / np.linalg.norm(normals, axis=2)
+
+    def straightness(self, worlds: Floats) -> Floats:
+        """Return the distance from hip to ankle relative to that in the rest pose: (N, L)."""
+        return _extensions(worlds, self.legs) / self.extensions
+
+    def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
+        """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""
+        ankles = [worlds[:, leg.ankle, :3, 3] for leg in self.legs]
+        return [
+            (toe - ankle, heel - ankle)
+            for ankle, (toe, heel) in zip(ankles, self.feet(worlds), strict=True)
+        ]
+
+    def feet(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
+        """Return the paths of the balls and the heels of all feet: (N, 3) each."""
+        return [
+            (worlds[:, leg.toe, :3, 3], worlds[:, leg.ankle, :3] @ heel)
+            for leg, heel in zip(self.legs, self.heels, strict=True)
+        ]
+
+
+def spans_of(timing: Timing) -> list[tuple[int, int]]:
+    """Return the ranges of present frames as ranges of rows, for rows in the order of frames."""
+    lengths = np.array([b - a for a, b in runs_of(timing.present)], dtype=np.intp)
+    stops = np.cumsum(lengths)
+    return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
+
+
+def leg_pairs(found: Retargeted, figure: Figure) -> list[LegPair]:
+    """Return the legs of the figure whose hips and ankles are driven, left before right."""
+    source, skeleton = found.source.figure.require_skeleton(), figure.require_skeleton()
+    partners, up = found.matches.partners, np.eye(3)["xyz".index(figure.up)]
+    animal = animal_legs(skeleton.parents, rest_of(skeleton, np.eye(3), figure.up).points, up)
+    toes = {leg.ankle: leg.toe for leg in legs_of(source)}
+    pairs = []
+    for leg in animal or legs_of(skeleton):
+        hip, ankle, toe = (int(partners[joint]) for joint in (leg.hip, leg.ankle, leg.toe))
+        if min(hip, ankle) < 0:
+            continue
+        chosen = (toe if toe >= 0 else ankle) if animal else toes.get(ankle, ankle)
+        pairs.append(LegPair(leg, hip, ankle, chosen, bool(animal)))
+    return pairs
+
+
+def driven_legs(
+    figure: Figure, clip: SampledClip, legs: list[Leg], up: Floats
+) -> DrivenLegs | None:
+    """Return the legs of a figure; None if they cannot be solved.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton.
+    clip : SampledClip
+        Its motion.
+    legs : list of Leg
+        The legs.
+    up : (3,)
+        The up axis of the figure.
+    """
+    skeleton = figure.require_skeleton()
+    weights = figure_pose(figure).shape_weights
+    if clip.shape_weights is not None:
+        weights = clip.shape_weights[0]
+    body = shaped(figure, weights)
+    soles = soles_of_feet(body, [[leg.toe, leg.ankle] for leg in legs], figure.is_attached)
+    chains = chains_to(skeleton, [*(leg.toe for leg in legs), *soles.movers])
+    constrained = [each.joint for each in skeleton.constraints]
+    if (chains.place[constrained] >= 0).any():
+        return None
+    rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
+    world = chain_worlds(still, chains, *rests)[0]
+    place = chains.place
+    own = tuple(
+        Leg(*(int(place[joint]) for joint in (leg.hip, leg.knee, leg.ankle, leg.toe)))
+        for leg in legs
+    )
+    moved = replace(soles, joints=place[soles.joints], movers=place[soles.movers])
+    ankles = world[[leg.ankle for leg in own]]
+    floor = extent(body)[0]
+    below = ankles[:, :3, 3] - (ankles[:, :3, 3] @ up - floor)[:, None] * up
+    inverse = np.linalg.inv(ankles)
+    heels = np.einsum("lab,lb->la", inverse, np.append(below, np.ones((len(own), 1)), axis=1))
+    level = np.einsum("lab,b->la", inverse[:, :3, :3], up)
+    toes = world[[leg.toe for leg in own], :3, 3] @ up
+    extensions, size = _extensions(world[None], own)[0], _size(world, own)
+    clearance = float(toes.mean() - floor)
+    return DrivenLegs(chains, own, moved, heels, level, rests, extensions, size, clearance)
+
+
+def _extensions(worlds: Floats, legs: tuple[Leg, ...]) -> Floats:
+    """Return the distances from hips to ankles as fractions of the legs' lengths: (N, L)."""
+    result = np.empty((len(worlds), len(legs)))
+    for number, leg in enumerate(legs):
+        hips, knees, ankles = (worlds[:, j, :3, 3] for j in (leg.hip, leg.knee, leg.ankle))
+        distance = np.linalg.norm(ankles - hips, axis=1)
+        result[:, number] = distance / np.maximum(reach(hips, knees, ankles), 1e-30)
+    return result
+
+
+def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
+    """Return about the height of a body, twice the length of its longest leg."""
+    points = world[:, :3, 3]
+    lengths = [
+        np.linalg.norm(points[leg.knee] - points[leg.hip])
+        + np.linalg.norm(points[leg.ankle] - points[leg.knee])
+        for leg in legs
+    ]
+    return 2.0 * float(max(lengths))
+
+
+def has_source_proportions(
+    found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
+) -> bool:
+    """Return whether the legs of a figure are as long as those of the source, as scaled.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    pairs : list of LegPair
+        The legs.
+    size : float
+        About the height of the figure.
+    """
+    partners = found.matches.partners
+    target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
+    joints = [
+        joint
+        for pair in pairs
+        for joint in (pair.leg.hip, pair.leg.knee, pair.leg.ankle, pair.leg.toe)
+        if partners[joint] >= 0
+    ]
+    bones = []
+    for skeleton, chosen in ((target, joints), (source, partners[joints])):
+        points = rest_of(skeleton, np.eye(3), "y").points[chosen]
+        bones.append(np.linalg.norm(np.diff(points, axis=0), axis=1))
+    return bool(np.abs(bones[0] - found.scale * bones[1]).max() < _ALIKE * size)
+
+
+def foot_paths(
+    found: Retargeted,
+    clip: SampledClip,
+    pairs: list[LegPair],
+    vectors: list[tuple[Floats, Floats]],
+    up: Floats,
+) -> list[FootPath]:
+    """Return the paths of the source's feet, in the axes and the unit of the figure.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    clip : SampledClip
+        Motion of the source, its rows in the order of the frames.
+    pairs : list of LegPair
+        The legs.
+    vectors : list of ((N, 3), (N, 3))
+        From the ankles of the figure to its balls and heels: they replace those of a source that
+        has no balls, or no standing rest pose.
+    up : (3,)
+        The up axis.
+    """
+    skeleton = found.source.figure.require_skeleton()
+    chains = chains_to(
+        skeleton, [joint for pair in pairs for joint in (pair.hip, pair.ankle, pair.toe)]
+    )
+    rests = np.stack([skeleton.rest_translations, skeleton.rest_scales])
+    still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
+    rest = chain_worlds(still, chains, *rests)[0]
+    world = chain_worlds(clip, chains, *rests)
+    axes, result = found.scale * found.to_target, []
+    for pair, own in zip(pairs, vectors, strict=True):
+        ends = (pair.hip, pair.ankle, pair.toe)
+        hip, ankle, toe = (int(chains.place[joint]) for joint in ends)
+        above = world[:, hip, :3, 3] @ axes.T
+        place, ball = (world[:, joint, :3, 3] @ axes.T for joint in (ankle, toe))
+        if pair.is_digitigrade:
+            ball = ball if toe != ankle else place + own[0]
+            result.append(FootPath(ball, ball, above))
+            continue
+        upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
+        height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
+        length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
+        if not 0.0 < height < _STEEP * length:
+            result.append(FootPath(place + own[0], place + own[1], above))
+            continue
+        heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
+        result.append(FootPath(ball, heel @ axes.T, above))
+    return result

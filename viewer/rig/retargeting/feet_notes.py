@@ -1,0 +1,48 @@
+"""Messages about the feet of driven figures."""
+
+from __future__ import annotations
+
+from viewer.diagnostics import Diagnostic
+from viewer.rig.figure import Figure
+from viewer.rig.retargeting.planted_feet import PlantedFeet
+from viewer.rig.retargeting.retarget import Retargeted
+from viewer.rig.scalars import length_text
+
+__all__ = ["feet_notes"]
+
+_ROUNDING = 1e-6  # relative to the body; smaller lengths are shown as 0
+
+
+def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
+    """Return what planting the feet changed.
+
+    Parameters
+    ----------
+    changes : PlantedFeet or None
+        The changes.
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    """
+    if changes is None:
+        return []
+    called = {"motion": found.source.figure.name, "figure": figure.name}
+    if not changes.is_better:
+        key = "F007.feet-kept" if changes.n_contacts else "F007.feet-no-contacts"
+        return [Diagnostic(key, values=called)]
+
+    def text(length: float) -> str:
+        return length_text(figure, length if length > _ROUNDING * changes.size else 0.0)
+
+    values = {
+        **called,
+        "n": changes.n_contacts,
+        "source": text(changes.source),
+        "before": text(changes.before),
+        "after": text(changes.after),
+        "gap_before": text(changes.gap_before),
+        "gap": text(changes.gap_after),
+        "lowered": text(changes.lowered) if changes.lowered > _ROUNDING * changes.size else "",
+    }
+    return [Diagnostic("F007.feet-planted", values=values)]

@@ -1,0 +1,153 @@
+"""Where and when the feet of a driven figure must stand."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.leg_solving import falling
+from viewer.rig.retargeting.source_contacts import (
+    Contact,
+    FootPath,
+    foot_contacts,
+    ground_level,
+    step_height,
+)
+
+__all__ = ["FootPlan", "foot_plan"]
+
+# Cosine of the angle between the sole and the ground: nothing is held up to the first value, and
+# everything from the second one on.
+_ON_SOLE = (-0.1, 0.3)
+_SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootPlan:
+    """Contacts of all feet, and the heights of the ground.
+
+    Attributes
+    ----------
+    feet : list of FootPath
+        Paths of the source's feet.
+    contacts : list of list of Contact
+        Contacts of each foot, in time order.
+    grounds : list of list of float
+        Height of the ground under the figure in each contact.
+    spans : list of (int, int)
+        Ranges of rows without gaps.
+    rate : float
+        Rows per second.
+    size : float
+        About the height of the body.
+    up : (3,)
+        The up axis.
+    """
+
+    feet: list[FootPath]
+    contacts: list[list[Contact]]
+    grounds: list[list[float]]
+    spans: list[tuple[int, int]]
+    rate: float
+    size: float
+    up: Floats
+
+    def stances(self, foot: int) -> Iterator[tuple[Contact, slice, float]]:
+        """Return the contacts of a foot, their rows, and the heights of the ground."""
+        for contact, ground in zip(self.contacts[foot], self.grounds[foot], strict=True):
+            yield contact, slice(contact.start, contact.stop), ground
+
+    def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
+        """Return how a standing foot moves horizontally from row to row.
+
+        Parameters
+        ----------
+        points : ((N, 3), (N, 3))
+            Paths of the ball and the heel.
+        contact : Contact
+            The contact, which chooses one of them in each row.
+        """
+        rows = slice(contact.start, contact.stop)
+        toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
+        moved = np.where(contact.on_toe[:, None], toe, heel)
+        return moved - (moved @ self.up)[:, None] * self.up
+
+    def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
+        """Return the distance that balls and heels slide while they stand, in total."""
+        total = 0.0
+        for points, contacts in zip(feet, self.contacts, strict=True):
+            for contact in contacts:
+                total += float(np.linalg.norm(self.steps(points, contact), axis=1).sum())
+        return total
+
+    def holds(self, facing: Floats) -> Floats:
+        """Return how far the sole of each foot is held on the ground, 0 to 1: (N, L).
+
+        Parameters
+        ----------
+        facing : (N, L)
+            Cosine of the angle between each sole and the ground.
+        """
+        result = np.zeros_like(facing)
+        for foot in range(len(self.contacts)):
+            for contact, rows, _ in self.stances(foot):
+                result[rows, foot] = contact.hold
+        return result * falling((_ON_SOLE[1] - facing) / (_ON_SOLE[1] - _ON_SOLE[0]))
+
+    def gap(self, heights: Floats, facing: Floats) -> float:
+        """Return the largest distance of a standing sole from the ground.
+
+        ``heights``: of the soles, (N, L). ``facing``: as for ``holds``.
+        """
+        stands, largest = self.holds(facing) >= 1.0, 0.0
+        for foot in range(len(self.contacts)):
+            for _, rows, ground in self.stances(foot):
+                gaps = np.abs(heights[rows, foot] - ground)[stands[rows, foot]]
+                largest = max(largest, float(gaps.max(initial=0.0)))
+        return largest
+
+    def floor(self, foot: int) -> Floats:
+        """Return the height below which a foot with contacts must not sink: (N,).
+
+        This is the lower ground of the contacts before and after. Where the source's own foot is
+        lower, its ground is.
+        """
+        contacts, path = self.contacts[foot], self.feet[foot]
+        rows = np.arange(len(path.toe))
+        after = np.searchsorted([contact.start for contact in contacts], rows, side="right")
+        before = np.maximum(after - 1, 0)
+        after = np.minimum(after, len(contacts) - 1)
+        levels = np.array(self.grounds[foot])
+        stands = np.array([contact.height for contact in contacts])
+        lowest = np.minimum(levels[before], levels[after])
+        sunk = np.minimum(stands[before], stands[after]) - path.lowest(self.up)
+        return lowest - np.maximum(sunk - _SUNK * self.size, 0.0)
+
+
+def foot_plan(
+    feet: list[FootPath],
+    spans: list[tuple[int, int]],
+    rate: float,
+    shape: tuple[float, float],
+    up: Floats,
+) -> FootPlan:
+    """Return the contacts of the source, and the heights of the ground under the figure.
+
+    Parameters
+    ----------
+    feet, spans, rate, up
+        As in ``FootPlan``.
+    shape : (float, float)
+        About the height of the figure, and the height of its balls above its soles at rest.
+    """
+    size, clearance = shape
+    contacts = foot_contacts(feet, spans, rate, size, up)
+    if not any(contacts):
+        return FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
+    level, is_usual = ground_level(contacts, size, clearance)
+    ground = 0.0 if is_usual else level - clearance
+    grounds = [[ground + step_height(one, level, size) for one in foot] for foot in contacts]
+    return FootPlan(feet, contacts, grounds, spans, rate, size, up)

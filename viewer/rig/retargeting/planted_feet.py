@@ -1,0 +1,156 @@
+"""Feet of driven figures, planted where those of the source stand (after Kovar et al. 2002).
+
+Retargeting keeps the directions of limbs, so that feet slide and sink where proportions differ. In
+a contact of the source, the ball or the heel of the figure's foot stays at one place and its sole
+on the ground; before and after, the correction fades. Hips and knees rotate to reach the ankles,
+and the body is lowered where legs are too short.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import cast
+
+import numpy as np
+
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.cleanup.frame_rows import in_frame_order
+from viewer.rig.cleanup.leg_solving import leg_rotations, lowering
+from viewer.rig.figure import Figure
+from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.driven_legs import (
+    DrivenLegs,
+    driven_legs,
+    foot_paths,
+    has_source_proportions,
+    leg_pairs,
+    spans_of,
+)
+from viewer.rig.retargeting.foot_plan import FootPlan, foot_plan
+from viewer.rig.retargeting.foot_shifts import foot_shifts
+from viewer.rig.retargeting.retarget import Retargeted
+
+__all__ = ["PlantedFeet", "plant_feet"]
+
+_EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
+_ROUNDING = 1e-6  # relative to the body
+
+
+@dataclass(frozen=True, slots=True)
+class PlantedFeet:
+    """Changes made by planting feet.
+
+    Attributes
+    ----------
+    n_contacts : int
+        Number of times a foot stands.
+    source, before, after : float
+        Distance that feet slide while they stand, in total: in the source, scaled to the figure,
+        and in the figure; figure units.
+    gap_before, gap_after : float
+        Largest height of a standing sole above or below the ground.
+    lowered : float
+        Largest distance by which the body was lowered.
+    size : float
+        About the height of the body.
+    """
+
+    n_contacts: int = 0
+    source: float = 0.0
+    before: float = 0.0
+    after: float = 0.0
+    gap_before: float = 0.0
+    gap_after: float = 0.0
+    lowered: float = 0.0
+    size: float = 1.0
+
+    @property
+    def is_better(self) -> bool:
+        """Whether feet slide less or are nearer to the ground, and neither is worse."""
+        slack = _ROUNDING * self.size
+        slides, gap = self.after - self.before, self.gap_after - self.gap_before
+        return max(slides, gap) <= slack and min(slides, gap) < -slack
+
+
+def plant_feet(
+    found: Retargeted, figure: Figure, hangs: bool = False
+) -> tuple[SampledClip, PlantedFeet | None]:
+    """Return the motion of a driven figure with its feet planted.
+
+    Parameters
+    ----------
+    found : Retargeted
+        The retargeting.
+    figure : Figure
+        The driven figure.
+    hangs : bool
+        Whether the motion's up axis points down.
+
+    Returns
+    -------
+    clip : SampledClip
+        The motion; unchanged if it would not become better.
+    changes : PlantedFeet or None
+        What was changed; None if the figure or the source has no legs of known names, or the
+        figure has the source's proportions.
+    """
+    pairs = leg_pairs(found, figure)
+    rest_up = np.eye(3)["xyz".index(figure.up)]
+    up = -rest_up if hangs else rest_up
+    clip = cast("SampledClip", in_frame_order(found.clip))
+    body = driven_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
+    if body is None or clip.n_rows == 0:
+        return found.clip, None
+    if has_source_proportions(found, figure, pairs, body.size):
+        return found.clip, None
+    source = cast("SampledClip", in_frame_order(found.source.clip))
+    worlds = body.worlds(clip)
+    feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
+    timing, shape = clip.timing, (body.size, body.clearance)
+    plan = foot_plan(feet, spans_of(timing), timing.frame_rate, shape, up)
+    if not any(plan.contacts):
+        return found.clip, PlantedFeet()
+    planted, lowered = _planted(clip, body, worlds, plan)
+    after = body.worlds(planted)
+    gaps = [plan.gap(body.heights(each, up), body.facing(each, up)) for each in (worlds, after)]
+    changes = PlantedFeet(
+        sum(map(len, plan.contacts)),
+        plan.slide([(foot.toe, foot.heel) for foot in feet]),
+        plan.slide(body.feet(worlds)),
+        plan.slide(body.feet(after)),
+        gaps[0],
+        gaps[1],
+        lowered,
+        body.size,
+    )
+    return (planted if changes.is_better else found.clip), changes
+
+
+def _planted(
+    clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan
+) -> tuple[SampledClip, float]:
+    """Return the corrected motion, and how far the body was lowered."""
+    up, joints = plan.up, body.chains.joints
+    heights, facing = body.heights(worlds, up), body.facing(worlds, up)
+    straight = body.straightness(worlds)
+    shifts, sway = foot_shifts(plan, body.feet(worlds), heights, facing, straight)
+    moves = [shift - sway for shift in shifts]
+    lowered = lowering(worlds[..., :3, 3], body.legs, moves, plan.rate, up, _EXTENDED)
+    drop = sway - lowered[:, None] * up
+    rotations = clip.rotations.copy()
+    rotations[:, joints] = leg_rotations(
+        rotations[:, joints], worlds, body.chains.parents, body.legs, drop, shifts
+    )
+    moved = _translated(clip, drop, joints[body.chains.parents < 0])
+    return replace(moved, rotations=rotations), float(lowered.max(initial=0.0))
+
+
+def _translated(clip: SampledClip, drop: Floats, roots: Ints) -> SampledClip:
+    """Return a motion of the whole body moved by offsets (N, 3)."""
+    if clip.figure_translations is not None:
+        return replace(clip, figure_translations=clip.figure_translations + drop)
+    shifts = np.zeros_like(clip.rotations[..., :3])
+    if clip.translations is not None:
+        shifts += clip.translations
+    shifts[:, roots] += drop[:, None]
+    return replace(clip, translations=shifts)

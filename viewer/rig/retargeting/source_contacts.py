@@ -1,0 +1,190 @@
+"""Contacts of the feet with the ground in a motion that drives a figure.
+
+A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
+moves slowly and is no higher than the other point of the foot; both with hysteresis. A foot stands
+only if, at some time in the contact, it is the lowest foot, not one that is held still in the air,
+and if it is below its hip, not beside it as that of somebody who lies. So the ground need not be
+flat: every contact has its own height, as on stairs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.foot_contacts import mean_speeds
+from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.cleanup.leg_solving import falling
+
+__all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
+
+# Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
+_SLOW, _FAST = 0.08, 0.2  # per second: a contact begins, and ends
+_LOW, _HIGH = 0.015, 0.025  # above the lower point of the foot: a contact begins, and ends
+_LOWEST = 0.02  # a foot this far above the other one may be the lowest
+_UPRIGHT = 0.3  # sine of the slope from the heel to the hip of somebody who does not lie
+_SHORTEST = 0.1  # seconds
+_LEVEL = 0.015  # heights this close are one level
+_GROUND = (-0.015, 0.06)  # heights of feet that stand on a ground at height 0
+_SIMILAR = 1.0 / 3.0  # fraction of the longest duration
+_TILTED = 0.04  # height of the heel above the ball, or of the ball above the heel
+_TIPTOE = 0.07  # the ball of a foot on tiptoe is at most this far above the ground
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootPath:
+    """Path of a foot of the source, in the axes and the unit of the driven figure.
+
+    Attributes
+    ----------
+    toe, heel : (N, 3)
+        Positions of the ball and of a point below the ankle; equal if there is no ball.
+    hip : (N, 3)
+        Positions of the hip.
+    """
+
+    toe: Floats
+    heel: Floats
+    hip: Floats
+
+    def lowest(self, up: Floats) -> Floats:
+        """Return the height of the lower one of both points: (N,)."""
+        return np.minimum(self.toe @ up, self.heel @ up)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Contact:
+    """A foot that stands.
+
+    Attributes
+    ----------
+    start, stop : int
+        Half-open range of rows.
+    on_toe : (N,)
+        Rows of the range in which the ball stands; in the others only the heel does.
+    hold : (N,)
+        1 in rows in which the foot is slow, less where the contact begins and ends.
+    height : float
+        Height of the foot's lower point.
+    tilt : float
+        Height of the heel above the ball.
+    """
+
+    start: int
+    stop: int
+    on_toe: Bools
+    hold: Floats
+    height: float
+    tilt: float
+
+
+def foot_contacts(
+    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+) -> list[list[Contact]]:
+    """Return the contacts of every foot, in time order.
+
+    Parameters
+    ----------
+    feet : sequence of FootPath
+        The feet.
+    spans : sequence of (int, int)
+        Ranges of rows without gaps.
+    rate : float
+        Rows per second.
+    size : float
+        About the height of the body.
+    up : (3,)
+        The up axis.
+    """
+    lows = np.array([foot.lowest(up) for foot in feet])
+    result = []
+    for number, foot in enumerate(feet):
+        others = np.delete(lows, number, axis=0)
+        is_lowest = (lows[number] < others + _LOWEST * size).all(axis=0)
+        found = []
+        for first, last in spans:
+            part = slice(first, last)
+            (toe, heel), speeds = _stands(foot, part, lows[number], rate, size, up)
+            hold = falling((np.where(toe, *speeds) / size - _SLOW) / (_FAST - _SLOW))
+            for a, b in runs_of(toe | heel):
+                rows = slice(first + a, first + b)
+                if b - a < _shortest(rate) or not is_lowest[rows].any():
+                    continue
+                slow = hold[a:b] >= 1.0
+                legs = (foot.hip[rows] - foot.heel[rows])[slow]
+                if np.median(legs @ up - _UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+                    continue
+                height = float(np.median(lows[number, rows][slow]))
+                tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
+                found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
+        result.append(found)
+    return result
+
+
+def _shortest(rate: float) -> int:
+    return max(2, round(_SHORTEST * rate))
+
+
+def _stands(
+    foot: FootPath, part: slice, lows: Floats, rate: float, size: float, up: Floats
+) -> tuple[list[Bools], list[Floats]]:
+    """Return the rows of a part in which the ball and the heel are in contact, and their speeds."""
+    found, paces = [], []
+    for points in (foot.toe[part], foot.heel[part]):
+        above = points @ up - lows[part]
+        speeds = mean_speeds(points, rate)
+        begins = (above < _LOW * size) & (speeds < _SLOW * size)
+        lasts = (above < _HIGH * size) & (speeds < _FAST * size)
+        stands = np.zeros(len(points), dtype=np.bool_)
+        for a, b in runs_of(lasts):
+            if b - a >= _shortest(rate) and begins[a:b].any():
+                stands[a:b] = True
+        found.append(stands)
+        paces.append(speeds)
+    return found, paces
+
+
+def ground_level(
+    contacts: Sequence[Sequence[Contact]], size: float, clearance: float
+) -> tuple[float, bool]:
+    """Return the height of feet on the ground, and whether the ground is at height 0.
+
+    This is the height at which feet stand longest, or one with a similar duration at which they
+    stand on a ground at height 0, as on the lowest step of stairs.
+
+    Parameters
+    ----------
+    contacts : sequence of sequence of Contact
+        Contacts of every foot, at least one.
+    size : float
+        About the height of the body.
+    clearance : float
+        Probable height of a standing foot's lower point above the ground.
+    """
+    every = [contact for foot in contacts for contact in foot]
+    heights = np.array([contact.height for contact in every])
+    rows = np.array([contact.stop - contact.start for contact in every])
+    near = np.abs(heights[:, None] - heights) < _LEVEL * size
+    counts = near @ rows
+    is_usual = (heights > _GROUND[0] * size) & (heights < _GROUND[1] * size)
+    is_usual &= counts >= _SIMILAR * counts.max()
+    best = int(counts.argmax())
+    if is_usual.any():
+        best = int(np.where(is_usual, np.abs(heights - clearance), np.inf).argmin())
+    order = np.argsort(heights[near[best]])
+    passed = np.cumsum(rows[near[best]][order])
+    middle = int(np.searchsorted(passed, 0.5 * passed[-1]))
+    return float(heights[near[best]][order][middle]), bool(is_usual.any())
+
+
+def step_height(contact: Contact, level: float, size: float) -> float:
+    """Return the height of the ground under a contact above the level of most contacts.
+
+    Small differences count as none, and so does the height of a foot on tiptoe.
+    """
+    height = contact.height - level
+    is_tiptoe = abs(contact.tilt) > _TILTED * size and abs(height) < _TIPTOE * size
+    return 0.0 if is_tiptoe or abs(height) < _LEVEL * size else height
