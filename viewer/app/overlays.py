@@ -73,7 +73,8 @@ def _hint(state: AppState) -> tuple[str, tuple[float, float]]:
     grid = f"grid {step:g} {unit}   " if state.options.grid else ""
     text = f"{grid}{key_name(state, 'H or ?')} keys"
     size = imgui.calc_text_size(text)
-    return text, (x + width - size.x - _GAP, y + height - size.y - 8.0)
+    one = imgui.get_style().font_scale_dpi
+    return text, (x + width - size.x - _GAP * one, y + height - size.y - 0.8 * _GAP * one)
 
 
 class _Progress(NamedTuple):

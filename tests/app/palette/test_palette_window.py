@@ -103,3 +103,17 @@ def test_letter_typed_before_the_palette_has_the_focus_runs_no_action(hand):
     hand.io.add_key_event(imgui.Key.w, True)
     hand.step(4)
     assert not hand.state.options.wireframe
+
+
+@pytest.mark.parametrize("frames", [1, 2, 3])
+def test_letters_typed_while_the_palette_opens_are_kept(hand, frames):
+    hand.io.add_key_event(imgui.Key.mod_ctrl, True)
+    for is_down in (True, False):
+        hand.io.add_key_event(imgui.Key.p, is_down)
+    hand.io.add_key_event(imgui.Key.mod_ctrl, False)
+    hand.step(frames)
+    for letter in "wireframe":
+        hand.io.add_input_character(ord(letter))
+        hand.step(1)
+    hand.step(3)
+    assert hand.state.of(Palette).query == "wireframe"

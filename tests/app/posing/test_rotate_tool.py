@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from app.posing_rigs import arm_figure
@@ -40,6 +42,16 @@ def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
     found = rings(posed_joint(actor, 0), actor.pose, "local", view)
     assert [(ring.color, ring.dof) for ring in found] == [(0, -1), (1, -1), (2, -1), (3, -1)]
     assert_allclose([ring.axis for ring in found], [*np.eye(3), [0, 0, 1]], atol=1e-9)
+
+
+def test_rings_and_their_reach_scale_with_the_interface() -> None:
+    actor = Actor(arm_figure())
+    view = replace(frame(), scale=2.0)
+    posed = posed_joint(actor, 0)
+    found = rings(posed, actor.pose, "local", view)
+    for inside, is_held in ((2 * RADIUS - 12, True), (2 * RADIUS - 16, False), (RADIUS, False)):
+        held = grab_ring(found[2:3], posed.center, view, spot(0.4, inside))
+        assert (held is not None) == is_held
 
 
 @pytest.mark.parametrize(

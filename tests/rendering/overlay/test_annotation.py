@@ -31,9 +31,9 @@ def placed(lettering, points, ranks, words=None):
 
 
 def test_letters_grow_with_the_image():
-    # 13 pixels at 720; 800 wide counts as 600 high.
-    assert letters_for((1280, 720)) == 13 and letters_for((2560, 1440)) == 26
-    assert letters_for(SIZE) == 11
+    # 17 pixels at 720; 800 wide counts as 600 high, which gives 14.2.
+    assert letters_for((1280, 720)) == 17 and letters_for((2560, 1440)) == 34
+    assert letters_for(SIZE) == 14
 
 
 def test_lower_rank_comes_first_then_the_nearer(lettering):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
 from viewer.rig.arrays import Floats
@@ -28,10 +29,13 @@ class ViewFrame:
         Scene to clip space, projection @ view.
     rect : (x, y, width, height)
         Window coordinates.
+    scale : float
+        Window coordinates per point, the unit of handles: that of the interface.
     """
 
     matrix: Floats
     rect: tuple[float, float, float, float]
+    scale: float = 1.0
 
     def project(self, points: Floats) -> Floats:
         """Return the projections of points: (..., 3) to (..., 2), NaN for those behind the eye."""
@@ -75,11 +79,11 @@ class ViewFrame:
         return near, unit(far - near)
 
     def unit_length(self, point: Floats) -> float:
-        """Return the length of one window unit at a point's depth, in scene units."""
+        """Return the length of one point of handles at a scene point's depth, in scene units."""
         seen = self.place(point)
         if seen is None:
             return 0.0
-        beside = self.at_depth_of(point, (seen[0] + 1.0, seen[1]))
+        beside = self.at_depth_of(point, (seen[0] + self.scale, seen[1]))
         return float(np.linalg.norm(beside - point))
 
     def _clip(self, place: Place, depth: float, w: float) -> Floats:
@@ -94,4 +98,5 @@ def view_frame(state: AppState) -> ViewFrame:
     x, y, width, height = state.view_rect
     rect = (x, y, max(width, 1.0), max(height, 1.0))
     projection = state.camera.projection_matrix(state.aspect, state.box)
-    return ViewFrame(projection @ state.camera.view_matrix(), rect)
+    scale = imgui.get_style().font_scale_dpi
+    return ViewFrame(projection @ state.camera.view_matrix(), rect, scale)

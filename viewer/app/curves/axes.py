@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from imgui_bundle import implot
+from imgui_bundle import imgui, implot
 
 from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
@@ -15,7 +15,16 @@ from viewer.app.curves.data import Curve
 from viewer.app.curves.state import Curves
 from viewer.rig.arrays import Floats
 
-__all__ = ["Color", "Plot", "curve_color", "factor_of", "least_height", "measured", "value_limits"]
+__all__ = [
+    "Color",
+    "Plot",
+    "curve_color",
+    "factor_of",
+    "least_height",
+    "measured",
+    "ui_scale",
+    "value_limits",
+]
 
 Color = tuple[float, float, float, float]
 
@@ -108,6 +117,11 @@ def least_height(state: AppState, curves: Sequence[Curve]) -> float:
         ),
         default=_LEAST,
     )
+
+
+def ui_scale() -> float:
+    """Return the size of a point in window coordinates, which is the scale of the interface."""
+    return float(imgui.get_style().font_scale_dpi)
 
 
 def value_limits(values: Floats, least: float) -> tuple[float, float]:

@@ -12,7 +12,15 @@ from imgui_bundle import imgui, implot
 
 from viewer.app.core.ink import faint
 from viewer.app.core.state import AppState
-from viewer.app.curves.axes import Color, Plot, factor_of, least_height, measured, value_limits
+from viewer.app.curves.axes import (
+    Color,
+    Plot,
+    factor_of,
+    least_height,
+    measured,
+    ui_scale,
+    value_limits,
+)
 from viewer.app.curves.data import Curve, sampled_points
 from viewer.app.curves.editing import set_clip_range
 from viewer.app.curves.keyed import KeyedMotion, keyed_of
@@ -115,7 +123,8 @@ def _fitting(state: AppState, curves: tuple[Curve, ...]) -> tuple[float, float, 
 
 
 def _spec(color: Color, weight: float = 1.5, flags: int = 0) -> implot.Spec:
-    return implot.Spec(line_color=color, line_weight=weight, flags=flags)
+    """Return the style of a line, whose width is in points."""
+    return implot.Spec(line_color=color, line_weight=weight * ui_scale(), flags=flags)
 
 
 def _draw_line(plot: Plot, row: int) -> None:
@@ -193,10 +202,11 @@ def _draw_range(plot: Plot) -> None:
     flags = implot.DragToolFlags_.no_fit
     if keyed_of(plot.state.actor) is None:
         flags |= implot.DragToolFlags_.no_inputs
-    moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, faint(_RANGE), 1.0, flags)
+    ink = faint(_RANGE)
+    moved, start, *_ = implot.drag_line_x(_START_ID, clip.start, ink, ui_scale(), flags)
     if moved:
         set_clip_range(plot.state, min(start, clip.end), clip.end)
-    moved, end, *_ = implot.drag_line_x(_END_ID, clip.end, faint(_RANGE), 1.0, flags)
+    moved, end, *_ = implot.drag_line_x(_END_ID, clip.end, ink, ui_scale(), flags)
     if moved:
         set_clip_range(plot.state, clip.start, max(end, clip.start))
     middle = 0.5 * (plot.limits[2] + plot.limits[3])
@@ -208,7 +218,8 @@ def _draw_time(plot: Plot) -> None:
     """Draw the current time; dragging it moves the clock by whole frames, with Alt continuously."""
     state, offset = plot.state, plot.state.actor.offset
     time = state.clock.time - offset
-    moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5, implot.DragToolFlags_.no_fit)
+    flags = implot.DragToolFlags_.no_fit
+    moved, time, *_ = implot.drag_line_x(_TIME_ID, time, _TIME, 1.5 * ui_scale(), flags)
     if moved:
         state.clock.scrub(time + offset, between=imgui.get_io().key_alt)
     plot.note("time line", time, 0.5 * (plot.limits[2] + plot.limits[3]))

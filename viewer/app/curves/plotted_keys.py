@@ -7,7 +7,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui, implot
 
-from viewer.app.curves.axes import Plot
+from viewer.app.curves.axes import Plot, ui_scale
 from viewer.app.curves.editing import (
     add_key_at,
     change_slope,
@@ -76,8 +76,8 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
     for place, time, value in chosen:
         middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
         draw_list = implot.get_plot_draw_list()
-        draw_list.add_circle_filled(middle, 6.0, imgui.get_color_u32(_CHOSEN))
-        draw_list.add_circle_filled(middle, 3.5, imgui.get_color_u32(inner))
+        draw_list.add_circle_filled(middle, 6.0 * ui_scale(), imgui.get_color_u32(_CHOSEN))
+        draw_list.add_circle_filled(middle, 3.5 * ui_scale(), imgui.get_color_u32(inner))
     implot.pop_plot_clip_rect()
 
 
@@ -88,7 +88,7 @@ def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) ->
             color = plot.color(row)
             spec = implot.Spec(
                 marker=implot.Marker_.circle,
-                marker_size=2.0,
+                marker_size=2.0 * ui_scale(),
                 marker_fill_color=color,
                 marker_line_color=color,
             )
@@ -106,7 +106,7 @@ def _draw_key(plot: Plot, place: KeyPlace, time: float, value: float) -> bool:
         time,
         value,
         plot.color(row),
-        4.5,
+        4.5 * ui_scale(),
         _FIXED,
         False,
         False,
@@ -148,10 +148,12 @@ def _draw_handle(
     end, height = time + sign * length / across, value + sign * slope * length / across
     points = implot.plot_to_pixels(time, value), implot.plot_to_pixels(end, height)
     implot.push_plot_clip_rect()
-    implot.get_plot_draw_list().add_line(points[0], points[1], imgui.get_color_u32(_HANDLE), 1.2)
+    implot.get_plot_draw_list().add_line(
+        points[0], points[1], imgui.get_color_u32(_HANDLE), 1.2 * ui_scale()
+    )
     implot.pop_plot_clip_rect()
     moved, x, y, _, hovered, held = implot.drag_point(
-        _HANDLE_ID + side, end, height, _HANDLE, 3.5, _FIXED, False, False, False
+        _HANDLE_ID + side, end, height, _HANDLE, 3.5 * ui_scale(), _FIXED, False, False, False
     )
     plot.note(f"tangent {side}", end, height)
     if moved:

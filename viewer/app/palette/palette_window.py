@@ -96,8 +96,11 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(-1.0)
     hint = "Find an action, panel, joint or figure"
+    letters = "".join(map(chr, imgui.get_io().input_queue_characters))
     palette.query = imgui.input_text_with_hint("##query", hint, palette.query)[1]
     note_item(state, "palette query")
+    if not palette.has_focus:
+        _keep_early_letters(palette, letters)
     palette.has_focus |= imgui.is_item_active()
     if palette.query != palette.matched:
         palette.shown = ranked(palette.query, [entry.text for entry in palette.known])
@@ -107,6 +110,15 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
     if imgui.is_key_pressed(_K.enter, False) or imgui.is_key_pressed(_K.keypad_enter, False):
         return palette.known[palette.shown[palette.row]] if palette.shown else None
     return chosen
+
+
+def _keep_early_letters(palette: Palette, letters: str) -> None:
+    """Add letters that were typed before the text box takes them, as on a slow machine."""
+    palette.query += letters
+    editing = imgui.internal.get_input_text_state(imgui.get_item_id())
+    if imgui.is_item_activated() and editing is not None:
+        # The text box discards the letters of the frame in which it gets the focus.
+        editing.reload_user_buf_and_move_to_end()
 
 
 def _move(palette: Palette) -> bool:

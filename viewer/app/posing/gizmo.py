@@ -39,9 +39,9 @@ __all__ = [
 ]
 
 DOT_REACH = 14.0
-"""Radius around a joint in which a click selects it, window coordinates."""
+"""Radius around a joint in which a click selects it, points."""
 
-_BESIDE = 22.0  # window coordinates around a handle within which a drag does not orbit
+_BESIDE = 22.0  # points around a handle within which a drag does not orbit
 _STILL = 2.0  # window coordinates by which the pointer may move in a click
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
@@ -107,7 +107,7 @@ def _is_beside_handle(state: AppState, place: Place) -> bool:
         found = rings(posed, state.actor.pose, posing.orientation, frame)
         return grab_ring(found, posed.center, frame, place, _BESIDE) is not None
     center = frame.place(posed.center)
-    if center is not None and _apart(center, place) <= _BESIDE:
+    if center is not None and _apart(center, place) <= _BESIDE * frame.scale:
         return True
     found_arrows = arrows(posed, posing.orientation)
     return grab_arrow(found_arrows, posed.center, frame, place, _BESIDE) is not None
@@ -170,7 +170,7 @@ def handle_at(state: AppState, frame: ViewFrame, place: Place) -> Handle | None:
     if arrow is not None:
         return MoveHandle(posed, pose, place, arrow)
     center = frame.place(posed.center)
-    if center is None or _apart(center, place) > DOT_REACH:
+    if center is None or _apart(center, place) > DOT_REACH * frame.scale:
         return None
     return _middle(state, posed, place)
 
@@ -198,9 +198,10 @@ def joint_places(state: AppState) -> Floats:
 def joint_at(state: AppState, place: Place) -> int:
     """Return the chosen actor's joint at a window position, -1 for none."""
     distances = np.linalg.norm(joint_places(state) - place, axis=1)
+    reach = DOT_REACH * view_frame(state).scale
     distances[np.isnan(distances)] = np.inf
     nearest = int(distances.argmin()) if len(distances) else -1
-    return nearest if nearest >= 0 and distances[nearest] <= DOT_REACH else -1
+    return nearest if nearest >= 0 and distances[nearest] <= reach else -1
 
 
 def choose_joint(state: AppState) -> bool:

@@ -45,21 +45,24 @@ _CHAIN = (0.45, 0.90, 0.95)
 _BEHIND = 0.28  # opacity of the far side of a ring
 _MOST_DOTS = 300  # maximum number of joints drawn as dots
 _ARC_RADIUS = 0.62  # relative to the radius of the rings
-_GAP = 10.0  # window coordinates between a ring and its text
+_GAP = 10.0  # points between a ring and its text
 
 
 class _Pen:
-    """Draws points of the scene as lines in the window."""
+    """Draws points of the scene as lines in the window; sizes are in points."""
 
     def __init__(self, frame: ViewFrame) -> None:
         self.frame, self.list = frame, imgui.get_background_draw_list()
+        self.scale = frame.scale
 
     def line(self, points: Floats, color: Color, thickness: float) -> None:
         """Draw a line through (N, 3) points, unless one of them is behind the eye."""
         seen = self.frame.project(points)
         if np.isfinite(seen).all():
             ink = imgui.get_color_u32(color)
-            self.list.add_polyline([(x, y) for x, y in seen.tolist()], ink, thickness, 0)
+            self.list.add_polyline(
+                [(x, y) for x, y in seen.tolist()], ink, thickness * self.scale, 0
+            )
 
     def fan(self, center: Floats, points: Floats, color: Color) -> None:
         """Fill the area between a point and a polyline."""
@@ -76,9 +79,9 @@ class _Pen:
             return
         ink = imgui.get_color_u32(color)
         if filled:
-            self.list.add_circle_filled(place, radius, ink)
+            self.list.add_circle_filled(place, radius * self.scale, ink)
         else:
-            self.list.add_circle(place, radius, ink, 0, 2.0)
+            self.list.add_circle(place, radius * self.scale, ink, 0, 2.0 * self.scale)
 
 
 def draw_gizmo(state: AppState) -> None:
@@ -123,16 +126,22 @@ def _draw_joints(state: AppState, pen: _Pen) -> None:
     ink, rim = imgui.get_color_u32((1.0, 1.0, 1.0, 0.75)), imgui.get_color_u32((0, 0, 0, 0.5))
     if len(seen) <= _MOST_DOTS:
         for x, y in places[seen].tolist():
-            pen.list.add_circle_filled((x, y), 3.5, rim)
-            pen.list.add_circle_filled((x, y), 2.5, ink)
+            pen.list.add_circle_filled((x, y), 3.5 * pen.scale, rim)
+            pen.list.add_circle_filled((x, y), 2.5 * pen.scale, ink)
     is_free = _drag(state) is None and not io.want_capture_mouse
     under = joint_at(state, (io.mouse_pos.x, io.mouse_pos.y)) if is_free else -1
     skeleton = state.actor.figure.skeleton
     # A click selects a joint even under a handle, which is only used by dragging.
     if under >= 0 and skeleton is not None:
         x, y = places[under].tolist()
-        pen.list.add_circle((x, y), 7.0, imgui.get_color_u32((*_HOT, 1.0)), 0, 2.0)
-        _text_box(state, pen, (x + 12.0, y - 8.0), [(joint_label(skeleton, under), (1, 1, 1, 1))])
+        hot, one = imgui.get_color_u32((*_HOT, 1.0)), pen.scale
+        pen.list.add_circle((x, y), 7.0 * one, hot, 0, 2.0 * one)
+        _text_box(
+            state,
+            pen,
+            (x + 12.0 * one, y - 8.0 * one),
+            [(joint_label(skeleton, under), (1, 1, 1, 1))],
+        )
 
 
 def _draw_arcs(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
@@ -249,15 +258,16 @@ def _draw_arrow(pen: _Pen, center: Floats, arrow: Arrow, is_hot: bool) -> None:
     ends = pen.frame.project(np.stack([center, center + LENGTH * unit * arrow.axis]))
     way = ends[1] - ends[0]
     size = float(np.linalg.norm(way))
-    if not np.isfinite(size) or size < 12.0:
+    one = pen.scale
+    if not np.isfinite(size) or size < 12.0 * one:
         return
     along, across = way / size, np.array([-way[1], way[0]]) / size
-    tip, foot = ends[1], ends[0] + 9.0 * along
-    neck = tip - 11.0 * along
+    tip, foot = ends[1], ends[0] + 9.0 * one * along
+    neck = tip - 11.0 * one * along
     ink = imgui.get_color_u32(color)
-    pen.list.add_line(tuple(foot), tuple(neck), ink, 4.0 if is_hot else 2.5)
+    pen.list.add_line(tuple(foot), tuple(neck), ink, (4.0 if is_hot else 2.5) * one)
     pen.list.add_triangle_filled(
-        tuple(tip), tuple(neck + 5.0 * across), tuple(neck - 5.0 * across), ink
+        tuple(tip), tuple(neck + 5.0 * one * across), tuple(neck - 5.0 * one * across), ink
     )
 
 
@@ -271,7 +281,8 @@ def _draw_text(state: AppState, pen: _Pen, posed: PosedJoint) -> None:
     if limits:
         lines.append((limits, (*_LIMIT, 1.0)))
     away = 1.2 * RADIUS + _GAP if state.of(Posing).tool == "rotate" else 2.0 * _GAP
-    _text_box(state, pen, (center[0] + away, center[1] - 2.0 * _GAP), lines)
+    corner = (center[0] + away * pen.scale, center[1] - 2.0 * _GAP * pen.scale)
+    _text_box(state, pen, corner, lines)
 
 
 def _text_box(

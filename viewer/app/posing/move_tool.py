@@ -36,11 +36,11 @@ __all__ = [
 ]
 
 LENGTH = 72.0
-"""Length of the arrows, window coordinates."""
+"""Length of the arrows, points."""
 
-_REACH = 7.0  # window coordinates around an arrow within which it is grabbed
-_SHORTEST = 12.0  # window coordinates: a shorter arrow points almost at the eye
-_BARE = 14.0  # window coordinates at an arrow's base that belong to the joint's handle
+_REACH = 7.0  # points around an arrow within which it is grabbed
+_SHORTEST = 12.0  # points: a shorter arrow points almost at the eye
+_BARE = 14.0  # points at an arrow's base that belong to the joint's handle
 _ITERATIONS = 40  # iterations of the solver: bounds the time per frame
 _MET = 1e-3  # smallest remaining distance that is shown, relative to the figure's size
 
@@ -134,20 +134,20 @@ def grab_arrow(
     place : (float, float)
         Position of the pointer, window coordinates.
     reach : float
-        Largest distance from the pointer, window coordinates.
+        Largest distance from the pointer, points.
     """
-    best, nearest = None, reach
+    best, nearest, scale = None, reach * frame.scale, frame.scale
     length = LENGTH * frame.unit_length(center)
     for arrow in found:
         ends = frame.project(np.stack([center, center + length * arrow.axis]))
         way = ends[1] - ends[0]
         size = float(np.linalg.norm(way))
-        if not np.isfinite(size) or size < _SHORTEST:
+        if not np.isfinite(size) or size < _SHORTEST * scale:
             continue
         x, y = np.array(place) - ends[0]
         along = float(x * way[0] + y * way[1]) / size
         across = abs(float(way[0] * y - way[1] * x)) / size
-        if _BARE < along < size + reach and across < nearest:
+        if _BARE * scale < along < size + reach * scale and across < nearest:
             best, nearest = arrow, across
     return best
 

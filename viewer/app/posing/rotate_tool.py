@@ -36,11 +36,11 @@ __all__ = [
 ]
 
 RADIUS = 78.0
-"""Radius of the rings, window coordinates."""
+"""Radius of the rings, points."""
 
 SNAP = math.radians(15.0)
 _VIEW_RADIUS = 1.2  # radius of the ring about the line of sight, relative to the others
-_REACH = 7.0  # window coordinates around a ring within which it is grabbed
+_REACH = 7.0  # points around a ring within which it is grabbed
 _FLAT = 0.25  # cosine between axis and line of sight below which a ring counts as seen edge-on
 _STEPS = 72
 
@@ -142,9 +142,9 @@ def grab_ring(
     place : (float, float)
         Position of the pointer, window coordinates.
     reach : float
-        Largest distance from the pointer, window coordinates.
+        Largest distance from the pointer, points.
     """
-    best, nearest = None, reach
+    best, nearest = None, reach * frame.scale
     length = frame.unit_length(center)
     eye = toward_eye(frame, center)
     for ring in found:
@@ -155,7 +155,7 @@ def grab_ring(
         distances, fractions = _distances(seen, np.array(place))
         directions = unit(points - center)
         if ring.color < 3:
-            distances = distances + 0.5 * _REACH * (directions[:-1] @ eye < -1e-6)
+            distances = distances + 0.5 * _REACH * frame.scale * (directions[:-1] @ eye < -1e-6)
         nearer = int(distances.argmin())
         if distances[nearer] < nearest:
             nearest = float(distances[nearer])

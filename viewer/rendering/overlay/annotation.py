@@ -28,7 +28,7 @@ __all__ = [
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default label colour, sRGB."""
 
-_LETTERS = 13.0  # height in an image of standard height, pixels
+_LETTERS = 17.0  # height in an image of standard height, pixels
 _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the start of its leader line

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["legend_pixels"]
 
 _SIZES = 9, 40  # height of letters, pixels: smallest and largest
-_LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 56.0
+_LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 46.0
 _SMALLER = 0.6  # factor to which the text height of many items may shrink
 _MOST = 0.9  # maximum fraction of the image's width and height
 # Fractions of the image's width for several columns. Figures are in the middle, so the text
