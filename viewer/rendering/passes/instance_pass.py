@@ -99,6 +99,7 @@ def draw_instances(
         "mesh",
         skin=instances.method,
         affine=instances.is_affine,
+        summed=instances.has_sums,
         materials=instances.mesh.has_materials,
         effects=view.effects.defines,
     )
@@ -126,6 +127,7 @@ def draw_instance_shapes(
         fragment=fragment,
         skin=instances.method,
         affine=instances.is_affine,
+        summed=instances.has_sums,
         materials=instances.mesh.has_materials,
     )
     instances.place(actors, view)
