@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.errors import RigError
-from viewer.loading import MotionSettings, load
+from viewer.loading import MotionSettings, begin, capturing, load, read_files
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
@@ -131,6 +131,32 @@ def test_a_joint_map_applies_to_all_people_of_a_capture(capture, hero, is_named,
         load(*files, motion=replace(settings, joint_map=bad))
     found = problem.value.diagnostic
     assert (found.key, found.path, found.line) == ("F004.mapping-joint", bad.path, 1)
+
+
+@pytest.mark.parametrize("feet", [True, False])
+def test_whole_captures_are_retargeted_once_and_growing_ones_part_by_part(
+    capture, hero, feet, monkeypatch
+):
+    calls = []
+
+    def counted(drive, figure):
+        calls.append(drive.motion.clip.n_rows)
+        return driven_clip(drive, figure)
+
+    monkeypatch.setattr(capturing, "driven_clip", counted)
+    settings = MotionSettings(model=hero, feet=feet)
+    whole = load(capture, motion=settings).actors
+    # The first frame of both people, to show something, then all frames.
+    assert calls == [1, 1, 4, 4]
+    calls.clear()
+    scene, (builder,) = begin(read_files([capture], settings=settings), settings)
+    for part in builder.parts():
+        builder.add(part)
+    assert calls == [1, 1, 3, 3] + ([4, 4] if feet else [])
+    for one, other in zip(whole, scene.actors, strict=True):
+        same = np.abs(np.einsum("nja,nja->nj", one.clip.rotations, other.clip.rotations))
+        assert_allclose(same, 1.0, rtol=0, atol=1e-9)
+        assert one.clip.timing.rows.tolist() == other.clip.timing.rows.tolist() == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("is_named", [True, False])

@@ -11,6 +11,7 @@ from batching.batch_jobs import items_called, misbehave
 from viewer.batching.attempts import FunctionJob
 from viewer.batching.engines import ENGINES, IN_FLIGHT, Limits, load_engine
 from viewer.batching.items import Item
+from viewer.errors import ViewerError
 
 JOB = FunctionJob(misbehave)
 
@@ -27,6 +28,12 @@ def test_sequential_engine_runs_items_in_order_in_this_process():
     assert [one.status for one in found] == ["done", "failed", "done"]
     assert found[1].message == "KeyError: 'left knee'" and "misbehave" in found[1].text
     assert found[0].values == found[2].values == {"process": os.getpid()}
+
+
+def test_functions_that_workers_cannot_import_are_refused():
+    job = FunctionJob(lambda item: None)
+    with pytest.raises(ViewerError, match="top level of a module, or workers=0"):
+        list(load_engine("processes").run(items_called("a"), job, Limits()))
 
 
 @pytest.mark.slow

@@ -62,6 +62,17 @@ def test_duplicates_are_used_once_and_counted(data):
     assert find_inputs(["data"]).paths[0] == "data/a.bvh"  # ends, despite the loop
 
 
+def test_outputs_of_an_earlier_run_are_no_inputs(data):
+    (data / "out" / "b").mkdir(parents=True)
+    (data / "out" / "b" / "walk9.bvh").touch()
+    for words in (["data"], ["data/**/*.bvh"]):
+        found = find_inputs(words, output="data/out")
+        assert "data/out/b/walk9.bvh" not in found.paths and "data/a.bvh" in found.paths
+        assert any("1 file in the folder of the outputs" in note for note in found.notes)
+    assert find_inputs(["data/out"], output="data/out").paths == ("data/out/b/walk9.bvh",)
+    assert "data/out/b/walk9.bvh" in find_inputs(["data"], output="data/ou").paths
+
+
 def test_names_that_exist_are_no_patterns(data):
     (data / "walk[1].bvh").touch()
     (data / "@x").touch()

@@ -2,7 +2,7 @@
 
 Rates depend on what else the machine does, so ratios are also given by processor time: what they
 would be if all cores were free, for 1,000 files. Workers start once per batch. The first argument
-is the number of files (1,000), the second that of frames per file (120).
+is the number of files (1,000), the second that of frames per file (120), the third of rounds.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def said(name: str, wall: float, work: float, goal: float) -> None:
 def main() -> None:
     """Measure interleaved rounds."""
     numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
-    count, n_frames = [*numbers, *(FILES, 120)[len(numbers) :]]
+    count, n_frames, rounds = [*numbers, *(FILES, 120, ROUNDS)[len(numbers) :]]
     os.environ["PYTHONPYCACHEPREFIX"] = CACHE.name  # for workers
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as name:
         folder = Path(name)
@@ -143,7 +143,7 @@ def main() -> None:
         converted(paths[:5], folder / "first", 0)  # imports
         works = works_of(paths, folder)
         costs: dict[str, list[Cost]] = {name: [] for name in works}
-        for _ in range(ROUNDS):
+        for _ in range(rounds):
             for name, (work, each) in works.items():
                 costs[name].append(cost(work, each))
     load = os.getloadavg()[0]

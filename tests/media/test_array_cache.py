@@ -199,7 +199,30 @@ def test_default_folder_is_that_of_platformdirs(
     import platformdirs
 
     monkeypatch.delenv("VIEWER_CACHE")
-    for value in (str(tmp_path), ""):
+    for value in (str(tmp_path), "", "  "):
         monkeypatch.setenv("XDG_CACHE_HOME", value)
         expected = Path(platformdirs.user_cache_dir("viewer", appauthor=False)) / "arrays"
         assert cache_folder() == expected
+
+
+def test_folder_may_be_relative_or_below_the_home_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("HOME", str(tmp_path))
+    for value in ("kept", "~/kept"):
+        monkeypatch.setenv("VIEWER_CACHE", value)
+        assert cache_folder() == tmp_path / "kept"
+
+
+def test_doctor_shows_the_folder_and_its_size(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from viewer.commands import doctor
+
+    slot().store(VALUES)
+    found = doctor._examine_cache().found
+    assert str(folder) in found
+    assert "1 array, 0.1 of at most 537 MB" in found
+    monkeypatch.setenv("VIEWER_CACHE", "off")
+    assert "VIEWER_CACHE" in doctor._examine_cache().found

@@ -49,6 +49,7 @@ def find_inputs(
     lists: Iterable[str] = (),
     suffixes: Collection[str] = (),
     keeps_folders: bool = False,
+    output: str = "",
 ) -> Inputs:
     """Find the inputs of a batch.
 
@@ -65,6 +66,9 @@ def find_inputs(
     keeps_folders : bool
         Whether every folder is an input. Otherwise its files are, except for recordings and
         models that consist of a folder.
+    output : str
+        Folder of the outputs. If it lies in a searched folder, its files are no inputs, as they
+        would be when a batch is resumed.
 
     Raises
     ------
@@ -72,7 +76,7 @@ def find_inputs(
         If there is no input, a file or list is missing, or a pattern or folder yields nothing.
     """
     wanted = {suffix.lower() for suffix in suffixes} or {*SUFFIXES} - {*_AMBIGUOUS}
-    search = _Search(wanted, keeps_folders)
+    search = _Search(wanted, keeps_folders, os.path.abspath(output) if output else "")
     for name in lists:
         search.add_list(name)
     for word in words:
@@ -119,14 +123,14 @@ def is_recording(folder: str | Path) -> bool:
 class _Search:
     """The paths found so far."""
 
-    def __init__(self, suffixes: set[str], keeps_folders: bool) -> None:
-        self.suffixes, self.keeps_folders = suffixes, keeps_folders
+    def __init__(self, suffixes: set[str], keeps_folders: bool, output: str) -> None:
+        self.suffixes, self.keeps_folders, self.output = suffixes, keeps_folders, output
         self.roots: list[str] = []  # folders that contain what was named
         self._found: dict[tuple[str, str], str] = {}
         self._real: dict[str, str] = {}  # real paths of folders
         self._folders: set[str] = set()
         self._n_repeated = 0
-        self._n_skipped = 0
+        self._n_skipped = self._n_outputs = 0
 
     def add_named(self, path: str) -> None:
         """Add a file, or a folder and what is in it."""
@@ -140,7 +144,8 @@ class _Search:
         self.roots.append(os.path.abspath(path))
         before = self._n_seen
         for each, is_folder in self._inside(path, set()):
-            self._add(each, is_folder)
+            if not self._is_output(each):
+                self._add(each, is_folder)
         if self._n_seen == before:
             raise ViewerError(
                 f"{printable(path, 300)}: no file in this folder has a suffix of a known format; "
@@ -159,7 +164,7 @@ class _Search:
         before = self._n_seen
         for path in glob.iglob(pattern, recursive=True):
             is_folder = os.path.isdir(path)
-            if not is_folder or self._is_input(path):
+            if (not is_folder or self._is_input(path)) and not self._is_output(path):
                 self._add(path, is_folder)
         if self._n_seen == before:
             raise ViewerError(f"{printable(pattern, 300)}: no file matches this pattern")
@@ -172,12 +177,24 @@ class _Search:
         if self._n_skipped:
             text = counted(self._n_skipped, "file")
             notes.append(f"{text} in folders skipped: the suffix belongs to no format")
+        if self._n_outputs:
+            notes.append(
+                f"{counted(self._n_outputs, 'file')} in the folder of the outputs left out"
+            )
         paths = sorted(self._found.values(), key=natural_key)
         return Inputs(tuple(paths), _common(self.roots), frozenset(self._folders), tuple(notes))
 
     @property
     def _n_seen(self) -> int:
         return len(self._found) + self._n_repeated
+
+    def _is_output(self, path: str) -> bool:
+        """Return whether a path lies in the folder of the outputs, itself within the last root."""
+        if not self.output or not self.output.startswith(os.path.join(self.roots[-1], "")):
+            return False
+        found = f"{os.path.abspath(path)}{os.sep}".startswith(f"{self.output}{os.sep}")
+        self._n_outputs += found
+        return found
 
     def _is_input(self, folder: str) -> bool:
         return self.keeps_folders or is_recording(folder)

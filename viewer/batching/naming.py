@@ -14,7 +14,7 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["FIELDS", "check_outputs", "has_fields", "items_of", "template_of"]
+__all__ = ["FIELDS", "check_outputs", "items_of", "output_folder", "template_of"]
 
 FIELDS = {
     "parent": "the input's folder, relative to the folder that all inputs share",
@@ -62,9 +62,13 @@ def template_of(output: str, suffix: str) -> str:
     return os.path.join(folder, "{parent}", "{stem}" + last)
 
 
-def has_fields(output: str) -> bool:
-    """Return whether an output is a template rather than a folder."""
-    return bool(_fields(output))
+def output_folder(output: str) -> str:
+    """Return the folder of all outputs of a folder or template; empty if it has no name.
+
+    >>> output_folder("out"), output_folder("out/a_{stem}.bvh"), output_folder("{stem}.bvh")
+    ('out', 'out', '')
+    """
+    return os.path.dirname(output.partition("{")[0]) if _fields(output) else output
 
 
 def _fields(template: str) -> list[str]:

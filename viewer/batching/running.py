@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import glob
 import os
 import time
 from collections.abc import Callable, Generator, Sequence
@@ -113,8 +114,9 @@ def shard_of(items: Sequence[Item], text: str) -> list[Item]:
 
 def related_reports(path: Path) -> list[Path]:
     """Return a report and those of the shards next to it that exist."""
-    stem = path.stem.partition(".")[0]
-    shards = sorted(path.parent.glob(f"{stem}*.jsonl")) if path.parent.is_dir() else []
+    stem = glob.escape(path.stem.partition(".")[0])
+    names = f"{stem}.*-of-*.jsonl"
+    shards = sorted(path.parent.glob(names)) if path.parent.is_dir() else []
     return [one for one in dict.fromkeys([path, *shards]) if one.is_file()]
 
 

@@ -39,10 +39,7 @@ from viewer.formats._skin.checks import (
     unbound_skin,
 )
 from viewer.formats._skin.sections import Sections, read_sections
-from viewer.formats._skin.weights_text import weights_lines
 from viewer.formats._source import Source
-from viewer.formats._text.decimals import integers, shortest
-from viewer.formats._text.number_text import row_texts
 from viewer.formats._text.numbers import LARGEST
 from viewer.media.image import save_image
 from viewer.media.saving import as_words, save_parts
@@ -193,6 +190,8 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     OutputError
         If a file cannot be written.
     """
+    from viewer.formats._skin.weights_text import weights_lines
+
     if figure.mesh is None:
         raise UnsupportedFormatError(f"figure {figure.name} has no mesh to write as .skin")
     mesh, sources = without_seams(figure.mesh)
@@ -243,6 +242,9 @@ def _check_writable(name: str, mesh: Mesh, skin: Skin | None) -> None:
 
 
 def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
+    from viewer.formats._text.decimals import shortest
+    from viewer.formats._text.number_text import row_texts
+
     return _section(name, len(rows), row_texts(rows, shortest, start=b"  "))
 
 
@@ -253,6 +255,9 @@ def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[byt
 
 def _triangle_runs(mesh: Mesh) -> list[Iterable[bytes]]:
     """Return the triangles sections, each after its material, as assigned by the reader."""
+    from viewer.formats._text.decimals import integers
+    from viewer.formats._text.number_text import row_texts
+
     indices = mesh.material_indices
     edges = np.flatnonzero(np.diff(indices)) + 1
     parts: list[Iterable[bytes]] = []

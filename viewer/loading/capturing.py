@@ -101,6 +101,8 @@ class Builder:
     hangs: bool = False
     _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
     _has_parameters: bool = False
+    _grows: bool = True  # whether the motions of driven figures are computed part by part
+    _is_behind: bool = False  # whether such a motion lacks parts that were read
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -118,12 +120,20 @@ class Builder:
         return self._parts
 
     def read_some(self) -> tuple[list[Actor], list[Diagnostic]]:
-        """Read the next part; return new actors and messages."""
+        """Read the next part; return new actors and messages.
+
+        For captures that are read to the end before they are shown: the motions of driven figures
+        are computed once, at the end.
+        """
         part = next(self.parts(), None)
         if part is None:
             self.is_cut = True
-            return [], self._fresh(self._plant_feet())
-        return self.add(part)
+            return [], self._fresh(self._finished())
+        self._grows = False
+        try:
+            return self.add(part)
+        finally:
+            self._grows = True
 
     def add(self, part: CapturePart) -> tuple[list[Actor], list[Diagnostic]]:
         """Add one part to the actors.
@@ -153,7 +163,7 @@ class Builder:
             notes += self._add_points(person, layout, clip, new)
         self.n_read = max(self.n_read, part.stop)
         notes += self._shape_notes()
-        notes += self._plant_feet()
+        notes += self._finished()
         for actor in new:
             if self.swings:
                 actor.springs = springs_for(actor, self.up)
@@ -194,6 +204,11 @@ class Builder:
             self._add_clip(person, clip, new)
             return []
         drive = self._drive(clip)
+        actor = self._bodies.get(person)
+        if not self._grows and actor is not None and actor.drive is not None:
+            actor.drive = _grown(actor.drive, drive)
+            self._is_behind = True
+            return []
         found, notes = driven_clip(drive, self.target)
         self._add_clip(person, found, new, drive)
         return [replace(note, path=self.path) for note in notes]
@@ -203,15 +218,16 @@ class Builder:
         up = f"-{self.up}" if self.hangs else self.up
         return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
 
-    def _plant_feet(self) -> list[Diagnostic]:
-        """At the end, plant the feet of driven figures, once."""
-        if not (self.is_done and self.plants_feet and self.target is not None):
+    def _finished(self) -> list[Diagnostic]:
+        """At the end, compute the whole motions of driven figures and plant their feet, once."""
+        is_left = self.plants_feet or self._is_behind
+        if not (self.is_done and is_left and self.target is not None):
             return []
-        self.plants_feet = False
+        plants_feet, self.plants_feet, self._is_behind = self.plants_feet, False, False
         notes: list[Diagnostic] = []
         for actor in self._bodies.values():
             if actor.drive is not None:
-                actor.drive = replace(actor.drive, plants_feet=True)
+                actor.drive = replace(actor.drive, plants_feet=plants_feet)
                 actor.clip, said = driven_clip(actor.drive, self.target)
                 notes += [replace(note, path=self.path) for note in said]
         return notes
@@ -232,9 +248,7 @@ class Builder:
             assert isinstance(actor.clip, SampledClip)  # set when the actor was made
             actor.clip = _extended(actor.clip, clip)
             if drive is not None and actor.drive is not None:
-                motion = actor.drive.motion
-                motion = replace(motion, clip=_extended(motion.clip, drive.motion.clip))
-                actor.drive = replace(actor.drive, motion=motion)
+                actor.drive = _grown(actor.drive, drive)
 
     def _add_points(
         self, person: int, layout: PointLayout, clip: PointClip, new: list[Actor]
@@ -310,7 +324,7 @@ class Builder:
             actor.figure, actor.clip, actor.color = target, clip, None
             actor.drive = drive
             actor.pose = figure_pose(target)
-        notes = [replace(note, path=self.path) for note in notes] + self._plant_feet()
+        notes = [replace(note, path=self.path) for note in notes] + self._finished()
         for actor, _, _ in clips:
             pose_actor(actor, 0.0)
         return self._fresh([*notes, *self._shape_notes()])
@@ -326,6 +340,13 @@ def _order(item: tuple[int, object]) -> tuple[bool, int]:
     """Return a sort key of people: by number, untracked ones last."""
     person = item[0]
     return not is_tracked(person), abs(person)
+
+
+def _grown(first: Drive, second: Drive) -> Drive:
+    """Return what drives a figure over the rows of two motions with the same timeline."""
+    motion = first.motion
+    clip = _extended(motion.clip, second.motion.clip)
+    return replace(first, motion=replace(motion, clip=clip))
 
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:

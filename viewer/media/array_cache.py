@@ -54,12 +54,12 @@ def cache_folder() -> Path | None:
     if _is_off or asked.lower() in _OFF:
         return None
     if asked:
-        return Path(asked)
+        return Path(os.path.abspath(os.path.expanduser(asked)))  # noqa: PTH100, PTH111
     if sys.platform.startswith("linux"):
         # As platformdirs would say, whose import takes longer than reading a small entry.
         base = os.environ.get("XDG_CACHE_HOME", "").strip()
-        home = Path(base) if base else Path(os.path.expanduser("~/.cache"))  # noqa: PTH111
-        return home / "viewer" / "arrays"
+        home = base if os.path.isabs(base) else os.path.expanduser("~/.cache")  # noqa: PTH111, PTH117
+        return Path(home) / "viewer" / "arrays"
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("viewer", appauthor=False)) / "arrays"
@@ -98,7 +98,7 @@ def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
     if not _LEAST <= end - start <= _LARGEST // 2:
         return None
     folder = cache_folder()
-    if folder is None or not folder.is_absolute():
+    if folder is None:
         return None
     return Slot(folder, kind, bytes(data[start:end]))
 

@@ -30,7 +30,7 @@ def address():
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
     }
-    options = {"host": "tcp://127.0.0.1", "dashboard_address": None, "port": 0}
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
     scheduler = {"cls": Scheduler, "options": options}
     with SpecCluster(workers, scheduler, silence_logs=50) as cluster:
         yield cluster.scheduler_address
@@ -115,6 +115,18 @@ def test_workers_without_the_package_or_of_another_version(address, monkeypatch)
     )
     monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
     assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
+
+
+def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
+    from distributed import Scheduler, SpecCluster
+
+    monkeypatch.setattr(dask_cluster, "_ALONE", 0.1)
+    monkeypatch.setattr(dask_cluster, "_COUNT_EVERY", 0.1)
+    options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
+    with SpecCluster({}, {"cls": Scheduler, "options": options}, silence_logs=50) as cluster:
+        limits = Limits(cluster=cluster.scheduler_address)
+        with pytest.raises(ViewerError, match=r"has had no workers for 0\.1 s; start some with: "):
+            list(dask_cluster.run(items(3), Job(), limits))
 
 
 def test_address_without_a_scheduler(monkeypatch) -> None:

@@ -105,7 +105,7 @@ def test_page_of_diff_sorts_by_distance_and_names_the_vertex(tmp_path) -> None:
     assert page.row("s2")[2].split() == ["25", "%", "vertex", "7,", "pose", "3"]
     assert page.row("s0")[2].split() == ["0", "%"]
     widths = [one["style"] for tag, one in page.tags if tag == "i"]
-    assert widths == ["width:100.0%", "width:50.0%", "width:0.0%"]
+    assert widths == ["width:100.0%", "width:50.0%"]
 
 
 def drawn(folder, index, color):

@@ -49,6 +49,17 @@ def test_items_are_written_as_the_command_writes_them(rigs, capsys):
     assert {one.outputs for one in by_name.values()} == {("out/a/one.npz",), ("out/b/two.npz",)}
 
 
+def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
+    rows = "".join(f"v {n}.25 {n}.5 1\n" for n in range(4000)) + "f 1 2 3\n"
+    for name in "ab":
+        (tmp_path / f"{name}.obj").write_text(rows)
+    assert run(["batch", "info", str(tmp_path / "*.obj")]) == 0
+    assert not (tmp_path / "cache").exists()
+    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert (tmp_path / "cache").exists()
+
+
 def test_resume_runs_only_what_is_not_done(rigs, capsys):
     command = [
         "batch",

@@ -39,6 +39,12 @@ def test_an_invalid_line_is_located(line):
     assert (found.key, found.line, found.values) == ("F002.joint-map", 2, {"found": line})
 
 
+def test_long_lines_are_refused_at_once():
+    with pytest.raises(FormatError) as caught:
+        read("hip = Hips\n" + "a" + 1_000_000 * " " + "b")
+    assert caught.value.diagnostic.line == 2
+
+
 def test_a_map_without_joints_is_refused():
     with pytest.raises(FormatError) as caught:
         read("# nothing\n")

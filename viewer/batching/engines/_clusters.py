@@ -31,6 +31,11 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
+    # These look at the workers many times a second, which costs a tenth of short items and more.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.scheduler.active-memory-manager.start": False,
 }
 
 
@@ -72,15 +77,21 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
 def _local_cluster(limits: Limits, folder: str) -> Any:
     from distributed import LocalCluster
 
-    return LocalCluster(
-        n_workers=limits.workers,
-        threads_per_worker=1,
-        processes=True,
-        memory_limit=None,
-        dashboard_address=None,
-        local_directory=folder,
-        silence_logs=logging.CRITICAL,
-    )
+    try:
+        return LocalCluster(
+            n_workers=limits.workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=None,
+            dashboard_address="127.0.0.1:0",
+            local_directory=folder,
+            silence_logs=logging.CRITICAL,
+        )
+    except RuntimeError as problem:
+        raise ViewerError(
+            f"--cluster local: the workers do not start ({printable(problem, 200)}); a script that "
+            'calls viewer.batch needs the line if __name__ == "__main__": before its own work'
+        ) from None
 
 
 def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
@@ -136,7 +147,8 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
             f"--{key}={value}" if value else f"--{key}" for key, value in options.items()
         ],
         worker_extra_args=["--resources", "GPU=1"] if has_gpu else [],
-        scheduler_options={"dashboard_address": None},
+        # Port 0 is any free one: others use the login node too.
+        scheduler_options={"dashboard": False, "dashboard_address": ":0"},
         silence_logs=logging.CRITICAL,
         **known,
     )

@@ -31,6 +31,7 @@ __all__ = ["run"]
 _TICK = 0.2  # seconds between checks whether the batch is stopping
 _PER_WORKER = 3  # items handed out per worker: one runs, and the next ones have arrived
 _COUNT_EVERY = 1.0  # seconds; workers join and leave
+_ALONE = 60.0  # seconds without any worker, before the batch is given up
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -56,6 +57,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         waiting, left = iter(items), True
         try:
             while True:
+                flight.count_workers()
                 while left and not flight.stops() and flight.has_room():
                     item = next(waiting, None)
                     left = item is not None
@@ -88,21 +90,37 @@ class _Flight:
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._batch = f"viewer-{uuid4().hex[:8]}-"
         self._numbers = itertools.count()
-        self._n_workers, self._counted = 0, -_COUNT_EVERY
+        self._n_workers, self._counted, self._seen = 0, -_COUNT_EVERY, time.monotonic()
+        # SLURM starts jobs when there is room, and workers of this machine are replaced.
+        self._can_wait = parse_cluster(limits.cluster or "local").kind != "address"
         self._resources: dict[str, float] | None = None
         self._uses_gpu = bool(getattr(job, "uses_gpu", False))
         self._is_stopping = False
 
+    def count_workers(self) -> None:
+        """Look how many workers there are, which changes while the batch runs.
+
+        Raises ViewerError if a scheduler has had none for a minute.
+        """
+        now = time.monotonic()
+        if now < self._counted + _COUNT_EVERY:
+            return
+        workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+        with_gpu = [one for one in workers if one["resources"].get("GPU")]
+        # Workers that declare GPUs are the ones to draw on, if there are any.
+        self._resources = {"GPU": 1} if with_gpu and self._uses_gpu else None
+        self._n_workers = len(with_gpu if self._resources else workers)
+        self._counted = now
+        if workers or self._can_wait:
+            self._seen = now
+        elif now > self._seen + _ALONE:
+            raise ViewerError(
+                f"--cluster: the scheduler has had no workers for {_ALONE:g} s; start some with: "
+                f"dask worker {self.limits.cluster} --nthreads 1"
+            )
+
     def has_room(self) -> bool:
         """Return whether workers wait for more items, or will soon."""
-        now = time.monotonic()
-        if now > self._counted + _COUNT_EVERY:
-            workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
-            with_gpu = [one for one in workers if one["resources"].get("GPU")]
-            # Workers that declare GPUs are the ones to draw on, if there are any.
-            self._resources = {"GPU": 1} if with_gpu and self._uses_gpu else None
-            self._n_workers = len(with_gpu if self._resources else workers)
-            self._counted = now
         return len(self.flying) < max(self._n_workers, 1) * _PER_WORKER
 
     def stops(self) -> bool:

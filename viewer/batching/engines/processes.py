@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import signal
 import sys
 import time
@@ -24,6 +25,7 @@ from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.items import Item, Result
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
+from viewer.phrases import printable
 
 if TYPE_CHECKING:
     from types import FrameType
@@ -45,7 +47,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     Raises
     ------
     ViewerError
-        If pebble is missing, or the workers do not start.
+        If pebble is missing, the job cannot be pickled, or the workers do not start.
     """
     try:
         import pebble  # noqa: F401
@@ -53,6 +55,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         raise ViewerError(
             "worker processes need pebble: pip install pebble, or use --workers 0"
         ) from None
+    _check_pickles(job)
     pool = _Workers(job, limits)
     waiting, left = iter(items), True
     try:
@@ -67,6 +70,16 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
             yield from pool.finished()
     finally:
         pool.close()
+
+
+def _check_pickles(job: Job) -> None:
+    try:
+        pickle.dumps(job)
+    except (pickle.PicklingError, AttributeError, TypeError) as problem:
+        raise ViewerError(
+            "worker processes import the job by its name: expected a function at the top level of "
+            f"a module, or workers=0 ({printable(problem)})"
+        ) from None
 
 
 @dataclass(frozen=True)
@@ -194,7 +207,8 @@ class _Workers:
         if self._n_breaks >= _MOST_BREAKS:
             raise ViewerError(
                 "the worker processes end before they do anything; a script that calls "
-                'viewer.batch needs the line if __name__ == "__main__": before its own work'
+                'viewer.batch needs the line if __name__ == "__main__": before its own work, and '
+                "a function typed into an interpreter or notebook needs workers=0"
             )
         self.close()
         self._pool = self._new_pool()

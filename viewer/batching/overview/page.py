@@ -90,7 +90,7 @@ def _counts(results: Sequence[Result]) -> str:
     findings = sum((Counter(result.values.get("counts", {})) for result in results), Counter())
     parts += [(str(findings[kind]), f"{kind}s", kind) for kind in _SEVERITIES if findings[kind]]
     seconds = sum(result.seconds for result in results)
-    parts.append((f"{seconds:.1f} s", "work", ""))
+    parts.append((f"{seconds:.1f} s", "computing", ""))
     items = (
         tag("li", f"{tag('b', text_of(number), kind)}{text_of(name)}")
         for number, name, kind in parts
@@ -199,12 +199,14 @@ def _distance_column(group: str, results: Sequence[Result]) -> _Column:
         found, value = worst_measure(result, group), value_of(result)
         if found is None or value is None:
             return "-"
-        length = value / most if most > 0.0 else 0.0
         place = ", ".join(filter(None, (found[0]["item"], found[0]["step"] or "")))
-        where = tag("span", text_of(place), "note") if value > 0.0 else ""
-        return f"{_amount(group, value)} {where}{bar(length)}"
+        if not value > 0.0:
+            return _amount(group, value)
+        where = tag("span", text_of(place), "note")
+        return f"{_amount(group, value)} {where}{bar(value / most if most > 0.0 else 1.0)}"
 
-    return _Column(group.capitalize(), "", cell)
+    size = " (of the size)" if key == "relative" else ""
+    return _Column(f"{group.capitalize()}{size}", "", cell)
 
 
 def _amount(group: str, value: float) -> str:

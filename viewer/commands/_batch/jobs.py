@@ -17,6 +17,7 @@ from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.formats._kept import keeping_figures
 from viewer.loading import bundled_body, bundled_files
+from viewer.media.array_cache import without_cache
 from viewer.phrases import printable
 
 __all__ = ["JOBS", "CommandJob", "JobKind", "add_job_arguments", "job_parser"]
@@ -125,7 +126,8 @@ class CommandJob:
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
-        with keeping_figures(self._shared):
+        # Most files are read once: their numbers would displace those of files that are not.
+        with keeping_figures(self._shared), without_cache():
             result = attempt(item, self._run)
         if result.status == "failed" and not result.message:
             # Commands that report on several files print what is wrong with one of them.

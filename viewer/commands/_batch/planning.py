@@ -13,7 +13,7 @@ from viewer.batching.engines import Limits
 from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.inputs import find_inputs
 from viewer.batching.items import Item
-from viewer.batching.naming import check_outputs, has_fields, items_of, template_of
+from viewer.batching.naming import check_outputs, items_of, output_folder, template_of
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
 from viewer.errors import OutputError, ViewerError
@@ -76,7 +76,12 @@ def plan_of(request: Request) -> Plan:
     Raises ViewerError if an input is missing, options contradict each other, or a file would be
     written twice or replaced.
     """
-    inputs = find_inputs(request.paths, request.lists, keeps_folders=request.keeps_folders)
+    inputs = find_inputs(
+        request.paths,
+        request.lists,
+        keeps_folders=request.keeps_folders,
+        output=output_folder(request.output),
+    )
     template = template_of(request.output, request.to) if request.output else ""
     items = items_of(inputs, template)
     check_outputs(items, request.shared)
@@ -98,9 +103,7 @@ def _report_of(request: Request) -> Path | None:
     """Return the report's path: next to the outputs, unless another one is given."""
     if request.report:
         return Path(request.report)
-    folder = request.output
-    if has_fields(folder):
-        folder = os.path.dirname(folder.partition("{")[0])
+    folder = output_folder(request.output)
     if not folder:
         return None
     part = f".{request.shard.replace('/', '-of-')}" if request.shard else ""

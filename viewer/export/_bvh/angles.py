@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.rotation import axis_rotations
 
 _WHOLE = 2.0 * np.pi  # radians in a revolution
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
@@ -27,9 +26,13 @@ def euler_angles(matrices: Floats, order: str) -> Floats:
     locked = np.hypot(m[..., j, k], m[..., k, k]) < _LOCKED
     # In gimbal lock only a sum of the outer angles is defined, so the first is 0: see unrolled.
     first = np.where(locked, 0.0, np.arctan2(-sign * m[..., j, k], m[..., k, k]))
-    rest = np.swapaxes(axis_rotations(i, first), -1, -2) @ m
-    second = np.arctan2(sign * rest[..., i, k], rest[..., k, k])
-    third = np.arctan2(sign * rest[..., j, i], rest[..., j, j])
+    # Rows of R_i(a)^T R.
+    cosine, sine = np.cos(first), sign * np.sin(first)
+    second = np.arctan2(sign * m[..., i, k], cosine * m[..., k, k] - sine * m[..., j, k])
+    third = np.arctan2(
+        sign * (cosine * m[..., j, i] + sine * m[..., k, i]),
+        cosine * m[..., j, j] + sine * m[..., k, j],
+    )
     return np.stack([first, second, third], axis=-1)
 
 
@@ -53,16 +56,27 @@ def unrolled(angles: Floats, order: str) -> Floats:
             joints[:, joint] = unrolled(angles[:, joint], order)
         return joints
     angles = _unlocked(angles, order)
+    stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
+    # The distance to the other form is at least 2 pi - stay.
+    if not (stay < np.pi).all():
+        angles = _nearest_form(angles, stay)
+    turns = np.zeros_like(angles)
+    np.cumsum(_revolutions(angles[1:] - angles[:-1]), axis=0, out=turns[1:])
+    return angles - _WHOLE * turns
+
+
+def _nearest_form(angles: Floats, stay: Floats) -> Floats:
+    """Switch to the other form of a rotation where it is nearer to the previous frame.
+
+    ``stay`` (N - 1, ...): distance from the previous frame in the given form.
+    """
     other = angles * [1.0, -1.0, 1.0] + np.pi
     # Switching costs the same from either form, so the number of switches accumulates.
-    stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
     change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=-1)
     changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)
     chosen = angles.copy()
     chosen[1:] = np.where(changed[..., None], other[1:], angles[1:])
-    turns = np.zeros_like(chosen)
-    np.cumsum(_revolutions(chosen[1:] - chosen[:-1]), axis=0, out=turns[1:])
-    return chosen - _WHOLE * turns
+    return chosen
 
 
 def _revolutions(angles: Floats) -> Floats:

@@ -10,7 +10,6 @@ from viewer.diagnostics import Phrase
 from viewer.formats._skin.blocks import find_block, unclosed, words_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
-from viewer.formats._text.words import refuse_words
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
@@ -63,6 +62,8 @@ def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
     if not block.closed:
         raise unclosed(source, block, source.end, None)
     if words is not None:
+        from viewer.formats._text.words import refuse_words
+
         places = np.full(len(words.bad), index)
         item = Phrase("matrix", index=index)
         refuse_words(source, words, words.bad, lambda _: item, "bindings", places)

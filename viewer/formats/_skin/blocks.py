@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
-from viewer.formats._text.words import Words, read_words
 from viewer.rig.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from viewer.formats._text.words import Words
 
 __all__ = ["KEYWORDS", "Block", "find_block", "read_count", "to_whole", "unclosed", "words_of"]
 
@@ -92,6 +95,8 @@ def words_of(source: Source, block: Block) -> Words:
     FormatError
         If the block is not closed before another section begins.
     """
+    from viewer.formats._text.words import read_words
+
     words = read_words(source.data, block.start, block.end)
     for index in words.bad.tolist():
         word = words.word(index)

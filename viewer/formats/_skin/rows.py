@@ -8,6 +8,7 @@ triangle per line. In this case, a line of the wrong length does not affect the 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +18,10 @@ from viewer.errors import FormatError
 from viewer.formats._skin.blocks import Block, to_whole, words_of
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
-from viewer.formats._text.words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from viewer.formats._text.words import Words
 
 __all__ = ["LOST", "OffsetOf", "read_rows", "whole_corners"]
 
@@ -83,6 +86,8 @@ def read_rows(
 def _faulty_rows(
     source: Source, block: Block, count: int, width: int, first: int, item: str
 ) -> tuple[Floats, Places]:
+    from viewer.formats._text.words import refuse_words
+
     def named(row: int) -> Phrase:
         return Phrase(item, section=block.name, index=row)
 

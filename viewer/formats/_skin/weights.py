@@ -7,6 +7,8 @@ influence.
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,8 +19,10 @@ from viewer.formats._skin.influence_counts import find_heads
 from viewer.formats._skin.rows import OffsetOf
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
-from viewer.formats._text.words import Words, refuse_words
 from viewer.rig.arrays import Floats, Ints
+
+if TYPE_CHECKING:
+    from viewer.formats._text.words import Words
 
 __all__ = ["read_weights"]
 
@@ -143,6 +147,8 @@ def _faulty_pairs(
     source: Source, words: Words, places: Places, owners: Places
 ) -> tuple[Ints, Floats]:
     """Return joints and weights; both are 0 if either is not a number."""
+    from viewer.formats._text.words import refuse_words
+
     joints, weights = words.values[places], words.values[places + 1]
     bad = np.flatnonzero(np.isnan(np.stack([joints, weights], axis=1)).any(axis=1))
     at = np.where(np.isnan(joints[bad]), places[bad], places[bad] + 1)

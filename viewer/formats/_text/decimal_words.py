@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.formats._text.powers import ERROR, FARTHEST, times_power
 from viewer.formats._text.swar import (
     Indices,
     Words,
@@ -182,6 +181,8 @@ def _scaled(mantissas: Words, exponents: Indices, odd: Bools) -> tuple[Floats, B
 
 
 def _long_products(mantissas: Words, exponents: Indices, odd: Bools) -> tuple[Floats, Bools]:
+    from viewer.formats._text.powers import ERROR, FARTHEST, times_power
+
     odd = odd | (np.abs(exponents) > FARTHEST)
     if odd.any():
         exponents, mantissas = np.where(odd, 0, exponents), np.where(odd, _U(0), mantissas)

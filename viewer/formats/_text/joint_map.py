@@ -31,6 +31,8 @@ _LINE = re.compile(rf"\s*({_NAME})\s*=\s*({_NAME})?(?:\s+#.*|\s*)")
 _COMMENT = re.compile(r"\s*(?:#.*)?")
 _PLAIN = re.compile(r'[^\s="#](?:[^\s="]|[ ](?=[^\s#="]))*')
 
+_LONGEST = 4096  # characters of a line; matching takes quadratic time
+
 
 def read_joint_map(source: Source) -> JointMap:
     """Read a joint map.
@@ -52,7 +54,7 @@ def read_joint_map(source: Source) -> JointMap:
     for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
         if _COMMENT.fullmatch(line):
             continue
-        found = _LINE.fullmatch(line)
+        found = _LINE.fullmatch(line) if len(line) <= _LONGEST else None
         names = None if found is None else (_name(found[1]), _name(found[2] or ""))
         if names is None or names[0] is None or names[1] is None:
             values = {"found": printable(line.strip(), 60)}

@@ -17,7 +17,6 @@ from viewer.rendering.joint_spheres import box_spheres, skin_spheres
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell
-from viewer.rig.inspection.single_vertices import rest_vertices
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh, bounding_box
 from viewer.rig.pose import Pose
@@ -76,6 +75,8 @@ class BackFaces:
         """Return the vertices around openings in a pose, figure space: (B, 3)."""
         if not len(shell.borders):
             return np.zeros((0, 3))
+        from viewer.rig.inspection.single_vertices import rest_vertices
+
         skin = figure.require_skin()
         palette = posed_skeleton(figure.require_skeleton(), pose).palette(skin)
         if self._around is None:

@@ -64,7 +64,7 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
         No side is shorter than 1; an odd last row or column is dropped.
     """
     decode, encode = _tables(is_linear)
-    linear = decode[pixels]
+    linear = decode.take(pixels)
     pictures = []
     while max(linear.shape[:2]) > 1:
         for axis in (0, 1):
@@ -75,7 +75,7 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
             else:
                 linear = 2 * linear
         linear = linear >> 2
-        pictures.append(np.ascontiguousarray(encode[linear]))
+        pictures.append(encode.take(linear))
     return pictures
 
 

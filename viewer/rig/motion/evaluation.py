@@ -354,7 +354,9 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     # at once.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
-    linear = quaternion_to_matrix(frames.rotations) * frames.scales[:, :, None, :]
+    linear = quaternion_to_matrix(frames.rotations)
+    if (frames.scales != 1.0).any():
+        linear *= frames.scales[:, :, None, :]
     local[..., :3, :3] = np.swapaxes(linear, 0, 1)
     offsets = rest_translations_of(figure, frames.shape_weights) + frames.translations
     local[..., :3, 3] = np.swapaxes(offsets, 0, 1)

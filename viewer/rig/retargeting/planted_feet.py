@@ -112,13 +112,14 @@ def plant_feet(
         return found.clip, PlantedFeet()
     planted, lowered = _planted(clip, body, worlds, plan)
     after = body.worlds(planted)
+    gaps = [plan.gap(body.heights(each, up), body.facing(each, up)) for each in (worlds, after)]
     changes = PlantedFeet(
         sum(map(len, plan.contacts)),
         plan.slide([(foot.toe, foot.heel) for foot in feet]),
         plan.slide(body.feet(worlds)),
         plan.slide(body.feet(after)),
-        plan.gap(body.heights(worlds, up), body.facing(worlds, up)),
-        plan.gap(body.heights(after, up), body.facing(after, up)),
+        gaps[0],
+        gaps[1],
         lowered,
         body.size,
     )
