@@ -1,8 +1,8 @@
 """Frames of a figure that moves, read into memory, against the minimal program that draws them.
 
-Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``least_frame.py`` is the
-minimal program. Processor time of the process, all its threads: a software driver draws with it,
-and other programs on the machine do not change it. Uses the pig if its files exist, else the
+Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``references/least_frame.py``
+is the minimal program. Processor time of the process, all its threads: a software driver draws with
+it, and other programs on the machine do not change it. Uses the pig if its files exist, else the
 bundled figure.
 """
 
@@ -13,8 +13,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from least_frame import LeastFrame
 from measure import median_ratio, report
+from references.least_frame import LeastFrame
 
 import viewer
 from viewer.rendering.offscreen import Offscreen, default_camera
