@@ -21,11 +21,13 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
 @pytest.fixture(scope="module")
-def address():
+def address(tmp_path_factory):
     """Start a scheduler with two worker processes, of which the second declares a GPU."""
     from distributed import Nanny, Scheduler, SpecCluster
 
-    common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None}
+    folder = str(tmp_path_factory.mktemp("dask"))
+    common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None,
+              "local_directory": folder}  # fmt: skip
     workers = {
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
