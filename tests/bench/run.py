@@ -18,7 +18,6 @@ NAMES = [
     "materials",
     "structure",
     "motion",
-    "read",
     "big_files",
     "gltf",
     "nodes",
