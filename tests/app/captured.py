@@ -47,7 +47,7 @@ def people(rig, *presences, rate=10.0):
 
 
 def dots(confidences, n_frames=3, rate=10.0):
-    """An actor of four captured points; frame 1 has these confidences, others are certain."""
+    """An actor of four captured points; frame 1 has these confidences, all others are 1."""
     layout = PointLayout(
         "face4", NAMES, np.array([[0, 1], [0, 2], [0, 3]]), np.array([0, 1, -1, 0])
     )

@@ -19,6 +19,7 @@ NAMES = [
     "structure",
     "motion",
     "read",
+    "big_files",
     "gltf",
     "nodes",
     "captures",

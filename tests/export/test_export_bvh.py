@@ -168,7 +168,7 @@ def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
         notes[1],
     )
     assert said and said[2] == found_names[joint]
-    assert float(said[1]) == pytest.approx(10 * off.max(), rel=5e-3)  # three digits are told
+    assert float(said[1]) == pytest.approx(10 * off.max(), rel=5e-3)  # three digits are printed
     # Calculated without the exporter: the skin in the shape of frame 0, on the joints of frame 7.
     assert float(said[3]) > float(said[1])
     assert notes[2] == "the shape changes over time: bone lengths are those of frame 0"
@@ -291,7 +291,7 @@ def test_fewer_digits_lose_precision_with_a_note(body: Figure, tmp_path: Path) -
         for j, n in enumerate(body.skeleton.names)
     )
     said = float(re.search(r"joints differ from the motion by up to (\S+) mm", notes[1])[1])
-    assert said == pytest.approx(10 * worst, rel=5e-3)  # three digits are told
+    assert said == pytest.approx(10 * worst, rel=5e-3)  # three digits are printed
     assert said > 0.01
 
 

@@ -186,7 +186,7 @@ def test_the_note_names_the_windows_that_were_used():
     scene = Scene([person(0, 0, 4), person(1, 8, 9), person(2, 12, 60)])
     wanted = CleanUp(merged=((0, 1, 2),), smoothing=SavitzkyGolay())
     *_, note = clean_up(scene, wanted)
-    assert "Savitzky-Golay filter, 3 to 7 frames, degree 2; 1 run of too few frames is un" in str(
+    assert "Savitzky-Golay filter, 3 to 7 frames, degree 2; 1 run with too few frames is un" in str(
         note
     )
 

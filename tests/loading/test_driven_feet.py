@@ -44,6 +44,8 @@ def test_the_option_and_its_note_are_those_of_every_command(walking, capsys):
     out = str(walking.with_name("out.bvh"))
     for words, is_said in ((), True), (("--feet", "on"), True), (("--feet", "off"), False):
         assert run(["convert", str(walking), "--body", "-o", out, "--force", *words]) == 0
-        assert ("feet of body planted in 6 contacts of walk" in capsys.readouterr().err) is is_said
+        assert (
+            "feet of body planted during 6 contacts of walk" in capsys.readouterr().err
+        ) is is_said
     assert run(["render", str(walking), "--feet", "no", "-o", "x.png"]) == 2
     assert "--feet" in capsys.readouterr().err

@@ -188,7 +188,7 @@ def test_bind_pose_shows_the_mesh_unposed(offscreen):
 
 
 def both_figure() -> Figure:
-    """Return a square of 0.5 and two boxes of 1.6 around it, one behind the other."""
+    """Return a square of side 0.5 and two boxes of side 1.6 around it, one behind the other."""
     boxes = np.array([[[-0.8, -0.8, -0.1], [0.8, 0.8, 0.1]], [[-0.8, -0.8, 0.4], [0.8, 0.8, 0.5]]])
     return Figure("both", square(half=0.25), skeleton([-1, 0], np.zeros((2, 3)), boxes))
 

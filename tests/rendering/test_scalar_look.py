@@ -14,7 +14,7 @@ from viewer.rig.skin import skin_from_lists
 
 
 def test_largest_percent_of_values_is_left_out():
-    # Of 1 to 1000 the 99th of a hundred is 990 or just above it; signs do not matter.
+    # The 99th percentile of 1 to 1000 is 990 or slightly more; the sign does not matter.
     numbers = np.arange(1.0, 1001.0)
     low, high = typical_span(numbers)
     assert low == 1.0 and 990 <= high <= 991
@@ -47,7 +47,7 @@ def test_only_automatic_strain_ranges_are_robust(name):
 
 
 def test_one_outlier_does_not_flatten_the_other_colours():
-    # Weights of joint 1 grow to the right; one vertex follows it alone.
+    # The weights of joint 1 increase to the right; one vertex has weight 1.
     figure = grid_figure(40)
     x = (figure.mesh.positions[:, 0] + 1.5) / 3.0
     weights = 0.5 * x**2
@@ -66,7 +66,7 @@ def test_one_outlier_does_not_flatten_the_other_colours():
         front_view(offscreen, scene, shading="scalar", scalar="stretch")
     amounts = np.sort(np.abs(numbers[numbers != 0.0]))
     most = amounts[int(np.ceil(0.99 * (len(amounts) - 1)))]
-    assert amounts[-1] > 3.0 * most  # the bad vertex
+    assert amounts[-1] > 3.0 * most  # the outlier
     assert scalars.ends == pytest.approx((-most, most))
     assert scalars.range == pytest.approx((numbers.min(), numbers.max()))
     low, high = numbers.min(), numbers.max()

@@ -1,8 +1,8 @@
 """Reports of a batch: ``report.jsonl``, one line per item, and the summary.
 
-A line is appended as soon as its item has finished, so a report is also the list of what need not
-be done again. Several processes may append to the same file, on one machine or on several. A line
-that a killed process has not finished is skipped when the report is read.
+A line is appended as soon as its item has finished, so a report also lists the items that need not
+be run again. Several processes may append to the same file, on one machine or on several. An
+incomplete line, left by a killed process, is skipped when the report is read.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Report:
     seconds : float
         Wall time of the batch.
     n_items : int
-        Number of items, also of those that were not started before the batch was interrupted.
+        Number of items, including those not yet started when the batch was interrupted.
     signal : int
         Number of the signal that interrupted it; 0 if none did.
     path : Path or None
@@ -94,13 +94,13 @@ class ReportFile:
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | (os.O_TRUNC if replaces else 0)
-            # Windows would write another line end.
+            # Windows would write a different line ending.
             self._handle = os.open(path, flags | getattr(os, "O_BINARY", 0), 0o666)
         except OSError as problem:
             raise self._error(problem) from None
 
     def add(self, result: Result) -> None:
-        """Append a line; a killed process loses none that was added before."""
+        """Append a line; a killed process loses no earlier line."""
         line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
         try:
             with _locked(self._handle):
@@ -139,7 +139,7 @@ class ReportFile:
 
 @contextlib.contextmanager
 def _locked(handle: int) -> Iterator[None]:
-    """Lock a file against other processes, also of other machines where the system can do so."""
+    """Lock a file against other processes, including those of other machines where supported."""
     try:
         from fcntl import LOCK_EX, LOCK_UN, lockf
     except ImportError:  # Windows
@@ -170,7 +170,7 @@ def _line(result: Result) -> str:
 
 
 def read_results(path: Path) -> list[Result]:
-    """Read a report; of an item that was run several times, the last result counts.
+    """Read a report; the last result of each item counts.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def read_results(path: Path) -> list[Result]:
     Raises
     ------
     ViewerError
-        If it cannot be read, or is no report.
+        If it cannot be read, or is not a report.
     """
     results: dict[tuple[str, str], Result] = {}
     n_lines = 0
@@ -199,7 +199,7 @@ def read_results(path: Path) -> list[Result]:
 
 
 def _result(line: str) -> Result | None:
-    """Return the result in a line; None if the line was cut off."""
+    """Parse the result in a line; None if the line is incomplete."""
     try:
         found: dict[str, Any] = json.loads(line)
         item = Item(found["index"], tuple(found["files"]), found["output"], found["name"])

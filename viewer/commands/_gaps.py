@@ -21,11 +21,11 @@ _PATTERNS = {
     "write": re.compile(rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}"),
 }
 _WHAT = {
-    "view": "gaps of captures: interpolate all, or those of up to N frames or a second (1s)",
-    "check": "gaps of captures: interpolate all",
-    "write": "gaps of captures: hold the last pose, split the file, or interpolate all or those of "
-    "up to N frames or a second (1s), as in interpolate:10,split (default: omitted from EasyMocap, "
-    ".obj and arrays, else hold)",
+    "view": "gaps in captures: interpolate all, or those of up to N frames or one second (1s)",
+    "check": "gaps in captures: interpolate all",
+    "write": "gaps in captures: hold the last pose, split the file, or interpolate all or those of "
+    "up to N frames or one second (1s), as in interpolate:10,split (default: missing frames are "
+    "omitted from EasyMocap, .obj and arrays; other formats hold the last pose)",
 }
 _METAVAR = {
     "view": "interpolate[:N]",

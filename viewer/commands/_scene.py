@@ -79,7 +79,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
     group.add_argument(
         "--no-cache",
         action="store_true",
-        help="parse all numbers anew, without the arrays that earlier runs kept (see doctor)",
+        help="parse all files again instead of using cached arrays (see viewer doctor)",
     )
 
 
@@ -143,7 +143,7 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         "--feet",
         choices=("on", "off"),
         default="on",
-        help="keep the feet of driven figures on the ground where those of the motion stand "
+        help="keep the feet of driven figures planted on the ground while those of the motion are "
         "(default: on)",
     )
     group.add_argument(

@@ -44,7 +44,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="OUT",
-        help="a folder, which repeats the folders of the inputs, or a template: "
+        help="a folder, which mirrors the folders of the inputs, or a template: "
         "'out/{parent}/{stem}.bvh'; also {folder}, {name}, {suffix}, {index:05}",
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")

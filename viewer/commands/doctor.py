@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--bench",
         action="store_true",
-        help="also measure how fast programs start and frames are drawn here (takes a minute)",
+        help="also measure start-up and drawing times on this machine (takes a minute)",
     )
 
 

@@ -17,7 +17,7 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_results", "read"]
 
-_LISTED = 12  # keys that are named
+_LISTED = 12  # keys named in a message
 
 
 def read(source: Source) -> Capture:

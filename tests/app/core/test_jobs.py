@@ -1,4 +1,4 @@
-"""Work in a thread that counts its steps: progress, lines, errors, and being cancelled."""
+"""Background work that counts its steps: progress, output lines, errors, and cancellation."""
 
 from __future__ import annotations
 

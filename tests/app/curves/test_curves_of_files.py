@@ -1,4 +1,4 @@
-"""Curves panel: whole poses, files, and motions without keys."""
+"""The Curves panel: keys of whole poses, opened files, and motions without keys."""
 
 from __future__ import annotations
 

@@ -54,7 +54,7 @@ def test_only_the_playback_range_is_written(moving, tmp_path):
     save_motion(moving.state, tmp_path / "part.bvh")
     moving.finish_job()
     text = (tmp_path / "part.bvh").read_text()
-    assert "Frames: 10\n" in text  # 6 to 15 of 30 a second
+    assert "Frames: 10\n" in text  # 6 to 15, at 30 frames per second
 
 
 def test_menu_asks_for_a_path_and_reports_what_was_written(moving, tmp_path):
@@ -299,7 +299,7 @@ def test_dialog_changes_the_suffix_with_the_format(bodies, tmp_path):
     assert (dialog.name, dialog.target()) == (stem, tmp_path / stem)
     bodies.click("Name")
     bodies.key("a", "ctrl")
-    bodies.type("hand.made.npz")  # a suffix that is typed counts
+    bodies.type("hand.made.npz")  # a typed suffix takes precedence
     _choose_format(bodies, ".bvh")
     assert dialog.name == "hand.made.bvh"
 

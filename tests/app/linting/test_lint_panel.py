@@ -56,7 +56,7 @@ def test_panel_starts_closed_and_checks_when_first_shown(drive):
     assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
     hand.menu("menu Window", "Lint")
     finish(hand)
-    assert hand.state.of(Linting).checked is first  # only the first time by itself
+    assert hand.state.of(Linting).checked is first  # automatic only the first time
 
 
 def test_reset_layout_closes_it(lint):
@@ -126,7 +126,7 @@ def test_mark_follows_the_pose(lint):
     before = hand.state.of(Linting).marks.points[0].copy()
     hand.state.actor.pose.dofs[0] = 1.5  # the root, along x
     hand.step(2)
-    # The vertex weighs 0.9.
+    # The weights of the vertex sum to 0.9.
     assert hand.state.of(Linting).marks.points[0] - before == pytest.approx([1.35, 0.0, 0.0])
 
 

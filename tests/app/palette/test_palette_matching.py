@@ -1,4 +1,4 @@
-"""Fuzzy matching: words before letters, beginnings before middles, all words needed."""
+"""Fuzzy matching: words before single letters, prefixes before infixes, all words required."""
 
 from __future__ import annotations
 

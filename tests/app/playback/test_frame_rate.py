@@ -117,7 +117,7 @@ def test_rate_change_is_undone_with_its_time_and_pose(pair):
 def test_rate_out_of_limits_is_refused_with_a_message(pair, text):
     pair.enter_value("Frame rate", text)
     assert rates(pair) == [10.0, 10.0] and pair.undo_steps == 0
-    if text not in ("nan", "inf"):  # which the field itself does not take
+    if text not in ("nan", "inf"):  # the field itself rejects these
         assert pair.says(f"frames per second: expected 0.01 to 1000, found {text}")
 
 
@@ -175,7 +175,7 @@ def test_undoing_the_rate_while_loading_keeps_loaded_frames(rig):
     actor.clip = with_rate(actor.clip, 25.0)
     assert history.observe(scene, options, busy=False)
     count = actor.figure.skeleton.n_joints
-    actor.clip = walk([True] * 4, count, rate=25.0)  # more was read
+    actor.clip = walk([True] * 4, count, rate=25.0)  # as if more frames were read
     history.add_actors(scene, options)
     assert not history.observe(scene, options, busy=False)
     history.undo(scene, options, lambda time: None)

@@ -124,7 +124,7 @@ def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
         assert found.base is not None
         assert found.files == (found.base / "bob",)
     (folder / "bob.zip").write_bytes(inner(inner(inner(inner(b"x")))))
-    with pytest.raises(FormatError, match="found archives in 3 archives"), opened(folder):
+    with pytest.raises(FormatError, match="found archives nested 3 deep"), opened(folder):
         pass
 
 
@@ -169,11 +169,11 @@ def test_links_encrypted_repeated_and_damaged_files_are_refused(tmp_path) -> Non
     data = bytearray(zipped(path, {"a.skel": "x", "a.skin": "x"}).read_bytes())
     data[data.index(b"PK\x01\x02") + 8] |= 1
     path.write_bytes(data)
-    assert refusal(path) == (": a.skel: expected a file without a password, found an encrypted one")
+    assert refusal(path) == (": a.skel: expected an unencrypted file, found an encrypted one")
     path.write_bytes(data[:-30])
-    assert "found a damaged one (File is not a zip file)" in refusal(path)
+    assert "found a damaged archive (File is not a zip file)" in refusal(path)
     path.write_bytes(b"Rar!\x1a\x07\x01\x00")
-    assert "expected a folder or a zip archive, found a damaged one" in refusal(path)
+    assert "expected a folder or a zip archive, found a damaged archive" in refusal(path)
     assert refusal(path.rename(tmp_path / "bob.rar")) == (
         ": expected a folder or a zip archive, found a .rar file"
     )

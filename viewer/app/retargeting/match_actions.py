@@ -1,4 +1,4 @@
-"""Edits of the match of joints: the motion is retargeted at once, and undo restores it."""
+"""Edits of the joint match: the motion is retargeted immediately, and edits can be undone."""
 
 from __future__ import annotations
 

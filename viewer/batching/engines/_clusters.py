@@ -24,6 +24,7 @@ __all__ = ["connected", "slurm_cluster"]
 _CONNECT = 10.0  # seconds
 _MEMORY = 4 << 30  # bytes that a SLURM job asks for per worker, unless it is told
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
+_ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 # The batch itself decides how often a crash is retried, and what it had started.
 _CONFIG = {
     "distributed.scheduler.allowed-failures": 0,
@@ -31,6 +32,8 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
+    # Not MALLOC_TRIM_THRESHOLD_: arrays would fault in again the memory that others returned.
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
     # These look at the workers many times a second, which costs a tenth of short items and more.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",

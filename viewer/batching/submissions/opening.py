@@ -1,4 +1,4 @@
-"""Opening of one submission: its files on disk, unpacked if necessary."""
+"""Access to the files of one submission, unpacked if necessary."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.formats import SUFFIXES
 
 __all__ = ["Submission", "opened"]
 
-_DEEPEST = 3  # archives in archives
+_DEEPEST = 3  # levels of nested archives
 _COMPANIONS = {  # files that models refer to
     *(".bin", ".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".gif", ".webp", ".tif", ".tiff"),
     *SUFFIXES,
@@ -26,14 +26,14 @@ _COMPANIONS = {  # files that models refer to
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """The files of a submission that are compared.
+    """The files of a submission to compare.
 
     Attributes
     ----------
     files : tuple of Path
         Files to open together, or one folder.
     base : Path or None
-        Temporary folder that stands for the archive, and is removed with its content.
+        Temporary folder with the unpacked archive, removed at the end; None for a folder.
     """
 
     files: tuple[Path, ...]
@@ -47,10 +47,10 @@ def opened(
     alike: Sequence[str] = (),
     temporary: Path | None = None,
 ) -> Iterator[Submission]:
-    """Open a folder or a zip archive; what was unpacked is removed at the end.
+    """Open a folder or a zip archive; unpacked files are removed at the end.
 
-    Links that lead out of a folder are treated as missing: a submission can't refer to the files
-    of others.
+    Links that lead out of the folder count as missing files: a submission can't use those of
+    others.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def _existing(folder: Path | None) -> Path | None:
 
 
 def _names_in(folder: Path) -> list[str]:
-    """Return the paths of all files in a folder, relative to it, except junk and outer links."""
+    """Return the relative paths of all files in a folder, except junk and outbound links."""
     names = []
     root = folder.resolve()
 
@@ -131,7 +131,7 @@ def _unpack(
 
 
 def _lone_archive(names: Sequence[str]) -> str | None:
-    """Return the only archive of a submission, as systems for courses pack them, or None."""
+    """Return the only archive of a submission, as course platforms often nest them, or None."""
     inner = [name for name in names if suffix_of(name) == ".zip"]
     is_lone = len(inner) == 1 and not any(suffix_of(name) in _COMPANIONS for name in names)
     return inner[0] if is_lone else None

@@ -95,7 +95,7 @@ def add_job_arguments(parser: argparse.ArgumentParser, job: str) -> None:
         elif action.dest == "output":
             action.required, action.metavar = False, "OUT"
             action.help = (
-                "a folder, which repeats the folders of the inputs, or a template: "
+                "a folder, which mirrors the folders of the inputs, or a template: "
                 "'out/{parent}/{stem}.bvh'; also {folder}, {name}, {suffix}, {index:05}"
             )
 

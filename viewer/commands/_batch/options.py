@@ -23,7 +23,7 @@ def add_batch_arguments(
     ``parser``: parser of a job.
     ``suffix``: default of ``--to``.
     ``writes``: whether the job writes files: ``always``, ``maybe`` or ``never``.
-    ``has_fixed``: whether the job itself has an option for files that all items read.
+    ``has_fixed``: whether the job itself has an option for files shared by all items.
     """
     group = parser.add_argument_group("batch")
     if writes != "never":
@@ -56,7 +56,7 @@ def add_batch_arguments(
 
 
 def _add_progress(group: argparse._ArgumentGroup) -> None:
-    """Add the options for what is run, and what has been run before."""
+    """Add the options for the report, and for resuming and dividing a batch."""
     group.add_argument(
         "--report",
         metavar="FILE",
@@ -72,7 +72,7 @@ def _add_progress(group: argparse._ArgumentGroup) -> None:
         "--shard",
         default="",
         metavar="I/N",
-        help="only every N-th input from the I-th, with I from 0 to N - 1, for arrays of jobs: "
+        help="run only every N-th input, starting with input I (0 to N - 1), for job arrays: "
         "$SLURM_ARRAY_TASK_ID/$SLURM_ARRAY_TASK_COUNT with --array=0-7",
     )
 
@@ -104,14 +104,14 @@ def _add_processes(group: argparse._ArgumentGroup) -> None:
         "--timeout",
         type=number,
         metavar="SECONDS",
-        help="end workers that take longer for one input; 0: never (default: "
-        f"{TIMEOUT:g}; not without workers)",
+        help="terminate workers that take longer for one input; 0: never (default: "
+        f"{TIMEOUT:g}; no limit with --workers 0)",
     )
     group.add_argument(
         "--limit-memory",
         default="",
         metavar="SIZE",
-        help="memory that a worker may use, with k, M or G (default: no limit)",
+        help="memory that a worker may use, such as 4G; suffixes k, M, G (default: no limit)",
     )
 
 

@@ -28,14 +28,14 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
     group = parser.add_argument_group("results")
     group.add_argument("--table", default="", metavar="FILE.csv", help="write one row per input")
     if job in _OVERVIEWS:
-        kinds = "a page (.html)"
+        kinds = "a page (.html) of all inputs"
         if job in _DRAWN:
-            kinds += ", or contact sheets of the images (.png, .jpg)"
+            kinds += ", or contact sheets of their images (.png, .jpg)"
         group.add_argument(
             "--overview",
             default="",
             metavar="FILE",
-            help=f"write {kinds} of all inputs, such as {_OVERVIEWS[job]}; failed ones are marked",
+            help=f"write {kinds}, such as {_OVERVIEWS[job]}; failed inputs are marked",
         )
     if job == "diff":
         group.add_argument(
@@ -44,7 +44,8 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
             default=[],
             metavar="PATTERN",
             help="compare this file of each folder or zip archive, such as student.skel or "
-            "'*.skin'; repeat it for several (default: files with the suffixes of the reference)",
+            "'*.skin'; repeat the option for several files (default: files with the suffixes of "
+            "the reference)",
         )
 
 

@@ -53,18 +53,18 @@ MESSAGES = {
     "F001.submission-size": "expected at most {most} bytes of files, found {found}",
     "F001.submission-count": "expected at most {most:#file}, found {found}",
     "F002.submission-kind": _SUBMISSION + "a {suffix:text} file",
-    "F002.submission-zip": _SUBMISSION + "a damaged one ({reason:text})",
+    "F002.submission-zip": _SUBMISSION + "a damaged archive ({reason:text})",
     "F002.submission-ratio": "expected a compression ratio of at most {most}, found {found} bytes "
     "in {size}",
-    "F002.submission-encrypted": "{item:text}: expected a file without a password, found an "
-    "encrypted one",
+    "F002.submission-encrypted": "{item:text}: expected an unencrypted file, found an encrypted "
+    "one",
     "F002.submission-method": "{item:text}: expected a stored or deflated file, found compression "
     "method {method}",
     "F002.submission-outside": "{item:text}: expected a path inside the archive, found one that "
     "leads outside",
     "F002.submission-link": "{item:text}: expected a file, found a symbolic link",
     "F002.submission-twice": "{item:text}: expected a single file with this path, found {found}",
-    "F002.submission-nested": "expected files to compare, found archives in {depth} archives",
+    "F002.submission-nested": "expected files to compare, found archives nested {depth} deep",
     "F002.submission-missing": "expected {expected:#file} matching {pattern:text}, found "
     "{names:list}",
     "F002.submission-several": "expected {expected:#file} matching {pattern:text}, found "

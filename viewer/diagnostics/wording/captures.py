@@ -87,8 +87,8 @@ MESSAGES = {
     "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
     "F007.video-last": "{n:#result} in the folder: opened {name:text}, the last iteration",
     "F007.video-tracks": "ignored because it does not match the people: all are in every frame",
-    "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, in the order "
-    "of the list",
+    "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
+    "their order in the list",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "

@@ -19,8 +19,8 @@ MESSAGES = {
     "F007.unused-images": "--images {value:text} has no effect: no file is a capture",
     "F007.unused-model": "--model {value:text} has no effect: no file has a motion that could "
     "drive it",
-    "F007.model-of-parameters": "--model has no effect: these people are given by parameters of "
-    "{member}, which only drive a figure if that model is in the model folder (viewer models)",
+    "F007.model-of-parameters": "--model has no effect: the capture contains parameters of "
+    "{member}, which can drive a figure only if that model is in the model folder (viewer models)",
     "F007.model-of-points": "--model has no effect: the capture has only keypoints",
     "F007.unused-joint-map": "--joint-map has no effect: no motion of another skeleton drives a "
     "figure",
@@ -46,8 +46,8 @@ MESSAGES = {
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
-    "F007.own-model": "drawn with {model:text} of the model folder (--model selects another)",
-    "F007.own-carrier": "motion computed with {model:text} of the model folder",
+    "F007.own-model": "drawn with {model:text} from the model folder (--model selects another)",
+    "F007.own-carrier": "motion computed with {model:text} from the model folder",
     "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
     "F007.bundled-body": "drawn with the bundled body (--model selects another)",
     "F007.bundled-body-without-shapes": "drawn with the bundled body, without the shape "

@@ -8,9 +8,10 @@ MESSAGES = {
     "F004.no-skeleton": "{figure:text} has no skeleton to animate",
     "F004.mirror": "figure {figure:text} has no skeleton to mirror",
     "F004.mapping-joint": "expected a joint of {figure:text}, found {joint:quoted}; {near}",
-    "F004.mapping-joints": "expected one joint of {figure:text}, found {joint:quoted}, the name "
-    "of {n}; {near}",
-    "F004.mapping-again": "expected each joint of {figure:text} once, found {joint:quoted} again",
+    "F004.mapping-joints": "expected one joint of {figure:text}, found {joint:quoted}, a name "
+    "shared by {n}; {near}",
+    "F004.mapping-again": "expected each joint of {figure:text} at most once, found {joint:quoted} "
+    "again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
     "{figure:text}: {idle:list8}; --joint-map can match them",
@@ -39,16 +40,16 @@ MESSAGES = {
     "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
     "{names:list}",
     "F007.rest-lying": "rest pose of {motion:text}: estimated from its trunk, knees and elbows; "
-    "its zero pose is not a standing pose, and the motion is not upright, so that the slope of "
+    "its zero pose is not a standing pose, and the motion is not upright, so the slope of "
     "its feet is assumed; --source-rest overrides it",
-    "F007.feet-planted": "feet of {figure:text} planted in {n:#contact} of {motion:text}: they "
+    "F007.feet-planted": "feet of {figure:text} planted during {n:#contact} of {motion:text}: they "
     "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
     "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "
-    "leaves them as retargeted",
-    "F007.feet-kept": "feet of {figure:text} not planted: they slide as little as those of "
+    "disables this",
+    "F007.feet-kept": "feet of {figure:text} not planted: they already slide as little as "
+    "those of {motion:text}",
+    "F007.feet-no-contacts": "feet of {figure:text} not planted: no ground contacts found in "
     "{motion:text}",
-    "F007.feet-no-contacts": "feet of {figure:text} not planted: those of {motion:text} never "
-    "stand",
     "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
@@ -108,7 +109,7 @@ PHRASES = {
     # Clean-up of captured motions
     "one-euro": "One Euro filter, cutoff {cutoff:g} Hz, beta {beta:g}",
     "savgol": "Savitzky-Golay filter, {shortest:+{} to }{n:#frame}, degree {order}{left:+; {}}",
-    "savgol-short": "{n:#run} of too few frames {n:?is|are} unchanged",
+    "savgol-short": "{n:#run} with too few frames {n:?is|are} unchanged",
     "moved-joints": "joints",
     "moved-points": "points",
     "part-body": "body",

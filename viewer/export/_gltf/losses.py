@@ -56,7 +56,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """The figure's vertex that each vertex of the file copies."""
+        """Indices of the figure's vertices that the file's vertices are copies of."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -95,7 +95,7 @@ def gltf_losses(
 def sides(
     written: Written, figure: Figure, frames: Frames, how: Skinning, shape: Shape
 ) -> tuple[Side, Callable[[int | None], Side]]:
-    """Return a posed figure, and a function that returns a file in the same form.
+    """Return the poses of a figure, and a function that returns those of a file for comparison.
 
     Parameters as for ``gltf_losses``; the function takes a number of influence sets, or None for
     all.
@@ -115,7 +115,7 @@ def sides(
 
 
 def _split(side: Side, sources: Ints) -> Side:
-    """Return a side with vertices duplicated as in the file."""
+    """Return a posed figure with its vertices duplicated as in the file."""
     whole = side.exact
     assert side.body is not None  # the caller checked for a mesh
     body = body_rows(side.body, sources)
@@ -218,7 +218,7 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
 
 
 def _is_limited(skeleton: Skeleton) -> bool:
-    """Return whether a joint has limits, other than the locked ones that follow others."""
+    """Return whether any joint has limits, except joints that a constraint drives."""
     followers = [constraint.joint for constraint in skeleton.constraints]
     is_own = ~np.isin(skeleton.dof_joints, followers)
     return bool(np.isfinite(skeleton.dof_limits[is_own]).any())

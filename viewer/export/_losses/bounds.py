@@ -19,7 +19,7 @@ from viewer.export._losses.skinned import Body, Poses
 from viewer.rig.arrays import Floats
 from viewer.rig.skin import Skin, merged, owners, skin_from_entries
 
-# The bounds of the last correctives: a batch writes motions of one body after another.
+# Cached bounds of the correctives used last: a batch writes many motions of the same body.
 _known: tuple[weakref.ref[Floats] | None, Floats] = (None, np.zeros(0))
 
 _NUMBERS = 9  # entries of a joint's rotation matrix, which drive the correctives
