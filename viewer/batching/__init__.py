@@ -1,1 +1,1 @@
-"""Many files through one job: items, engines that run them, and the report."""
+"""Processing of many files by one job: items, engines that run them, and the report."""

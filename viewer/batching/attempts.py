@@ -1,4 +1,4 @@
-"""One attempt at an item in this process, its output and errors as a result."""
+"""An attempt to run one item in this process; its output and errors become a result."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class FunctionJob:
 
 
 def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
-    """Run one item; its failure is a result, and only a signal is raised.
+    """Run one item; a failure becomes a result, and only a signal is raised.
 
     Parameters
     ----------
@@ -60,14 +60,14 @@ def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     Raises
     ------
     Interrupted
-        If a signal arrives that nobody has postponed.
+        If a signal arrives whose handling is not deferred.
     """
     out, err = io.StringIO(), io.StringIO()
     start = time.perf_counter()
     with recorded() as record, contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(err))
-        # Also ends what the item has held back: writing holds signals until the block ends.
+        # Also interrupts the item if it is writing, which defers signals until the block ends.
         stack.enter_context(watched())
         result = _outcome(item, call, record)
     return replace(
@@ -94,8 +94,8 @@ def _outcome(item: Item, call: Callable[[Item], Any], record: Record) -> Result:
         reason = printable(f"{where}{problem.strerror or problem}", _LONGEST)
         return Result(item, "failed", _UNWRITTEN, message=reason)
     except (Exception, SystemExit) as problem:
-        # The one place that catches everything: a batch is run for hours unattended, and a defect
-        # that one file brings to light must not cost the results of all others.
+        # The only place that catches all exceptions: a batch runs unattended for hours, and a bug
+        # triggered by one file must not discard the results of all others.
         reason = printable(f"{type(problem).__name__}: {problem}", _LONGEST)
         return Result(item, "failed", _DEFECT, message=reason, text="".join(traceback.format_exc()))
     if isinstance(returned, int) and not isinstance(returned, bool):

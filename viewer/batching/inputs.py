@@ -16,24 +16,24 @@ from viewer.phrases import counted, printable
 
 __all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]
 
-_AMBIGUOUS = (".txt", ".json")  # notes and settings more often than poses
+_AMBIGUOUS = (".txt", ".json")  # usually notes and settings, not poses
 _WILD = re.compile(r"[*?[]")
 _DIGITS = re.compile(r"[0-9]+")
 
 
 @dataclass(frozen=True)
 class Inputs:
-    """What the arguments of a batch stand for.
+    """The inputs that the arguments of a batch select.
 
     Attributes
     ----------
     paths : tuple of str
-        Files, and folders that are one input each, sorted; spelled as they were given.
+        Files, and folders that are one input each, sorted; spelled as given.
     base : str
-        Absolute path of the folder that contains everything that was named. It depends on the
-        arguments only, not on the files that a pattern happens to match.
+        Absolute path of the folder that contains all arguments. It depends only on the arguments,
+        not on the files that a pattern happens to match.
     folders : frozenset of str
-        Those of the paths that are folders.
+        The paths that are folders.
     notes : tuple of str
         Messages about duplicates and skipped files.
     """
@@ -59,16 +59,16 @@ def find_inputs(
         Files, folders, patterns such as ``data/**/*.npz`` (a name that exists is not a pattern),
         ``@list.txt`` for a list, and ``-`` for a list on standard input.
     lists : iterable of str
-        Files with one path per line, or separated by zero bytes, as ``find -print0`` does; ``-``
+        Files with one path per line, or separated by null bytes, as by ``find -print0``; ``-``
         for standard input.
     suffixes : collection of str
         Suffixes of the files taken from a folder; by default, those that identify a format.
     keeps_folders : bool
-        Whether every folder is an input. Otherwise its files are, except for recordings and
-        models that consist of a folder.
+        Whether each folder is one input. Otherwise its files are the inputs, except for recordings
+        and models that consist of a folder.
     output : str
-        Folder of the outputs. If it lies in a searched folder, its files are no inputs, as they
-        would be when a batch is resumed.
+        Folder of the outputs. If it lies in a searched folder, its files are not used as inputs,
+        which matters when a batch is resumed.
 
     Raises
     ------
@@ -94,12 +94,12 @@ def find_inputs(
 
 
 def natural_key(path: str) -> tuple[str, str]:
-    """Return a sort key that orders names part by part, and numbers in them by value.
+    """Return a sort key that orders paths part by part, with numbers by value.
 
     >>> sorted(["a/walk10", "a/walk9", "a-b/walk1"], key=natural_key)
     ['a/walk9', 'a/walk10', 'a-b/walk1']
     """
-    # A longer number is larger, and a folder is compared as a whole before what is in it.
+    # A longer number is larger, and a folder is compared as a whole before its contents.
     return _DIGITS.sub(_with_length, path.casefold()).replace("/", "\0"), path
 
 
@@ -109,7 +109,7 @@ def _with_length(number: re.Match[str]) -> str:
 
 
 def is_recording(folder: str | Path) -> bool:
-    """Return whether a folder as a whole is one recording or model, recognised by its files."""
+    """Return whether a folder is a single recording or model, recognised by its files."""
     try:
         names = os.listdir(folder)
     except OSError:
@@ -125,7 +125,7 @@ class _Search:
 
     def __init__(self, suffixes: set[str], keeps_folders: bool, output: str) -> None:
         self.suffixes, self.keeps_folders, self.output = suffixes, keeps_folders, output
-        self.roots: list[str] = []  # folders that contain what was named
+        self.roots: list[str] = []  # folders that contain the arguments
         self._found: dict[tuple[str, str], str] = {}
         self._real: dict[str, str] = {}  # real paths of folders
         self._folders: set[str] = set()
@@ -133,7 +133,7 @@ class _Search:
         self._n_skipped = self._n_outputs = 0
 
     def add_named(self, path: str) -> None:
-        """Add a file, or a folder and what is in it."""
+        """Add a file, or a folder and its contents."""
         if not os.path.exists(path):
             raise ViewerError(f"{printable(path, 300)}: no such file or folder")
         is_folder = os.path.isdir(path)
@@ -170,7 +170,7 @@ class _Search:
             raise ViewerError(f"{printable(pattern, 300)}: no file matches this pattern")
 
     def result(self) -> Inputs:
-        """Return everything, sorted."""
+        """Return all inputs, sorted."""
         notes = []
         if self._n_repeated:
             notes.append(f"{counted(self._n_repeated, 'path')} named more than once, used once")
@@ -189,7 +189,7 @@ class _Search:
         return len(self._found) + self._n_repeated
 
     def _is_output(self, path: str) -> bool:
-        """Return whether a path lies in the folder of the outputs, itself within the last root."""
+        """Return whether a path lies in the output folder, if that is within the last root."""
         if not self.output or not self.output.startswith(os.path.join(self.roots[-1], "")):
             return False
         found = f"{os.path.abspath(path)}{os.sep}".startswith(f"{self.output}{os.sep}")
@@ -203,7 +203,7 @@ class _Search:
         path = os.path.normpath(path)
         folder, name = os.path.split(path)
         if folder not in self._real:
-            # Links to folders may form loops; files are known by the names of their links.
+            # Links to folders may form loops; linked files keep the names of their links.
             self._real[folder] = os.path.realpath(folder or ".")
         key = (self._real[folder], name)
         if key in self._found:
@@ -216,7 +216,7 @@ class _Search:
     def _inside(self, folder: str, visited: set[str]) -> Iterator[tuple[str, bool]]:
         """Yield files and recordings in a folder and its subfolders, except hidden ones.
 
-        With each, whether it is a folder.
+        Each path is paired with whether it is a folder.
         """
         real = os.path.realpath(folder)
         if real in visited:

@@ -17,14 +17,14 @@ class Item:
     Attributes
     ----------
     index : int
-        Position in the sorted list of all items of the batch, before shards are taken.
+        Position in the sorted list of all items of the batch, before it is divided into shards.
     files : tuple of str
-        Input files or folders, as the job's command would be given them. A member of a zip archive
+        Input files or folders, as passed to the job's command. A member of a zip archive
         is written as ``archive.zip/member``.
     output : str
         File or folder that the job writes; empty for jobs that only print.
     name : str
-        Path relative to the folder that all inputs share: what tables and reports show.
+        Path relative to the common folder of all inputs, shown in tables and reports.
     """
 
     index: int
@@ -40,9 +40,9 @@ class Result:
     Attributes
     ----------
     status : str
-        ``done``, or why there is no result: ``failed`` (the job's message says why), ``timeout``,
-        ``crashed`` (the worker process died), ``memory``, ``cancelled``; ``unchanged`` if an
-        earlier run has done it.
+        ``done``, or the reason why there is no result: ``failed`` (the job's message says why),
+        ``timeout``, ``crashed`` (the worker process died), ``memory``, ``cancelled``; ``unchanged``
+        if an earlier run finished it.
     exit_code : int
         That of the job's command: 0 success, 1 findings or differences, 2 bad input ...
     seconds : float

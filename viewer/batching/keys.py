@@ -1,4 +1,4 @@
-"""Keys of items: hashes of their inputs, options and program, by which finished ones are known."""
+"""Keys of items: hashes of inputs, options and program version that identify finished items."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ _remembered: dict[tuple[str, int, int], bytes] = {}
 
 
 def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
-    """Return the key of an item, which changes if its result may change.
+    """Return the key of an item, which changes whenever its result may change.
 
-    Files that an input refers to, such as textures, are not part of it.
+    Files that an input refers to, such as textures, are not included.
 
     Parameters
     ----------
     item : Item
-        The item; the content of its files counts, not their place, and the output's name.
+        The item; the key includes the content of its files, not their location, and the output's
+        name.
     settings : str
-        Everything else that the result depends on: job, options, version of the program.
+        Everything else that affects the result: job, options, version of the program.
     shared : iterable of str
         Files that all items read; each is read once per process.
 
@@ -50,7 +51,7 @@ def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
 
 
 def _digest(path: str) -> bytes:
-    """Return the hash of a file, of a folder's files and their names, or of an archive's member."""
+    """Return the hash of a file, of a folder's files and their names, or of an archive member."""
     total = blake2b(digest_size=_SIZE)
     if os.path.isdir(path):
         for folder, folders, files in os.walk(path):

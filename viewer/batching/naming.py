@@ -1,4 +1,4 @@
-"""Output names of a batch, from a template; clashes are found before anything starts."""
+"""Output names of a batch, from a template; name clashes are found before anything starts."""
 
 from __future__ import annotations
 
@@ -31,12 +31,12 @@ _LONGEST = 300  # characters of a name in a message
 
 
 def template_of(output: str, suffix: str) -> str:
-    """Return the template of the output names.
+    """Return the template for output names.
 
     Parameters
     ----------
     output : str
-        A template, or a folder, in which the folders of the inputs are repeated.
+        A template, or a folder, which mirrors the folders of the inputs.
     suffix : str
         Suffix of the files in such a folder, such as ``bvh``; ``folder`` for outputs that are
         folders; empty if ``output`` must be a template.
@@ -44,7 +44,7 @@ def template_of(output: str, suffix: str) -> str:
     Raises
     ------
     ViewerError
-        If a field is unknown, or neither fields nor suffix are given.
+        If a field is unknown, or neither a field nor a suffix is given.
     """
     if _fields(output):
         if suffix:
@@ -63,7 +63,7 @@ def template_of(output: str, suffix: str) -> str:
 
 
 def output_folder(output: str) -> str:
-    """Return the folder of all outputs of a folder or template; empty if it has no name.
+    """Return the common folder of all outputs of a folder or template; empty if it has none.
 
     >>> output_folder("out"), output_folder("out/a_{stem}.bvh"), output_folder("{stem}.bvh")
     ('out', 'out', '')
@@ -100,7 +100,7 @@ def items_of(inputs: Inputs, template: str = "") -> list[Item]:
     inputs : Inputs
         The inputs.
     template : str
-        Template of the output names; empty if nothing is written.
+        Template for output names; empty if nothing is written.
     """
     pieces = list(Formatter().parse(template))
     here = os.getcwd()
@@ -127,7 +127,7 @@ def _filled(
     is_folder: bool,
 ) -> str:
     parent, last = os.path.split(name)
-    # A folder's name has no suffix, whatever dots it contains.
+    # A folder's name has no suffix, even if it contains dots.
     stem, suffix = (last, "") if is_folder else os.path.splitext(last)
     values: dict[str, str | int] = {
         "parent": parent or ".",
@@ -150,8 +150,8 @@ def _filled(
 def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> None:
     """Check that no two items have the same output and no output is an input.
 
-    Names that differ in upper and lower case only are the same file on some systems, and the
-    results are likely to be copied to one of them.
+    Names that differ only in case refer to the same file on some systems, and results are likely to
+    be copied to one of these.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ def _identity(folder: str, path: str) -> str:
 
 
 class _RealPaths:
-    """Real paths, for which each folder is resolved once."""
+    """Real paths; each folder is resolved only once."""
 
     def __init__(self) -> None:
         self._folders: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""Run of a batch: its engine, its report, what is done already, and interruption."""
+"""Execution of a batch: engine, report, resumption and interruption."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ __all__ = ["KeyedJob", "Settings", "related_reports", "run_batch", "shard_of"]
 
 @dataclass(frozen=True)
 class Settings:
-    """How a batch is run.
+    """Settings of a run.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class Settings:
         What to do with a report that exists: ``refuse`` it, ``replace`` it, ``append`` to it, or
         ``resume``: append, and skip the items that it or the report of another shard lists as done.
     identity : str
-        Job, options and version of the program, as a part of the items' keys.
+        Job, options and version of the program, which are part of the items' keys.
     shared : tuple of str
         Files that all items read.
     """
@@ -79,7 +79,7 @@ class KeyedJob:
         """Run one item, unless it is finished."""
         try:
             key = item_key(item, self.identity, self.shared)
-        except OSError:  # the job names the file and says what is wrong with it
+        except OSError:  # the job reports the file and its error
             return self.job(item)
         if key in self.finished:
             return Result(item, "unchanged", key=key)
@@ -113,7 +113,7 @@ def shard_of(items: Sequence[Item], text: str) -> list[Item]:
 
 
 def related_reports(path: Path) -> list[Path]:
-    """Return a report and those of the shards next to it that exist."""
+    """Return an existing report and the reports of other shards next to it."""
     stem = glob.escape(path.stem.partition(".")[0])
     names = f"{stem}.*-of-*.jsonl"
     shards = sorted(path.parent.glob(names)) if path.parent.is_dir() else []
@@ -128,7 +128,7 @@ def run_batch(
 ) -> Report:
     """Run the items of a batch; a failed item never stops the others.
 
-    The first signal ends the batch when the items that run are finished; a second one cancels them.
+    The first signal ends the batch after the running items are finished; a second one cancels them.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def run_batch(
     Raises
     ------
     Interrupted
-        If a second signal cancels the batch; the report has what was finished.
+        If a second signal cancels the batch; the report contains the finished items.
     ViewerError
         If the batch cannot start.
     OutputError
@@ -202,5 +202,5 @@ def _has_content(path: Path) -> bool:
 
 
 def _is_there(result: Result) -> bool:
-    """Return whether everything that an item has written still exists."""
+    """Return whether all files that an item wrote still exist."""
     return all(os.path.lexists(path) for path in result.outputs)

@@ -47,9 +47,9 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     Parameters
     ----------
     path : str or Path
-        The file; it is replaced as a whole, or not at all.
+        The file, which is replaced atomically.
     job : str
-        Name of the command, which has its own columns.
+        Name of the command, which determines the columns.
     results : iterable of Result
         Results in any order; rows are in the order of the inputs.
 
@@ -64,14 +64,14 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     writer.writerow(_columns(job))
     writer.writerows([[_safe(cell) for cell in row] for row in rows])
     text = stream.getvalue()
-    # Excel takes a file without this mark for one in the system's encoding.
+    # Without this mark, Excel assumes the system's encoding.
     mark = b"" if text.isascii() else b"\xef\xbb\xbf"
     save_bytes(path, mark + text.encode("utf-8", "backslashreplace"))
     return len(rows)
 
 
 def table_rows(job: str, results: Iterable[Result]) -> list[list[Cell]]:
-    """Return the rows of a table, without the head."""
+    """Return the rows of a table, without the header."""
     cells_of = _CELLS.get(job, _output_cells)
     return [
         [
@@ -92,7 +92,7 @@ def _columns(job: str) -> list[str]:
 
 
 def _safe(cell: Cell) -> Cell:
-    """Return a cell that no spreadsheet takes for a formula: names come from other people."""
+    """Return a cell that spreadsheets do not treat as a formula: names are untrusted."""
     if isinstance(cell, str):
         return f"'{cell}" if cell.startswith(_FORMULAS) else cell
     if isinstance(cell, float):
@@ -133,7 +133,7 @@ def worst_measure(result: Result, group: str) -> tuple[Mapping[str, Any], Mappin
 
 
 def _number(value: object) -> float:
-    """Return a number; those that JSON lacks are written as text."""
+    """Parse a number; JSON stores NaN and infinity as text."""
     if isinstance(value, int | float):
         return float(value)
     return math.nan if value is None else float(str(value))
@@ -156,7 +156,7 @@ def _diff_cells(result: Result) -> list[Cell]:
 
 
 def mismatches_of(result: Result) -> list[str]:
-    """Return what only one of the two sides has."""
+    """Return the elements that only one of the two sides has."""
     return [
         text
         for one in comparisons(result)

@@ -1,4 +1,4 @@
-"""The number of this worker process among those of its batch."""
+"""Rank of this worker process within its batch."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ _name = ""
 
 
 def name_worker(name: object) -> None:
-    """Set the name of this process, as a cluster calls it; a number at its end is the rank."""
+    """Set the name of this process in a cluster; a number at its end is the rank."""
     global _name
     _name = str(name)
 
 
 def worker_rank() -> int | None:
-    """Return the number of this worker, which workers share out graphics cards by.
+    """Return the rank of this worker, by which graphics cards are assigned.
 
     Returns
     -------
     int or None
-        None in the process that runs the batch. Replaced workers get new numbers.
+        None in the process that runs the batch. Replacement workers get new ranks.
     """
     if not _name and multiprocessing.parent_process() is None:
         return None

@@ -24,9 +24,9 @@ if TYPE_CHECKING:
 __all__ = ["Measured", "measured"]
 
 _SIZE = 1280, 720
-_STARTS, _FRAMES = 5, 9  # repetitions, of which the median counts
+_STARTS, _FRAMES = 5, 9  # repetitions; the median is used
 _INSTANCES, _ROUNDS_OF_MANY = 100, 3
-# The least that a program needs which draws something: numpy, and a context of OpenGL.
+# A minimal program that draws: it imports numpy and creates an OpenGL context.
 _LEAST = "from viewer.rendering.gpu.context import headless_context; headless_context()"
 
 
@@ -50,7 +50,7 @@ def measured() -> Iterator[Measured]:
     Raises
     ------
     RenderError
-        If nothing can be drawn, after the measurements that do not draw.
+        If drawing is impossible; raised after the measurements that need no drawing.
     """
     yield from _starts()
     yield from _frames()
@@ -58,7 +58,7 @@ def measured() -> Iterator[Measured]:
 
 
 def _starts() -> Iterator[Measured]:
-    """Measure whole programs, from their start to their end."""
+    """Measure whole programs, from start to exit."""
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
         picture = str(Path(folder) / "picture.png")
         draw = ["-m", "viewer", "render", "-o", picture, "--force", "--quality", "draft"]
@@ -82,12 +82,12 @@ def _skeleton() -> str:
 
 
 def _ratio(times: Sequence[float], others: Sequence[float]) -> float:
-    """Return the median ratio of times that were measured in turn."""
+    """Return the median ratio of times that were measured alternately."""
     return statistics.median(one / other for one, other in zip(times, others, strict=True))
 
 
 def _process(arguments: Sequence[str], environment: dict[str, str]) -> Callable[[], object]:
-    """Return a function that runs Python with arguments."""
+    """Return a function that runs Python with the given arguments."""
 
     def run() -> None:
         done = subprocess.run(
@@ -104,7 +104,7 @@ def _process(arguments: Sequence[str], environment: dict[str, str]) -> Callable[
 
 
 def _frames() -> Iterator[Measured]:
-    """Measure frames of the bundled body that are read into memory."""
+    """Measure frames of the bundled body, rendered and read into memory."""
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.options import DisplayOptions
 
@@ -164,7 +164,7 @@ def _pose(scene: Scene) -> None:
 
 
 def _parts() -> Iterator[Measured]:
-    """Measure what a frame consists of, without drawing."""
+    """Measure the parts of a frame other than drawing."""
     import numpy as np
 
     from viewer.media.png import encode_png
@@ -189,12 +189,12 @@ def _parts() -> Iterator[Measured]:
 
 
 def _interleaved(work: dict[str, Callable[[], object]], rounds: int) -> dict[str, list[float]]:
-    """Time each function once per round, in turn, after a first round: milliseconds by name."""
+    """Time all functions once per round, after a warm-up round: milliseconds by name."""
     times: dict[str, list[float]] = {name: [] for name in work}
     for number in range(rounds + 1):
         for name, run in work.items():
             started = time.perf_counter()
             run()
-            if number:  # the first round compiles and fills caches
+            if number:  # the warm-up round compiles and fills caches
                 times[name].append(1e3 * (time.perf_counter() - started))
     return times

@@ -1,4 +1,4 @@
-"""The option for gaps in captures, frames in which a person is absent."""
+"""The option for gaps in captures: frames in which a person is absent."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ _METAVAR = {
 
 
 def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
-    """Add ``--gaps``, and older names for its values, which help does not list.
+    """Add ``--gaps``, and deprecated options for its values, which are hidden in the help.
 
     ``group``: options of a command.
     ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.

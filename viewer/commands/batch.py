@@ -24,7 +24,7 @@ _FAILED = 1  # exit code
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments that all jobs share."""
+    """Add the arguments common to all jobs."""
     names = ", ".join(JOBS)
     parser.usage = "%(prog)s JOB PATHS [-o OUT] [options of the job] [options]"
     parser.add_argument(

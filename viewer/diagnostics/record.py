@@ -1,4 +1,4 @@
-"""Record of one run: its diagnostics, data and written files, for callers that run commands."""
+"""Record of one run: diagnostics, data and written files, for callers that run commands."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ __all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", 
 
 @dataclass
 class Record:
-    """Data of a run that its printed text does not have.
+    """Data of a run that its printed text lacks.
 
     Attributes
     ----------
     diagnostics : list of dict
-        Warnings and notes as ``described`` returns them; those that are plain text have only
-        ``severity`` and ``message``.
+        Warnings and notes as returned by ``described``; plain texts have only ``severity`` and
+        ``message``.
     values : dict
         Results as JSON data.
     outputs : dict of str
@@ -35,7 +35,7 @@ class Record:
     outputs: dict[str, None] = field(default_factory=dict)
 
 
-# Not a context variable: videos are encoded, and so written, by threads of their own.
+# Not a context variable: videos are encoded and written by separate threads.
 _current: Record | None = None
 
 
@@ -69,13 +69,13 @@ def note_found(found: Diagnostic | str) -> bool:
 
 
 def note_values(values: Mapping[str, Any]) -> None:
-    """Record results, which are JSON data."""
+    """Record results as JSON data."""
     if _current is not None:
         _current.values |= values
 
 
 def note_output(path: Path, instead_of: Path | None = None) -> None:
-    """Record a written file, or a folder instead of the files in its temporary folder."""
+    """Record a written file, or a folder in place of the files in its temporary folder."""
     if _current is None:
         return
     if instead_of is not None:

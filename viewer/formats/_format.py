@@ -16,7 +16,7 @@ class Format:
     suffixes : tuple of str
         Suffixes with their dots; files are written with the first suffix.
     signature : bytes
-        Regular expression that the head of every such text file contains; empty for none.
+        Regular expression that matches in the head of every such text file; empty for none.
     keys : tuple of str
         Keys that identify an archive (``.pkl``, ``.npz``) of this format: any one is sufficient.
     files : tuple of str

@@ -1,4 +1,4 @@
-"""Figures that are read once for many runs in one process, such as the model of a batch."""
+"""Cache of figures that many runs in one process read, such as the model of a batch."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _Content = TypeVar("_Content")
 
 @dataclass(frozen=True)
 class _Kept:
-    """A figure, which never changes, and what its reader recorded."""
+    """An immutable figure, and what its reader recorded."""
 
     state: tuple[Any, ...]
     content: Any
@@ -34,7 +34,7 @@ _wanted: frozenset[Path] = frozenset()
 
 @contextlib.contextmanager
 def keeping_figures(paths: Collection[Path]) -> Iterator[None]:
-    """Keep the figures in some files for later runs, until a run keeps others.
+    """Keep the figures of some files for later runs, until a run keeps others.
 
     A file that has changed is read again. Only files are kept, not folders.
 
@@ -67,7 +67,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
     path = source.path.resolve() if _wanted else source.path
     if path not in _wanted or source.is_folder:
         return reader(source)
-    # What a figure refers to is checked too: textures and buffers may be replaced alone.
+    # Files that a figure refers to are checked too: textures or buffers may be replaced alone.
     known = _kept.get(path)
     if known is not None and known.state == _state(source, known.also_read):
         for found in known.diagnostics:
@@ -88,7 +88,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
 
 
 def _state(source: Source, others: Collection[Path]) -> tuple[Any, ...]:
-    """Return what tells whether a figure would be read differently now."""
+    """Return a key that changes if a figure would now be read differently."""
     stamps = []
     for path in (source.path, *others):
         try:

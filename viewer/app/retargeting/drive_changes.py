@@ -1,4 +1,4 @@
-"""Changes of how motions drive figures: they are retargeted at once, and undo restores them."""
+"""Changes to how a motion drives a figure: it is retargeted immediately, and undo reverts it."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def change_drive(state: AppState, change: Callable[[Drive], Drive]) -> bool:
     state : AppState
         State with a driven actor.
     change : callable
-        Returns the new way of driving a figure.
+        Returns the changed drive.
 
     Returns
     -------
     bool
-        Whether it worked; otherwise a message is shown and nothing changes.
+        Whether it succeeded; otherwise a message is shown and nothing changes.
     """
     first = state.actor
     together = [actor for actor in state.scene.actors if _is_together(actor, first)]
@@ -65,8 +65,8 @@ def _is_together(actor: Actor, first: Actor) -> bool:
 
 
 def _retargeted(actor: Actor, change: Callable[[Drive], Drive]) -> Actor:
-    """Return a copy of an actor whose motion is retargeted in another way."""
-    assert actor.drive is not None and isinstance(actor.clip, SampledClip)  # by ``no_edit``
+    """Return a copy of an actor with its motion retargeted by a changed drive."""
+    assert actor.drive is not None and isinstance(actor.clip, SampledClip)  # checked by ``no_edit``
     drive = change(actor.drive)
     clip = driven_clip(drive, actor.figure)[0]
     if drive.finish is not None:

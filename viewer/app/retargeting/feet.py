@@ -1,4 +1,4 @@
-"""Switch for the feet of driven figures, which stay on the ground where those of the motion do."""
+"""Switch for planting the feet of driven figures while those of the motion stand."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ __all__ = ["plants_feet", "toggle_feet"]
 
 
 def plants_feet(state: AppState) -> bool:
-    """Return whether the feet of the chosen actor are kept on the ground."""
+    """Return whether the feet of the chosen actor are planted."""
     drive = state.actor.drive
     return drive is not None and drive.plants_feet
 
 
 def toggle_feet(state: AppState) -> None:
-    """Switch the correction of the chosen actor's feet on or off, also for its whole capture."""
+    """Switch planted feet on or off for the chosen actor and all people of its capture."""
     if no_edit(state):
         state.say_status(no_edit(state))
         return

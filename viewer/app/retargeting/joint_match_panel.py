@@ -129,7 +129,7 @@ def _draw_table(state: AppState, shown: Shown, hovered: set[int]) -> None:
 
 
 def _listed(state: AppState, shown: Shown) -> list[int]:
-    """Return the joints of the figure that the filter leaves."""
+    """Return the joints of the figure that pass the filter."""
     view = state.of(JointMatch)
     wanted, found = view.filter.lower(), []
     for joint in shown.target.joints.tolist():
@@ -142,7 +142,7 @@ def _listed(state: AppState, shown: Shown) -> list[int]:
 
 
 def _draw_row(state: AppState, shown: Shown, joint: int, is_hovered: bool) -> None:
-    """Draw a pair of joints; ``is_hovered``: in the drawing of the skeletons."""
+    """Draw a pair of joints; ``is_hovered``: whether the pair is hovered in the drawing."""
     label, partner = shown.target.labels[joint], int(shown.partners[joint])
     imgui.table_next_row()
     if is_hovered:

@@ -115,5 +115,5 @@ def _save(state: AppState, paths: list[Path]) -> None:
 
 
 def _apply(state: AppState, joint_map: JointMap | None) -> bool:
-    """Match the joints of the chosen actor, and of all people of its capture."""
+    """Set the joint match of the chosen actor, and of all people of its capture."""
     return change_drive(state, lambda drive: replace(drive, joint_map=joint_map))

@@ -24,12 +24,12 @@ Box = tuple[float, float, float, float]
 
 
 def draw_preview(state: AppState, shown: Shown, size: tuple[float, float]) -> None:
-    """Draw both skeletons at rest; a click selects a joint of the figure, a drag rotates them.
+    """Draw both skeletons at rest; a click selects a joint of the figure, a drag orbits.
 
     Parameters
     ----------
     state : AppState
-        State with the panel's own.
+        State that contains the panel's state.
     shown : Shown
         The match.
     size : (float, float)
@@ -70,7 +70,7 @@ def hover_pair(state: AppState, shown: Shown, joint: int) -> None:
 
 
 def _hover(state: AppState, shown: Shown, placed: list[Floats]) -> None:
-    """Highlight the joint next to the mouse; a click selects that of the figure."""
+    """Highlight the joint under the mouse and its partners; a click selects that of the figure."""
     view = state.of(JointMatch)
     near = _NEAR * imgui.get_font_size()
     mouse = np.array([imgui.get_mouse_pos().x, imgui.get_mouse_pos().y])
@@ -95,7 +95,7 @@ def _was_dragged() -> bool:
 
 
 def _placed(side: Side, yaw: float, box: Box) -> Floats:
-    """Return the joints in window coordinates, as large as the box allows: (J, 2)."""
+    """Return the joints in window coordinates, scaled to fit the box: (J, 2)."""
     letter = imgui.get_font_size()
     flat = np.stack(
         [
@@ -139,7 +139,7 @@ def _draw_side(side: Side, placed: Floats, used: set[int], hovered: set[int]) ->
 
 
 def _draw_label(text: str, at: Floats) -> None:
-    """Draw the name of a joint on a plate, so that bones do not cross it."""
+    """Draw the name of a joint on a background, so that bones do not cross it."""
     draw_list, letter = imgui.get_window_draw_list(), imgui.get_font_size()
     size = imgui.calc_text_size(text)
     x, y = float(at[0]) + 0.6 * letter, float(at[1]) - 0.5 * size.y

@@ -78,7 +78,7 @@ class Shown:
 
     @property
     def unused(self) -> list[int]:
-        """Joints of the motion that drive nothing."""
+        """Joints of the motion that drive no joint."""
         return [joint for joint in self.source.joints.tolist() if joint not in self.driven]
 
 

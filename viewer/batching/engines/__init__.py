@@ -1,9 +1,9 @@
 """Engines that run the items of a batch: in this process, in local workers, on a cluster.
 
 Each module has ``run(items, job, limits)``, a generator of results in the order in which they
-finish. Engines take items only as they can run them, so that a batch of millions needs no queue.
-They start no more items once ``limits.is_stopping()`` is true, and finish those that run. Closing
-the generator cancels what runs.
+finish. Engines take items only when they can run them, so that a batch of millions needs no queue.
+Once ``limits.is_stopping()`` is true, they start no more items and finish the running ones. Closing
+the generator cancels the running items.
 """
 
 from __future__ import annotations
@@ -22,9 +22,9 @@ IN_FLIGHT = 4
 
 
 class Job(Protocol):
-    """What is done with each item: a callable that can be pickled.
+    """The job that is applied to each item: a callable that can be pickled.
 
-    It returns a result for any item, also for bad input; see ``attempts.attempt``.
+    It returns a result for any item, even for bad input; see ``attempts.attempt``.
     """
 
     def __call__(self, item: Item) -> Result:
@@ -38,16 +38,16 @@ def _never() -> bool:
 
 @dataclass(frozen=True)
 class Limits:
-    """How much a batch may use.
+    """Limits of a batch.
 
     Attributes
     ----------
     workers : int
         Number of worker processes; engines that run in this process ignore it.
     retries : int
-        How often an item is run again after its worker crashed, hung or ran out of memory.
+        How often an item is retried after its worker crashed, hung or ran out of memory.
     timeout : float or None
-        Seconds after which the worker of an attempt is ended; None for no limit.
+        Seconds after which the worker of an attempt is terminated; None for no limit.
     memory : int or None
         Bytes that a worker may allocate; None for no limit.
     cluster : str
@@ -83,7 +83,7 @@ class EngineKind:
     packages : tuple of str
         Packages of the extra ``batch`` that it needs.
     is_isolated : bool
-        Whether a time and memory limit can be enforced, and a crash costs no more than its item.
+        Whether time and memory limits can be enforced, and a crash affects only its item.
     """
 
     title: str

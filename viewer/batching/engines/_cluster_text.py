@@ -25,12 +25,12 @@ class ClusterName:
     Attributes
     ----------
     kind : str
-        ``local``: worker processes of this machine; ``address``: an existing scheduler; ``slurm``:
+        ``local``: worker processes on this machine; ``address``: an existing scheduler; ``slurm``:
         jobs that SLURM starts.
     address : str
         Address of the scheduler.
     options : mapping of str to str
-        Options of the SLURM jobs, as ``sbatch`` calls them; empty values for flags.
+        Options of the SLURM jobs, named as by ``sbatch``; empty values for flags.
     """
 
     kind: Literal["local", "address", "slurm"]
@@ -39,12 +39,12 @@ class ClusterName:
 
 
 def parse_cluster(text: str) -> ClusterName:
-    """Return the meaning of a cluster's name.
+    """Parse the value of ``--cluster``.
 
     Raises
     ------
     ViewerError
-        If it is not a known name, or an option has no name.
+        If it is not a known kind, or an option has no name.
 
     >>> parse_cluster("slurm:partition=gpu,time=2:00:00").options
     {'partition': 'gpu', 'time': '2:00:00'}

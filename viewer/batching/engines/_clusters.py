@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 __all__ = ["connected", "slurm_cluster"]
 
 _CONNECT = 10.0  # seconds
-_MEMORY = 4 << 30  # bytes that a SLURM job asks for per worker, unless it is told
+_MEMORY = 4 << 30  # bytes per worker that a SLURM job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
 _ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
-# The batch itself decides how often a crash is retried, and what it had started.
+# The batch itself counts retries and tracks which items a worker had started.
 _CONFIG = {
     "distributed.scheduler.allowed-failures": 0,
     "distributed.scheduler.worker-saturation": 1.0,
@@ -34,7 +34,8 @@ _CONFIG = {
     "distributed.worker.memory.pause": False,
     # Not MALLOC_TRIM_THRESHOLD_: arrays would fault in again the memory that others returned.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
-    # These look at the workers many times a second, which costs a tenth of short items and more.
+    # These poll the workers many times a second, which takes a tenth or more of the time of short
+    # items.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",
     "distributed.admin.tick.interval": "1s",
@@ -44,7 +45,7 @@ _CONFIG = {
 
 @contextmanager
 def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
-    """Connect to a cluster, which is shut down at the end if it was started here.
+    """Connect to a cluster; shut it down at the end if it was started here.
 
     Raises
     ------
@@ -58,7 +59,7 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
         target: Any = name.address
         if name.kind != "address":
             # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
-            # batch decides what is finished.
+            # batch decides which items are finished.
             folder = stack.enter_context(TemporaryDirectory(prefix="viewer-dask-"))
             with _signals_blocked(), dask.config.set(_CONFIG):
                 if name.kind == "local":
@@ -122,7 +123,7 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         If dask-jobqueue is missing, or ``cpus`` is not a positive integer.
     """
     try:
-        with _handlers_kept():  # importing it replaces the one of Ctrl-C
+        with _handlers_kept():  # importing it replaces the handler of Ctrl-C
             from dask_jobqueue import SLURMCluster
     except ImportError:
         raise ViewerError(
@@ -150,7 +151,7 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
             f"--{key}={value}" if value else f"--{key}" for key, value in options.items()
         ],
         worker_extra_args=["--resources", "GPU=1"] if has_gpu else [],
-        # Port 0 is any free one: others use the login node too.
+        # Port 0 selects any free port: other users share the login node.
         scheduler_options={"dashboard": False, "dashboard_address": ":0"},
         silence_logs=logging.CRITICAL,
         **known,
@@ -172,7 +173,7 @@ def _handlers_kept() -> Iterator[None]:
 
 @contextmanager
 def _signals_blocked() -> Iterator[None]:
-    """Block Ctrl-C in threads and processes that are started in the block."""
+    """Block Ctrl-C in threads and processes that are started within the block."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

@@ -1,4 +1,4 @@
-"""One item on a worker of a cluster: version check, warm job, time and memory limits."""
+"""Execution of an item on a cluster's worker: version check, cached job, time and memory limits."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ from viewer.version import VERSION
 __all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
 
 ENDED = "viewer-ended"
-"""Topic of events on the scheduler: attempts that their time limit ended."""
+"""Topic of events on the scheduler: attempts ended by their time limit."""
 
-_SETTLE = 0.5  # seconds in which the last event leaves a worker that ends itself
+_SETTLE = 0.5  # seconds for sending the last event of a worker that ends itself
 _FAILED = 70  # exit code of such a worker
 
 # A worker runs one item at a time even if it has several threads: output is captured, and
@@ -33,7 +33,7 @@ _jobs: dict[bytes, Job] = {}
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """What a worker is asked to do; pickled, because another version may not understand it.
+    """A request to a worker; pickled, because another version may be unable to load it.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class OtherVersion:
-    """The answer of a worker that has another version of the package."""
+    """The reply of a worker that has another version of the package."""
 
     worker: str
     version: str
@@ -63,7 +63,7 @@ def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVer
     Parameters
     ----------
     version : str
-        That of the program which runs the batch.
+        Version of the program that runs the batch.
     key : str
         Name of the attempt, for events.
     call : tuple
@@ -85,7 +85,7 @@ def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVer
 
 
 def _job(pickled: bytes) -> Job:
-    """Return the job; it stays as warm as it made itself for the item before."""
+    """Return the job; it is reused for the next items, along with everything that it has cached."""
     if pickled not in _jobs:
         _jobs.clear()
         _jobs[pickled] = pickle.loads(pickled)
@@ -94,7 +94,7 @@ def _job(pickled: bytes) -> Job:
 
 @contextmanager
 def _ended_after(timeout: float | None, worker: Any, key: str) -> Iterator[None]:
-    """End this process unless the block ends in time: a thread can't be interrupted."""
+    """End this process if the block exceeds its time limit: a thread can't be interrupted."""
     if timeout is None:
         yield
         return
@@ -114,12 +114,13 @@ def _ended_after(timeout: float | None, worker: Any, key: str) -> Iterator[None]
 
 
 def limit_memory(size: int) -> None:
-    """Limit the memory that this process may allocate, in bytes; further calls change nothing."""
+    """Limit the memory that this process may allocate, in bytes; further calls have no effect."""
     if sys.platform == "win32":
         return
     import resource
 
-    # On Linux, the address space also has mapped files and reserves of drivers, which cost nothing.
+    # On Linux, the address space also includes mapped files and driver reservations, which use
+    # none.
     kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     soft, most = resource.getrlimit(kind)
     limit = size if most == resource.RLIM_INFINITY else min(size, most)

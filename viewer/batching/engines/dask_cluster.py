@@ -1,7 +1,7 @@
 """Items on the workers of a Dask cluster: on this machine, at an address, or in SLURM jobs.
 
-Few items per worker are handed out at a time, so that millions need no queue. If a worker dies,
-its items are run again elsewhere; an item that repeatedly ends its workers is reported.
+Only a few items per worker are handed out at a time, so that millions need no queue. If a worker
+dies, its items are run again elsewhere; an item that repeatedly kills its worker is reported.
 """
 
 from __future__ import annotations
@@ -28,10 +28,10 @@ if TYPE_CHECKING:
 
 __all__ = ["run"]
 
-_TICK = 0.2  # seconds between checks whether the batch is stopping
-_PER_WORKER = 3  # items handed out per worker: one runs, and the next ones have arrived
+_TICK = 0.2  # seconds between checks for whether the batch is stopping
+_PER_WORKER = 3  # items handed out per worker: one runs while the next ones are transferred
 _COUNT_EVERY = 1.0  # seconds; workers join and leave
-_ALONE = 60.0  # seconds without any worker, before the batch is given up
+_ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -41,8 +41,8 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     Raises
     ------
     ViewerError
-        If Dask is missing, the cluster can't be reached or started, or a worker has no viewer or
-        one of another version.
+        If Dask is missing, the cluster can't be reached or started, or a worker lacks this version
+        of the viewer.
     """
     try:
         import distributed  # noqa: F401
@@ -79,26 +79,26 @@ class _Attempt:
 
 
 class _Flight:
-    """The attempts that a cluster has been asked for."""
+    """The attempts that have been handed to a cluster."""
 
     def __init__(self, client: Client, job: Job, limits: Limits) -> None:
         import cloudpickle
 
         self.client, self.limits = client, limits
         self.flying: dict[Future, _Attempt] = {}
-        self._job = cloudpickle.dumps(job)  # also functions of notebooks
+        self._job = cloudpickle.dumps(job)  # also pickles functions of notebooks
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._batch = f"viewer-{uuid4().hex[:8]}-"
         self._numbers = itertools.count()
         self._n_workers, self._counted, self._seen = 0, -_COUNT_EVERY, time.monotonic()
-        # SLURM starts jobs when there is room, and workers of this machine are replaced.
+        # SLURM starts jobs when resources are free, and local workers are replaced.
         self._can_wait = parse_cluster(limits.cluster or "local").kind != "address"
         self._resources: dict[str, float] | None = None
         self._uses_gpu = bool(getattr(job, "uses_gpu", False))
         self._is_stopping = False
 
     def count_workers(self) -> None:
-        """Look how many workers there are, which changes while the batch runs.
+        """Update the number of workers, which changes while the batch runs.
 
         Raises ViewerError if a scheduler has had none for a minute.
         """
@@ -107,7 +107,7 @@ class _Flight:
             return
         workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
         with_gpu = [one for one in workers if one["resources"].get("GPU")]
-        # Workers that declare GPUs are the ones to draw on, if there are any.
+        # If any workers declare GPUs, only these draw.
         self._resources = {"GPU": 1} if with_gpu and self._uses_gpu else None
         self._n_workers = len(with_gpu if self._resources else workers)
         self._counted = now
@@ -120,11 +120,11 @@ class _Flight:
             )
 
     def has_room(self) -> bool:
-        """Return whether workers wait for more items, or will soon."""
+        """Return whether workers are idle, or soon will be."""
         return len(self.flying) < max(self._n_workers, 1) * _PER_WORKER
 
     def stops(self) -> bool:
-        """Return whether the batch is stopping; items that no worker has yet are then dropped."""
+        """Return whether the batch is stopping; items not yet sent to a worker are then dropped."""
         if not self._is_stopping and self.limits.is_stopping():
             self._is_stopping = True
             started = {key for keys in self.client.processing().values() for key in keys}
@@ -178,7 +178,7 @@ class _Flight:
         return result.status in _RETRIED and is_left and not self.stops()
 
     def _results(self, done: list[Future]) -> list[tuple[Future, Result | None]]:
-        """Return the results of attempts that ended; None if the item itself was not at fault."""
+        """Return the result of an attempt that ended; None if the item itself was not at fault."""
         finished: list[Future] = []
         ended: list[Future] = []
         for future in done:
@@ -200,7 +200,7 @@ class _Flight:
         if future.status == "cancelled":
             raise _lost()
         if future.status != "error":
-            return None  # the result was on a worker that died meanwhile
+            return None  # the worker that held the result has died
         problem = future.exception()
         if isinstance(problem, KilledWorker):
             return self._killed(item, future, problem)
@@ -223,7 +223,7 @@ class _Flight:
         return Result(item, "crashed", 2, attempts=attempts, message=f"the worker {address} died")
 
     def _first_on(self, address: str) -> str:
-        """Return the attempt that a worker ran when it died, as they are run in order."""
+        """Return the attempt that a worker was running when it died; it runs them in order."""
         keys = [
             key
             for _, event in self.client.get_events(address)

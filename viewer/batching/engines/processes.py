@@ -1,8 +1,8 @@
 """Items in worker processes of this machine.
 
-Workers start as new interpreters, because a fork would inherit OpenGL contexts and threads, and
-stay warm: modules, GPU programs and models are loaded by the first item that needs them. A worker
-that crashes, hangs or exceeds its memory is replaced, and its item is run again.
+Workers start as new interpreters, because a fork would inherit OpenGL contexts and threads, and are
+reused: modules, GPU programs and models are loaded by the first item that needs them. A worker that
+crashes, hangs or exceeds its memory is replaced, and its item is run again.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 
 __all__ = ["run"]
 
-_TICK = 0.2  # seconds between checks whether the batch is stopping
+_TICK = 0.2  # seconds between checks for whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit
 _PATIENCE = 120.0  # seconds until a pool in which no item runs is replaced; doubled each time
-_MOST_BREAKS = 3  # pools that end without a result, before the batch is given up
+_MOST_BREAKS = 3  # pools that may end without a result before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -110,7 +110,7 @@ class _Worker(SpawnProcess):
 
 
 class _Context(SpawnContext):
-    """Starts workers as new interpreters, and knows them."""
+    """Starts workers as new interpreters, and keeps track of them."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -154,7 +154,7 @@ class _Workers:
         self._pool = self._new_pool()
 
     def stops(self) -> bool:
-        """Return whether the batch is stopping; workers then skip the items that wait."""
+        """Return whether the batch is stopping; workers then skip the queued items."""
         if not self._is_stopping.is_set() and self.limits.is_stopping():
             self._is_stopping.set()
         return self._is_stopping.is_set()
@@ -182,16 +182,16 @@ class _Workers:
         attempt = self.flying.pop(future)
         result = self._result(future, attempt)
         if result.status == "cancelled" and not result.message:
-            return  # it had not been started
+            return  # it was never started
         if result.status in _RETRIED and attempt.earlier < self.limits.retries and not self.stops():
             self.schedule(_Attempt(attempt.item, attempt.earlier + 1))
             return
         yield replace(result, attempts=attempt.earlier + 1)
 
     def close(self) -> None:
-        """End the workers, and what they run."""
+        """Terminate the workers and their items."""
         self._pool.stop()  # type: ignore[no-untyped-call]
-        # Before the queue is closed, or workers that are starting would complain about it.
+        # Before the queue is closed, because workers that are starting would report errors.
         self._context.end_workers()
         self._pool.join()
         self._context.is_closing = False
@@ -226,9 +226,9 @@ class _Workers:
         return Result(item, "crashed", 2, message=f"the worker process {_end_of(code)}")
 
     def _renew(self) -> None:
-        """Replace a pool that broke; its other items come back one by one, as crashed."""
+        """Replace a broken pool; its other items are returned one by one, as crashed."""
         if self._pool.active:
-            return  # replaced when the first of its items came back
+            return  # replaced when its first item was returned
         self._n_breaks += 1
         if self._n_breaks >= _MOST_BREAKS:
             raise ViewerError(
@@ -242,7 +242,7 @@ class _Workers:
     def _check_stall(self) -> None:
         """Replace a pool in which no item runs.
 
-        The system may kill a worker that holds the lock of the queue, and nobody gets it then.
+        If the system kills a worker that holds the lock of the queue, the lock is never released.
         """
         now = time.monotonic()
         if any(future.running() for future in self.flying):
@@ -265,8 +265,8 @@ class _Workers:
         pool = ProcessPool(
             self.limits.workers, initializer=_prepare, initargs=given, context=self._context
         )
-        # Ctrl-C and a closed terminal reach all of its processes, but the batch decides what they
-        # end. Workers inherit the mask, as do the threads that start further workers.
+        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides what to
+        # end. Workers inherit the signal mask, as do the threads that start further workers.
         with _blocked():
             _ = pool.active  # starts it
         return pool
@@ -304,8 +304,8 @@ def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
     """Begin a worker."""
     global _job, _stopping
     _job, _stopping = job, stopping
-    # Between items, a worker may hold the lock of the queue, which would be lost with it: only
-    # items are interrupted. A worker without one ends when the pool closes its queue.
+    # Between items, a worker may hold the lock of the queue, which would never be released: only
+    # items are interrupted. An idle worker ends when the pool closes its queue.
     signal.signal(signal.SIGTERM, _note_termination)
     if memory is not None:
         _limit_memory(memory)
@@ -316,7 +316,8 @@ def _limit_memory(size: int) -> None:
         return
     import resource
 
-    # On Linux, the address space also has mapped files and reserves of drivers, which cost nothing.
+    # On Linux, the address space also includes mapped files and driver reservations, which use
+    # none.
     kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     most = resource.getrlimit(kind)[1]
     limit = size if most == resource.RLIM_INFINITY else min(size, most)
@@ -337,9 +338,9 @@ def _work(item: Item) -> Result:
     try:
         result = _job(item)
     except Interrupted as stop:
-        # The pool ends this worker; what the item was writing has been removed.
+        # The pool ends this worker; the item's incomplete output has been removed.
         os._exit(stop.exit_code)
     if result.status == "memory":
-        # Memory is fragmented now, and libraries may hold on to half-built objects.
+        # Memory is now fragmented, and libraries may keep partially built objects.
         os._exit(_NO_MEMORY)
     return result

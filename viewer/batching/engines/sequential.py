@@ -1,4 +1,4 @@
-"""Items one after another in this process."""
+"""Engine that runs items one after another in this process."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["run"]
 
 
 def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
-    """Run items in order; time and memory are not limited, as nothing could be ended."""
+    """Run items in order; time and memory are not limited, because the process cannot be killed."""
     for item in items:
         if limits.is_stopping():
             return

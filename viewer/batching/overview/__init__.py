@@ -18,12 +18,12 @@ _PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 
 
 def check_overview(path: str | Path) -> None:
-    """Refuse a file that is neither a page nor a picture, before the batch starts.
+    """Check, before the batch starts, that a file is a page or a picture.
 
     Raises
     ------
     UnsupportedFormatError
-        If the suffix is that of another kind of file.
+        If the suffix belongs to another kind of file.
     """
     suffix = Path(path).suffix.lower()
     if suffix not in (*PAGES, *_PICTURES):
@@ -34,21 +34,21 @@ def check_overview(path: str | Path) -> None:
 
 
 def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list[str]:
-    """Write an overview of a batch; return lines about the files written.
+    """Write an overview of a batch; return a line about each written file.
 
     Parameters
     ----------
     path : str or Path
-        A page (``PAGES``), or a picture, of which there are several if one has no room for all.
+        A page (``PAGES``), or a picture; several pictures are written if one cannot hold all.
     job : str
-        Name of the job, for titles and for what is shown of each item.
+        Name of the job, for titles, and to choose what is shown of each item.
     results : sequence of Result
         Results in any order.
 
     Raises
     ------
     ViewerError
-        If a sheet is asked for, but no item has written a picture.
+        If a sheet is requested, but no item has written a picture.
     OutputError
         If a file cannot be written.
     """

@@ -1,4 +1,4 @@
-"""Elements of pages: escaped text, tables, and a style for light and dark screens."""
+"""Elements of HTML pages: escaped text, tables, and a style for light and dark mode."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.phrases import printable
 
 __all__ = ["bar", "document", "row", "table", "tag", "text_of"]
 
-_LONGEST = 1000  # characters of a text
+_LONGEST = 1000  # maximum characters of a text
 
 _STYLE = """
 :root { color-scheme: light dark; --back: #fff; --text: #1d2026; --soft: #626a77; --line: #dfe3e9;
@@ -53,7 +53,7 @@ def text_of(value: object) -> str:
 
 
 def tag(name: str, content: str, kind: str = "") -> str:
-    """Return an element; the content is HTML already."""
+    """Return an element; its content must already be HTML."""
     return f'<{name} class="{kind}">{content}</{name}>' if kind else f"<{name}>{content}</{name}>"
 
 
@@ -67,7 +67,7 @@ def row(cells: Iterable[str], kinds: Sequence[str], head: bool = False) -> str:
     kinds : sequence of str
         Class of each cell; may be empty.
     head : bool
-        Whether it is the head of the table.
+        Whether it is the header row.
     """
     name = "th" if head else "td"
     pairs = zip(cells, kinds, strict=True)
@@ -75,20 +75,20 @@ def row(cells: Iterable[str], kinds: Sequence[str], head: bool = False) -> str:
 
 
 def table(heads: Sequence[str], kinds: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; the cells are HTML already, the heads are not."""
+    """Return a table; cells must already be HTML, headers are plain text."""
     head = row([text_of(one) for one in heads], kinds, head=True)
     body = "\n".join(row(cells, kinds) for cells in rows)
     return tag("div", f"<table><thead>{head}</thead>\n<tbody>{body}</tbody></table>", "scroll")
 
 
 def bar(fraction: float) -> str:
-    """Return a bar of this length, 0 to 1, as HTML."""
+    """Return a bar of a length from 0 to 1 as HTML."""
     percent = 100.0 * min(max(fraction, 0.0), 1.0)
     return f'<span class="bar"><i style="width:{percent:.1f}%"></i></span>'
 
 
 def document(title: str, body: Iterable[str]) -> str:
-    """Return a page that needs no other file; the title is text, the body HTML."""
+    """Return a self-contained page; the title is plain text, the body HTML."""
     parts = "\n".join(body)
     return (
         '<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

@@ -1,4 +1,4 @@
-"""Overview as a page of HTML: counts, findings by code, and all items, worst first."""
+"""Overview as an HTML page: counts, findings by code, and all items, worst first."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _relative(result: Result, group: str) -> float:
 
 
 def _counts(results: Sequence[Result]) -> str:
-    """Return the numbers of items by status, and of findings."""
+    """Return the numbers of items by status, and the number of findings."""
     by_status = Counter(result.status for result in results)
     parts: list[tuple[str, str, str]] = [
         (str(count), status, _kind_of(status)) for status, count in by_status.most_common()
@@ -137,7 +137,7 @@ def _codes(results: Iterable[Result]) -> list[str]:
 
 
 def _columns(job: str, results: Sequence[Result]) -> list[_Column]:
-    """Return the columns that have content."""
+    """Return the columns that are not empty."""
     columns = [
         _Column("Item", "name", lambda result: text_of(result.item.name)),
         _Column("Status", "", _status),
@@ -216,7 +216,7 @@ def _amount(group: str, value: float) -> str:
 
 
 def _texts(job: str, result: Result) -> list[str]:
-    """Return what an item's row says about it, the worst first."""
+    """Return the details in an item's row, the worst first."""
     texts = [row_message(result)] if row_message(result) else []
     if job == "lint":
         findings = result.values.get("findings", ())

@@ -1,4 +1,4 @@
-"""Choice of the files of a submission that are compared, by their paths alone."""
+"""Selection of the files of a submission to compare, based on their paths alone."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def patterns_of(reference: Iterable[str | Path]) -> list[str]:
 def choose(
     names: Sequence[str], expected: Sequence[str], alike: Sequence[str], path: Path
 ) -> Chosen:
-    """Return the files of a submission that are compared.
+    """Return the files of a submission to compare.
 
     The files nearest to the top of the folder are preferred, since submissions often contain
     build folders, backups and the course's own data.
@@ -99,7 +99,7 @@ def _nearest(names: Sequence[str]) -> list[str]:
 
 
 def _offered(names: Iterable[str]) -> list[str]:
-    """Return the files that the message about a missing one lists: readable files, or else all."""
+    """Return the files to list in the message about a missing one: readable files, or else all."""
     names = sorted(names)
     return [name for name in names if _is_rig_file(name)] or names
 
@@ -110,7 +110,7 @@ def _is_rig_file(name: str) -> bool:
 
 
 def _is_table(name: str) -> bool:
-    """Return whether a file may be a table of a folder in a known format, such as PIG."""
+    """Return whether a file may belong to a folder in a known format, such as PIG."""
     return suffix_of(name) == ".txt"
 
 

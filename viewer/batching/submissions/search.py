@@ -16,7 +16,7 @@ _ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Submissions, and the files that are none.
+    """Submissions, and files that are not.
 
     Attributes
     ----------
@@ -31,7 +31,7 @@ class Found:
 
 
 def is_archive(path: str) -> bool:
-    """Return whether a file is an archive by its name; only zip archives are opened."""
+    """Return whether a file is named like an archive; only zip archives are opened."""
     return path.lower().endswith(_ARCHIVES)
 
 
@@ -41,8 +41,8 @@ def find_submissions(paths: Sequence[str | Path]) -> Found:
     Parameters
     ----------
     paths : sequence of str or Path
-        Several paths are a submission each. A single folder is one if it directly contains
-        readable files; otherwise it contains one submission in each of its folders and archives.
+        If there are several, each is a submission. A single folder is a submission if it directly
+        contains readable files; otherwise, each of its folders and archives is one.
     """
     given = [Path(path) for path in paths]
     entries = _entries(given[0]) if len(given) == 1 else []
@@ -59,6 +59,6 @@ def _entries(folder: Path) -> list[Path]:
 
 
 def _is_rig_file(file: Path) -> bool:
-    # Tables of grades are often next to the submissions.
+    # Grade tables are often next to the submissions.
     suffix = suffix_of(file.name)
     return file.is_file() and suffix in SUFFIXES and suffix not in (".txt", ".json")

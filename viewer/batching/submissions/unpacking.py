@@ -1,4 +1,4 @@
-"""Zip archives from other people: names and sizes are checked before anything is unpacked."""
+"""Untrusted zip archives: names and sizes are checked before anything is unpacked."""
 
 from __future__ import annotations
 
@@ -38,9 +38,9 @@ class Archive:
     Attributes
     ----------
     shown : Path
-        Path in messages: of the archive, below that of the archive that contains it.
+        Path for messages; that of a nested archive begins with that of the outer one.
     size : int
-        Bytes of its file.
+        Size of its file in bytes.
     archive : ZipFile
         The archive.
     members : dict of str to ZipInfo
@@ -53,7 +53,7 @@ class Archive:
     members: dict[str, zipfile.ZipInfo]
 
     def unpack(self, names: Iterable[str], folder: Path) -> int:
-        """Write members to a folder, which must be empty; return their size in bytes.
+        """Write members to an empty folder; return their total size in bytes.
 
         Raises
         ------
@@ -82,7 +82,7 @@ class Archive:
             if member.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 method = member.compress_type
                 raise self._fault("F002.submission-method", item=item, method=method)
-        # zipfile never returns more bytes of a member than its directory states.
+        # zipfile never returns more bytes of a member than the central directory states.
         total = sum(member.file_size for member in members.values())
         if len(members) > MOST_FILES:
             raise self._fault("F001.submission-count", most=MOST_FILES, found=len(members))
@@ -128,7 +128,7 @@ def open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> Ite
 
 
 def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
-    """Return a member's path; programs for Windows also write backslashes.
+    """Return a member's path; some Windows programs write backslashes.
 
     Raises FormatError if it leads outside the archive.
     """

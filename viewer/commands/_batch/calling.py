@@ -53,10 +53,10 @@ def batch(
     overview: str | os.PathLike[str] = "",
     on_result: Callable[[Result], None] | None = None,
 ) -> Report:
-    """Run a job for each of many files; a failed one never stops the others.
+    """Run a job on many files, one by one; a failure never stops the others.
 
-    Worker processes are new interpreters: a script that uses them needs the line
-    ``if __name__ == "__main__":`` before its own work, and a function must be importable.
+    Worker processes are new interpreters: scripts that use them must guard their top-level code
+    with ``if __name__ == "__main__":``, and functions must be importable.
 
     Parameters
     ----------
@@ -65,38 +65,38 @@ def batch(
     job : str or callable
         A command (``convert``, ``render``, ``lint``, ``diff``, ``rig``, ``info``), or a function
         that is called with each ``Item`` (``files``, ``output``, ``name``). A dict that it returns
-        is the ``values`` of the result; an exception makes the item a failed one.
+        becomes the ``values`` of the result; an exception marks the item as failed.
     out : str or path
-        A folder, in which the folders of the inputs are repeated, or a template, such as
+        A folder, which mirrors the folders of the inputs, or a template, such as
         ``out/{parent}/{stem}.bvh``.
     to : str
         Suffix of the outputs in a folder.
     options : sequence of str
         Options of the command, as on the command line; for ``diff``, the reference comes first.
     shared : sequence of str or path
-        Files that are opened with every input. For a function, files that it reads.
+        Files that are opened with every input; for a function, files that it reads.
     workers : int, optional
         Number of worker processes; 0 for this process. By default 0 for few inputs, otherwise one
         per core.
     cluster : str
         ``local``, the address of a Dask scheduler, or ``slurm``; empty for this machine.
     shard : str
-        ``I/N``: only every N-th input from the I-th.
+        ``I/N``: only every N-th input, starting with input I (0 to N - 1).
     resume : bool
-        Whether inputs are skipped that the report lists as done with the same content, options and
+        Whether to skip inputs that the report lists as done with the same content, options and
         version of the program.
     force : bool
         Whether existing files may be replaced.
     retries : int
-        How often an input is run again after its worker failed.
+        How often an input is retried after its worker failed.
     timeout : float, optional
-        Seconds per attempt, 600 by default; 0 for no limit. Only worker processes have one.
+        Seconds per attempt, 600 by default; 0 for no limit. Applies to worker processes only.
     memory : int, optional
         Bytes that a worker may use.
     report : str or path
-        File for one line of JSON per input; by default ``report.jsonl`` in ``out``.
+        File that gets one line of JSON per input; by default ``report.jsonl`` in ``out``.
     table : str or path
-        CSV file for one row per input.
+        CSV file with one row per input.
     overview : str or path
         A page (``.html``) of all inputs, for ``render``, ``lint``, ``diff`` and functions; for
         ``render`` and ``diff`` also contact sheets (``.png``).
@@ -106,14 +106,14 @@ def batch(
     Returns
     -------
     Report
-        Results, numbers by status, failures.
+        Results, counts by status, failures.
 
     Raises
     ------
     ViewerError
         If the batch cannot start: nothing matches, outputs clash or exist, a package is missing.
     KeyboardInterrupt
-        After Ctrl-C, when the items that run are finished; a second one cancels them.
+        After Ctrl-C, once the running items are finished; a second Ctrl-C cancels them.
     """
     names = [paths] if isinstance(paths, str | os.PathLike) else paths
     request = Request(
@@ -141,11 +141,11 @@ def batch(
 
 
 def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Report:
-    """Run a batch, and pass a signal on to the caller at its end."""
+    """Run a batch, and pass a received signal on to the caller at the end."""
     try:
         found = run_batch(plan.items, job, plan.settings, on_result)
     except Interrupted as stop:
-        # The caller's own handler decides, as if the signal had arrived only now.
+        # The caller's own handler handles it, as if the signal had arrived only now.
         signal.raise_signal(stop.number)
         raise KeyboardInterrupt from None
     if found.signal:
@@ -161,7 +161,7 @@ def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Reques
 
 
 def _identity(function: Callable[[Item], Any]) -> str:
-    """Return a function's name and a hash of its code, which changes with its body."""
+    """Return a function's name and a hash of its code."""
     code = getattr(function, "__code__", None)
     body = b"" if code is None else code.co_code + repr(code.co_consts).encode()
     name = getattr(function, "__qualname__", type(function).__qualname__)
@@ -169,7 +169,7 @@ def _identity(function: Callable[[Item], Any]) -> str:
 
 
 def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, Request]:
-    """Return a command as a job, and the request with what its options add."""
+    """Return a command as a job, and the request extended by its options."""
     if job not in JOBS:
         near = did_you_mean(job, JOBS) or f"there are {', '.join(JOBS)}"
         raise ViewerError(f'no job is called "{printable(job, 60)}"; {near}')

@@ -20,7 +20,7 @@ _MOST = 20  # failures listed
 
 
 class Display:
-    """Progress of a batch: a bar in a terminal, otherwise a line per minute.
+    """Progress of a batch: a bar in a terminal, otherwise one line per minute.
 
     ``title``: name of the work.
     ``items``: those of the batch.
@@ -32,7 +32,7 @@ class Display:
         self._progress = Progress(title, self.total)
         self._start = self._said = time.monotonic()
         self._n_done = self._n_failed = self._n_unchanged = 0
-        self._texts: dict[int, str] = {}  # of items that others must be printed before
+        self._texts: dict[int, str] = {}  # of items that must wait for earlier ones
         self._order = deque(item.index for item in items if prints)
 
     def show(self, result: Result) -> None:
@@ -43,7 +43,7 @@ class Display:
         now = time.monotonic()
         rate = (self._n_done - self._n_unchanged) / max(now - self._start, 1e-3)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
-        if not (self._order and sys.stdout.isatty()):  # text in the same terminal
+        if not (self._order and sys.stdout.isatty()):  # if the text is printed in the same terminal
             self._progress.title = f"{self._title}, {rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
         if not sys.stderr.isatty() and now > self._said + _MINUTE:
@@ -84,7 +84,7 @@ def duration(seconds: float) -> str:
 
 
 def summary_lines(report: Report) -> list[str]:
-    """Return the numbers of items by status, and the first failures as a table."""
+    """Return the counts of items by status, and the first failures as a table."""
     rate = len(report.results) / max(report.seconds, 1e-3)
     head = f"{counted(len(report.results), 'item')} in {duration(report.seconds)} ({rate:.3g}/s)"
     parts = [f"{count} {status}" for status, count in sorted(report.counts.items())]

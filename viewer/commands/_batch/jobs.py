@@ -30,7 +30,7 @@ class JobKind:
     ``title``: description.
     ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
     ``writes``: ``always``, ``maybe`` or ``never``.
-    ``prints``: whether its text is the result, and printed.
+    ``prints``: whether its text is the result and is therefore printed.
     ``few``: largest number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
     """
@@ -107,7 +107,7 @@ class CommandJob:
     ``command``: a key of ``JOBS``.
     ``arguments``: its arguments, without files and output.
     ``fixed``: files that are opened with every item.
-    ``shared``: files that all items read, also those that options name.
+    ``shared``: files that all items read, including those named by options.
     """
 
     command: str
@@ -117,7 +117,7 @@ class CommandJob:
 
     @property
     def uses_gpu(self) -> bool:
-        """Whether clusters hand the job to workers with a graphics card, if there are any."""
+        """Whether the job runs only on workers with a graphics card, if a cluster has any."""
         return self.command == "render"
 
     @cached_property
@@ -126,11 +126,11 @@ class CommandJob:
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
-        # Most files are read once: their numbers would displace those of files that are not.
+        # Most files are read only once, so caching them would evict files that are read again.
         with keeping_figures(self._shared), without_cache():
             result = attempt(item, self._run)
         if result.status == "failed" and not result.message:
-            # Commands that report on several files print what is wrong with one of them.
+            # Commands that report on several files print the error of a single one.
             lines: Sequence[str] = result.text.strip().splitlines() or [""]
             result = replace(result, message=printable(lines[-1].strip(), 500))
         return result
@@ -154,7 +154,7 @@ class CommandJob:
 
 @cache
 def _device() -> int | None:
-    """Return the graphics device of this worker process; None for the default one."""
+    """Return the graphics device of this worker process; None for the default."""
     from viewer.rendering.gpu.egl_devices import device_of_worker
 
     rank = worker_rank()

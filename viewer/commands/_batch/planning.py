@@ -21,15 +21,15 @@ from viewer.phrases import counted, listed, printable
 
 __all__ = ["Plan", "Request", "plan_of"]
 
-_SMALL = 50e6  # bytes of all inputs; above that, even few are run by workers
+_SMALL = 50e6  # bytes of all inputs; above this, even a few inputs are run by workers
 _LISTED = 10  # names in a message
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asks for; the options of the same names describe it.
+    """The user's request; the options of the same names describe it.
 
-    ``identity``: job, options and version, as a part of the items' keys.
+    ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
     ``few``: largest number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
@@ -100,7 +100,7 @@ def plan_of(request: Request) -> Plan:
 
 
 def _report_of(request: Request) -> Path | None:
-    """Return the report's path: next to the outputs, unless another one is given."""
+    """Return the report's path: next to the outputs by default."""
     if request.report:
         return Path(request.report)
     folder = output_folder(request.output)
@@ -111,7 +111,7 @@ def _report_of(request: Request) -> Path | None:
 
 
 def _existing(request: Request) -> Literal["refuse", "replace", "append", "resume"]:
-    """Return what is done with a report that exists."""
+    """Return how to treat an existing report."""
     if request.resume:
         return "resume"
     if request.shard and request.report:
@@ -160,14 +160,14 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
 
 
 def _size(items: Sequence[Item]) -> int:
-    """Return the number of bytes of files; folders count as none."""
+    """Return the total size of files in bytes; folders count as 0."""
     return sum(
         os.path.getsize(file) for item in items for file in item.files if os.path.isfile(file)
     )
 
 
 def _cores() -> int:
-    """Return the number of cores that this process may use, as batch systems assign them."""
+    """Return the number of cores that this process may use, as assigned by batch systems."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1

@@ -43,7 +43,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     fixed = _fixed(arguments)
     command = _command_arguments(arguments)
     if arguments.resume and hasattr(command, "force"):
-        # Outputs of items that the report does not list were written by a run that was killed.
+        # Outputs of items that the report does not list were written by a killed run.
         command.force = True
     memory = (
         parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
@@ -118,13 +118,13 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return job, options and version as text that is equal if the results are."""
+    """Return a text that identifies job, options and version: equal texts give equal results."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
 
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
-    """Yield the files that options name, such as that of ``--model``."""
+    """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
         if name in _NOT_RESULTS:
             continue

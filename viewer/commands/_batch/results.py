@@ -1,4 +1,4 @@
-"""Files about all items that are written when a batch ends: a table and an overview."""
+"""Summary files written when a batch ends: a table and an overview of all items."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
 
 
 def check_results(job: str, table: str, overview: str, may_replace: bool, output: str = "") -> None:
-    """Check the names of the files, before the batch starts.
+    """Check the file names before the batch starts.
 
     ``table``, ``overview``: the files; empty for none.
     ``may_replace``: whether they may exist.

@@ -1,4 +1,4 @@
-"""Submissions as items of ``batch diff``: folders and archives, opened where they are compared."""
+"""Submissions as items of ``batch diff``: folders and archives, opened by the comparing worker."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class SubmissionJob:
         """Run one item in this process."""
         result = self._compared(item)
         errors = [one["error"] for one in comparisons(result) if one.get("error")]
-        # Otherwise, the message says that there is no image of what could not be compared.
+        # Otherwise, the message would be about an image missing because the comparison failed.
         return replace(result, message=printable(errors[0], 2000)) if errors else result
 
     def _compared(self, item: Item) -> Result:
@@ -93,7 +93,7 @@ def _temporary_folder() -> str:
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:
-    """Return JSON data with a part of all texts replaced."""
+    """Return JSON data with a substring replaced in all texts."""
     if isinstance(value, str):
         return value.replace(old, new)
     if isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Option that writes the match of joints of a driven figure to a file."""
+"""Option that writes the joint match of a driven figure to a file."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def add_joint_map_argument(group: argparse._ArgumentGroup) -> None:
 
 @contextmanager
 def saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[None]:
-    """Write the requested joint map before the block, and remove it if the block fails.
+    """Write the requested joint map before the block; remove it if the block fails.
 
     ``arguments``: arguments of ``convert``.
     ``scene``: the opened scene.

@@ -10,7 +10,7 @@ from viewer.formats._format import Format
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-_NAMED_KEYS = 3  # per format, in a message about unknown archives
+_NAMED_KEYS = 3  # keys per format in a message about unknown archives
 
 
 def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
@@ -23,7 +23,7 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
     keys = archive.keys
     for kind, form in formats.items():
         if kind == "smpl" and set(keys).intersection(formats["skel_body"].keys):
-            continue  # SKEL also has arrays of SMPL
+            continue  # SKEL also contains SMPL's arrays
         if set(keys).intersection(form.keys):
             if kind not in ("amass", "pose"):
                 return kind
@@ -44,14 +44,14 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
 
 
 def _is_video_mocap(archive: Archive) -> bool:
-    """Return whether an archive has results of a tool that have no keys of their own."""
+    """Return whether an archive has results of a tool without distinctive keys."""
     from viewer.formats._video_mocap.tools import tool_of
 
     return tool_of(archive) is not None
 
 
 def _pose_or_motion(archive: Archive, keys: Collection[str]) -> str:
-    """Return whether an archive is one pose or a motion; both have the same keys."""
+    """Return whether an archive is a single pose or a motion; both have the same keys."""
     from viewer.formats.amass import has_frames
 
     is_pose = set(archive.keys).intersection(keys)

@@ -1,6 +1,6 @@
-"""Rows of a ``.ply`` that all have the same size, as most files have them.
+"""Rows of a ``.ply`` that all have the same size, as in most files.
 
-Their columns are views of one array, so they need no positions of single numbers.
+Their columns are views of one array, so positions of individual numbers are not needed.
 """
 
 from __future__ import annotations
@@ -82,5 +82,5 @@ def even_binary(
 
 
 def _equal_counts(count: int, size: int) -> NDArray[np.int64]:
-    # One number stands for all of them.
+    # One number represents all of them.
     return np.broadcast_to(np.int64(size), (count,))

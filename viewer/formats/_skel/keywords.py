@@ -1,4 +1,4 @@
-"""Words and numbers of ``.skel`` files with a meaning of their own."""
+"""Keywords and special numbers of ``.skel`` files."""
 
 from __future__ import annotations
 
