@@ -99,7 +99,7 @@ def plant_feet(
     up = -rest_up if hangs else rest_up
     clip = cast("SampledClip", in_frame_order(found.clip))
     body = driven_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
-    if body is None or clip.n_rows == 0:
+    if body is None or body.size <= 0.0 or clip.n_rows == 0:
         return found.clip, None
     if has_source_proportions(found, figure, pairs, body.size):
         return found.clip, None
