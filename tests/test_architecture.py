@@ -16,7 +16,7 @@ SOURCES = sorted(PACKAGE.rglob("*.py"))
 TESTS = ROOT / "tests"
 TEST_FILES = sorted(TESTS.rglob("*.py"))
 # Folders of tests that mirror no folder of sources.
-OTHER_FOLDERS = {"bench", "data", "golden"}
+OTHER_FOLDERS = {"bench", "bench/references", "data", "golden"}
 
 # Which parts of the package each part may import, in addition to itself and what every part may
 # import.

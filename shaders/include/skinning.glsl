@@ -10,7 +10,6 @@ in uvec4 in_bindings;    // first pair, number of pairs, index of the vertex in 
 uniform sampler2D u_palette;    // skinning matrices, three rows each, for each instance in turn
 uniform sampler2D u_pairs;      // joint and weight, strongest first for each vertex
 uniform int u_n_joints;         // matrices of one instance
-uniform int u_n_summed;         // 1 if u_offsets contains one summed row per instance, else 0
 uniform int u_n_offsets;        // entries of u_offset_list per instance; 0 for none
 uniform int u_n_sources;        // vertices in each row of u_offsets
 uniform sampler2D u_offset_list;  // row of u_offsets and weight, for each instance in turn
@@ -69,19 +68,21 @@ vec3 offset(int row, int vertex) {
     return texelFetch(u_offsets, ivec2(index & 4095, index >> 12), 0).rgb;
 }
 
-// Sum of the pose correctives of one vertex. A loop with zero iterations skips the texture reads;
-// software drivers execute both sides of a condition.
+// Sum of the pose correctives of one vertex. With SUMMED_OFFSETS, u_offsets contains one row of sums
+// per instance; otherwise a loop with zero iterations skips the texture reads: software drivers
+// execute both sides of a condition.
 vec3 corrective(int vertex) {
+#ifdef SUMMED_OFFSETS
+    return offset(gl_InstanceID, vertex);
+#else
     vec3 sum = vec3(0.0);
-    for (int i = 0; i < u_n_summed; ++i) {
-        sum += offset(gl_InstanceID, vertex);
-    }
     int first = gl_InstanceID * u_n_offsets;
     for (int i = first; i < first + u_n_offsets; ++i) {
         vec2 row = texelFetch(u_offset_list, ivec2(i & 1023, i >> 10), 0).rg;
         sum += row.y * offset(int(row.x), vertex);
     }
     return sum;
+#endif
 }
 
 void skin(inout vec3 position, inout vec3 normal);  // defined by the skinning method's chunk

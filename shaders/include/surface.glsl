@@ -10,7 +10,11 @@ uniform sampler2D u_texture;    // sRGB, decoded by the sampler
 
 #ifndef MATERIALS
 vec4 base_color() {
+#ifdef UNTEXTURED  // software drivers would sample a texture only to discard the result
+    return vec4(v_color, 1.0);
+#else
     return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
+#endif
 }
 #else
 const int BASE_MAP = 0, METALLIC_MAP = 1, ROUGHNESS_MAP = 2;

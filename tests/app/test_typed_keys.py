@@ -6,7 +6,7 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app.posing.joint_tree import joint_tree
-from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click
+from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before
 
 A, ENTER, BACKSPACE, KEYPAD_1, KEYPAD_ENTER = 65, 257, 259, 321, 335
 LEFT_CTRL = 341
@@ -87,11 +87,27 @@ def test_shortcut_acts_if_its_modifier_is_released_before_the_next_frame(hand, t
 def test_tab_reacts_if_the_mouse_reaches_it_just_before_the_click(hand):
     tab = imgui.internal.find_window_by_name("Skinning").dc.dock_tab_item_rect
     hand.io.add_mouse_pos_event(tab.min.x + 10, (tab.min.y + tab.max.y) / 2)
-    end_frame_before_click(imgui.get_current_context().input_events_queue, PRESS)
+    end_frame(imgui.get_current_context().input_events_queue)
     for is_down in (True, False):
         hand.io.add_mouse_button_event(0, is_down)
     hand.step(5)
     assert "engine" in hand.state.item_rects
+
+
+def test_drag_between_two_frames_reaches_its_end(hand):
+    queue = imgui.get_current_context().input_events_queue
+    y, ends = hand.place("root.tx")[1], [hand.place("root.tx", k)[0] for k in (0.5, 0.6, 0.8)]
+    hand.move((ends[0], y))
+    for is_down, places in ((True, ends), (False, ())):
+        end_frame(queue)
+        hand.io.add_mouse_button_event(0, is_down)
+        for x in places:
+            hand.io.add_mouse_pos_event(x, y)
+    hand.step(6)
+    quick = hand.dof("root.tx")
+    hand.key("z", "ctrl")
+    hand.pull((ends[0], y), (ends[2], y))
+    assert quick == hand.dof("root.tx") > 0.0
 
 
 @pytest.mark.parametrize(

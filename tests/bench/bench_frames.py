@@ -1,8 +1,9 @@
 """Frames of a moving figure, read into memory, against a minimal program that draws them.
 
-Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``least_frame.py`` is the
-minimal program. Processor time of all threads of the process, which includes software drivers and
-does not depend on other programs. Uses the pig if its files exist, else the bundled figure.
+Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``references/least_frame.py``
+is the minimal program. Processor time of all threads of the process, which includes software
+drivers and does not depend on other programs. Uses the pig if its files exist, else the bundled
+figure.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from least_frame import LeastFrame
 from measure import median_ratio, report
+from references.least_frame import LeastFrame
 
 import viewer
 from viewer.rendering.offscreen import Offscreen, default_camera

@@ -34,7 +34,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import Skinning
 
-SIZE, COUNT, GOAL = (1280, 720), 100, 1.2
+SIZE, COUNT, GOAL = (1280, 720), 100, 1.15
 _STILL = """#version 330
 in vec3 in_position; in vec3 in_normal; in vec2 in_uv; in vec3 in_color;
 in vec4 in_model_x; in vec4 in_model_y; in vec4 in_model_z; in vec3 in_actor_color;

@@ -11,7 +11,7 @@ from measure import run_process
 
 def main(rounds: int = 3) -> None:
     """Print both peaks and their ratio."""
-    baseline = str(Path(__file__).parent / "baseline.py")
+    baseline = str(Path(__file__).parent / "references" / "baseline.py")
     with tempfile.TemporaryDirectory() as folder:
         picture = str(Path(folder) / "picture.png")
         command = ["-m", "viewer", "render", "-o", picture, "--force"]

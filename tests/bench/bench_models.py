@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from bench_read import fromstring
+from bench_big_files import numbers_of
 from bench_skinning import synthetic
 from measure import interleaved, report, run_process
 
@@ -74,7 +74,7 @@ def main(rounds: int = 15) -> None:
 def _text(folder: Path, text: str, rounds: int) -> None:
     work = {
         "viewer.load": lambda: viewer.load(folder / "text"),
-        "numpy.fromstring": lambda: fromstring(text),
+        "numpy.fromstring": lambda: numbers_of(text),
     }
     times = interleaved(work, rounds)
     report(f"PIG from {len(text) / 1e6:.1f} MB of text", times, (*work,), GOAL)

@@ -41,7 +41,7 @@ print(json.dumps([code, sizes, sorted(n for n in sys.modules if n.startswith('vi
 
 def main(rounds: int = 11) -> None:
     """Print the ratios, what encoding an image takes, and what was imported."""
-    baseline = str(Path(__file__).parent / "baseline.py")
+    baseline = str(Path(__file__).parent / "references" / "baseline.py")
     with tempfile.TemporaryDirectory() as folder:
         picture = str(Path(folder) / "picture.png")
         command = ["render", "-o", picture, "--force", "--size", "1280x720", "--quality", "draft"]

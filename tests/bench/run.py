@@ -18,7 +18,7 @@ NAMES = [
     "materials",
     "structure",
     "motion",
-    "read",
+    "big_files",
     "gltf",
     "nodes",
     "captures",

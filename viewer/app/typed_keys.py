@@ -16,7 +16,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-__all__ = ["TypedKeys", "end_frame_before", "end_frame_before_click"]
+__all__ = ["TypedKeys", "end_frame", "end_frame_before"]
 
 _PRINTABLE = range(32, 163)  # GLFW's keys from Space to World 2
 _KEYPAD = (*range(320, 335), 336)  # digits and operators, without Enter
@@ -70,24 +70,17 @@ def end_frame_before(queue: Any, key: int, action: int) -> None:
         end_frame(queue)
 
 
-def end_frame_before_click(queue: Any, action: int) -> None:
-    """Let the motion before a press of a mouse button have a frame of its own.
+def end_frame(queue: Any) -> None:
+    """Let ImGui process the events of its queue, if there are any, before later ones.
 
-    Tabs and other widgets that may overlap react only if they were hovered in an earlier frame.
+    A mouse button needs it: tabs and other widgets that may overlap react to a press only if they
+    were hovered in an earlier frame, and the last motion of a drag counts only before its release.
 
     Parameters
     ----------
     queue : sequence
-        ImGui's queue of input events, to which the press has not been added yet.
-    action : int
-        Argument of GLFW's mouse button callback.
+        ImGui's queue of input events.
     """
-    if action == _PRESS:
-        end_frame(queue)
-
-
-def end_frame(queue: Any) -> None:
-    """Let ImGui process the events of its queue, if there are any, before later ones."""
     if len(queue):
         for is_down in (True, False):
             imgui.get_io().add_key_event(_SEPARATOR, is_down)

@@ -36,7 +36,7 @@ from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
 from viewer.app.preferences.system_theme import system_theme  # noqa: E402
 from viewer.app.theme import add_system_fonts, apply_theme  # noqa: E402
-from viewer.app.typed_keys import TypedKeys, end_frame_before, end_frame_before_click  # noqa: E402
+from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
@@ -189,7 +189,7 @@ class _Window:
             imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
 
     def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
-        end_frame_before_click(self._imgui.input_events_queue, action)
+        end_frame(self._imgui.input_events_queue)
         imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
 
     def _on_change(self, *_: Any) -> None:

@@ -233,10 +233,10 @@ def _video_rate(settings: MotionSettings) -> float | None:
 
 
 def _is_picture(source: Source) -> bool:
-    from viewer.formats import is_picture
-
     if source.is_folder or claims(source.path.suffix):
         return False
+    from viewer.formats import is_picture
+
     return is_picture(source.peek(_PEEK))
 
 

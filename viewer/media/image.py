@@ -13,7 +13,6 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError
-from viewer.media.array_cache import slot_of
 from viewer.media.png import encode_png
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
@@ -58,6 +57,8 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
     FormatError
         If it is not a readable image.
     """
+    from viewer.media.array_cache import slot_of
+
     slot = slot_of("pixels-1", data, 0, len(data))
     kept = None if slot is None else slot.load("|u1", 3)
     if kept is not None:

@@ -175,4 +175,5 @@ def is_rigid(palette: Floats) -> Bools:
     errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
     is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
     # A reflection also has orthogonal columns, but a negative determinant.
-    return is_uniform & (np.linalg.det(linear) > 0.0).all(axis=-1)
+    # Its sign is found without the product, which may overflow.
+    return is_uniform & (np.linalg.slogdet(linear).sign > 0.0).all(axis=-1)

@@ -126,11 +126,13 @@ class Actor:
     @property
     def name(self) -> str:
         """Label in menus and files: the title, and the person or figure in the recording."""
-        from viewer.rig.captures.person import person_name
-
         is_part = self.called and self.figure.points is not None
         name = f"{self.title} {self.figure.name}" if is_part else self.title
-        return name if self.person is None else f"{name} {person_name(self.person)}"
+        if self.person is None:
+            return name
+        from viewer.rig.captures.person import person_name
+
+        return f"{name} {person_name(self.person)}"
 
     @property
     def is_drawn(self) -> bool:

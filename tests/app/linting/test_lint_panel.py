@@ -222,6 +222,9 @@ def test_limits_are_set_in_their_dialog(lint):
     hand = lint(column())
     hand.click("Limits…")
     hand.step(2)
+    # Room for the longest text of the fields.
+    x0, _, x1, _ = hand.state.item_rects["Largest speed"]
+    assert x1 - x0 > 10 * imgui.get_style().font_size_base
     hand.enter_value("Largest rotation", "180")
     assert hand.state.of(Linting).options.max_rotation == pytest.approx(np.pi)
     hand.enter_value("Low confidence", "0.5")

@@ -21,11 +21,13 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
 @pytest.fixture(scope="module")
-def address():
+def address(tmp_path_factory):
     """Start a scheduler with two worker processes; the second declares a GPU."""
     from distributed import Nanny, Scheduler, SpecCluster
 
-    common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None}
+    folder = str(tmp_path_factory.mktemp("dask"))
+    common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None,
+              "local_directory": folder}  # fmt: skip
     workers = {
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
@@ -49,13 +51,13 @@ def finished(job, some, limits, on_result=lambda result: None):
 
 def test_cluster_of_this_machine_reports_crashes_hangs_and_defects() -> None:
     some = items(40, crash=5, hang=11, **{"raise": 20})
-    found = finished(Job(), some, Limits(2, retries=0, timeout=0.5, cluster="local"))
+    found = finished(Job(), some, Limits(2, retries=0, timeout=1.0, cluster="local"))
     assert {n: one.status for n, one in found.items() if one.status != "done"} == {
         5: "crashed",
         11: "timeout",
         20: "failed",
     }
-    assert found[11].message == "no result after 0.5 s"
+    assert found[11].message == "no result after 1 s"
     assert found[20].message == "ZeroDivisionError: in the job"
     assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
 

@@ -47,7 +47,9 @@ class Instances:
         matrix[:3, 3] = -np.asarray(eye)
         view = View(matrix, np.eye(4), Camera())
         self.instances.update([actor.pose for actor in actors], how)
-        program = self.programs.feedback("instance", how.method, VARYINGS)
+        program = self.programs.feedback(
+            "instance", how.method, VARYINGS, summed=self.instances.has_sums
+        )
         self.instances.place(actors, view)
         self.instances.use(program, view)
         count = self.mesh.n_vertices

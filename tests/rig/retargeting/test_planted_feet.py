@@ -226,3 +226,25 @@ def test_the_rotations_of_the_arms_are_untouched() -> None:
     found, clip, _ = planted()
     arms = [OTHER.skeleton.names.index(f"{side}Arm_") for side in SIDES]
     assert (clip.rotations[:, arms] == found.clip.rotations[:, arms]).all()
+
+
+def test_legs_that_cannot_be_solved_are_left_alone() -> None:
+    skeleton = OTHER.skeleton
+    mirrored, points = skeleton.rest_scales.copy(), skeleton.rest_translations.copy()
+    mirrored[skeleton.names.index("LeftLeg_")] = -1.0, 1.0, 1.0
+    below = [skeleton.names.index(f"{side}{part}_") for side in SIDES for part in ("Leg", "Foot")]
+    points[below] = 0.0
+    for bad in (
+        replace(skeleton, rest_scales=mirrored),
+        replace(skeleton, rest_translations=points),
+    ):
+        found, clip, changes = planted(replace(OTHER, skeleton=bad))
+        assert changes is None and clip is found.clip
+
+
+def test_somebody_who_lies_does_not_stand() -> None:
+    rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
+    rotations[:] = axis_rotations(0, np.asarray(-np.pi / 2))
+    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    clip, changes = plant_feet(found, OTHER)
+    assert clip is found.clip and changes.n_contacts == 0

@@ -138,11 +138,17 @@ def test_a_frame_in_an_a_pose_is_found(body, expected):
     assert degrees(found[1:], expected[1:]).max() < 5.0
 
 
-def test_someone_who_never_stands_keeps_the_zero_pose(body):
-    motion = twin(along_x(), starts_in_t_pose=False)
-    lying = replace(motion, figure=replace(motion.figure, up="z"))
-    _, notes = posed(body, lying)
-    assert notes == [("F007.rest-unknown", {"motion": "twin"})]
+@pytest.mark.parametrize("axes", [along_x(), arbitrary()])
+def test_someone_who_never_stands_is_estimated_from_the_trunk(body, axes):
+    motions = [twin(each, starts_in_t_pose=False) for each in (t_pose(), axes)]
+    lying = [replace(each, figure=replace(each.figure, up="z")) for each in motions]
+    (wanted, _), (found, notes) = (posed(body, each) for each in lying)
+    assert notes == [("F007.rest-lying", {"motion": "twin"})]
+    away = degrees(found, wanted).max(axis=0)
+    feet = [name.endswith(("ankle", "foot")) for name in body.skeleton.names]
+    assert away[np.logical_not(feet)].max() < 5.0
+    # The slope of the feet is 26.6 degrees, and assumed to be 30.
+    assert away[feet].max() < 15.0
 
 
 def test_limbs_that_never_bend_are_named(body):

@@ -45,6 +45,7 @@ _GROUNDS = {
     "none": "none: feet are not checked",
 }
 _LONGEST = 400  # longest message in the list, characters
+_LIMITS_WIDTH = 24.0  # in font sizes
 _FASTEST = 100.0  # largest speed that can be set, units per second
 _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 
@@ -101,6 +102,8 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
 
 def _draw_limits(state: AppState) -> None:
     """Draw the limits that depend on the user's intent."""
+    # Fields fill the window, so that it would shrink with them.
+    imgui.set_next_window_size((_LIMITS_WIDTH * imgui.get_font_size(), 0.0))
     if not imgui.begin_popup("lint limits"):
         return
     view = state.of(Linting)

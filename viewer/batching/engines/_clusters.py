@@ -24,6 +24,7 @@ __all__ = ["connected", "slurm_cluster"]
 _CONNECT = 10.0  # seconds
 _MEMORY = 4 << 30  # bytes per worker that a SLURM job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
+_ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 # The batch itself counts retries and tracks which items a worker had started.
 _CONFIG = {
     "distributed.scheduler.allowed-failures": 0,
@@ -31,6 +32,8 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
+    # Omits Dask's MALLOC_TRIM_THRESHOLD_, which returns freed memory: new arrays would page-fault.
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
     # These poll the workers many times a second, which takes a tenth or more of the time of short
     # items.
     "distributed.worker.profile.enabled": False,

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
+from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
@@ -90,12 +91,32 @@ class _Attempt:
     earlier: int = 0
 
 
+class _Worker(SpawnProcess):
+    """A worker process, which is not started any more when its pool is closing."""
+
+    owner: _Context | None = None
+
+    def start(self) -> None:
+        """Start it; raise OSError, which ends the thread of a pool, if that is closing."""
+        owner, self.owner = self.owner, None  # it is sent to the new process
+        if owner is None:
+            super().start()
+            return
+        with owner.lock:
+            if owner.is_closing:
+                raise OSError("the pool is closing")
+            super().start()
+            owner.workers = [one for one in owner.workers if one.is_alive()] + [self]
+
+
 class _Context(SpawnContext):
     """Starts workers as new interpreters, and keeps track of them."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.workers: list[SpawnProcess] = []
+        self.lock = Lock()
+        self.workers: list[_Worker] = []
+        self.is_closing = False
 
     def Process(  # type: ignore[override]  # noqa: N802  the name in multiprocessing
         self,
@@ -103,12 +124,19 @@ class _Context(SpawnContext):
         name: str,
         args: tuple[Any, ...],
         kwargs: dict[str, Any],
-    ) -> SpawnProcess:
+    ) -> _Worker:
         """Return a worker."""
-        worker = SpawnProcess(target=target, name=name, args=args, kwargs=kwargs)
-        self.workers = [one for one in self.workers if one.exitcode is None]
-        self.workers.append(worker)
+        worker = _Worker(target=target, name=name, args=args, kwargs=kwargs)
+        worker.owner = self
         return worker
+
+    def end_workers(self) -> None:
+        """End all workers, and start none until ``is_closing`` is reset."""
+        with self.lock:
+            self.is_closing = True
+            for worker in self.workers:
+                if worker.is_alive():
+                    worker.terminate()
 
 
 class _Workers:
@@ -164,11 +192,9 @@ class _Workers:
         """Terminate the workers and their items."""
         self._pool.stop()  # type: ignore[no-untyped-call]
         # Before the queue is closed, because workers that are starting would report errors.
-        for worker in self._context.workers:
-            if worker.is_alive():
-                worker.terminate()
+        self._context.end_workers()
         self._pool.join()
-        self._context.workers.clear()
+        self._context.is_closing = False
 
     def _result(self, future: ProcessFuture[Result], attempt: _Attempt) -> Result:
         from pebble import ProcessExpired

@@ -39,8 +39,9 @@ MESSAGES = {
     "overrides it",
     "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
     "{names:list}",
-    "F007.rest-unknown": "zero pose of {motion:text} used as its rest pose, though it is "
-    "not a standing pose: the motion is not upright; --source-rest N uses frame N",
+    "F007.rest-lying": "rest pose of {motion:text}: estimated from its trunk, knees and elbows; "
+    "its zero pose is not a standing pose, and the motion is not upright, so the slope of "
+    "its feet is assumed; --source-rest overrides it",
     "F007.feet-planted": "feet of {figure:text} planted during {n:#contact} of {motion:text}: they "
     "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
     "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "

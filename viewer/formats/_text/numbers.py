@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 
 from viewer.formats._text.decimal_words import parse_decimals, parse_exponentials, parse_short
 from viewer.formats._text.swar import Indices, Words, padded
-from viewer.media.array_cache import slot_of
 from viewer.progress import report_bytes
 from viewer.rig.arrays import Bools, Floats
 
@@ -118,6 +117,8 @@ def parse_numbers(data: bytes, start: int, end: int, is_kept: bool = True) -> tu
     >>> parse_numbers(b"1 -2.5  1e3", 0, 11)[0].tolist()
     [1.0, -2.5, 1000.0]
     """
+    from viewer.media.array_cache import slot_of
+
     slot = slot_of("numbers-1", data, start, end) if is_kept else None
     kept = None if slot is None else slot.load("<f8", 1)
     if kept is not None:

@@ -11,7 +11,6 @@ from viewer.diagnostics import Part, Phrase
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
-from viewer.media.array_cache import slot_of
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_numbers", "read_table"]
@@ -54,6 +53,8 @@ def read_table(
 
 def _regular_rows(source: Source, columns: int) -> Floats | None:
     """Return the rows of a table without errors, (N, columns); None if it has any."""
+    from viewer.media.array_cache import slot_of
+
     data = source.data
     slot = slot_of(f"table{columns}-1", data, 0, len(data))
     kept = None if slot is None else slot.load("<f8", 2)

@@ -198,7 +198,6 @@ class InstanceBuffers:
             "u_orthographic": view.camera.is_parallel,
             "u_blend_factor": self._how.blend_factor,
             "u_n_joints": self._n_joints,
-            "u_n_summed": self._offsets.n_summed,
             "u_n_offsets": self._offsets.n_listed,
             "u_n_sources": len(self.mesh.copies),
             "u_palette": _PALETTE_UNIT,
@@ -223,6 +222,11 @@ class InstanceBuffers:
     def is_affine(self) -> bool:
         """Whether joints of some actor scale or shear."""
         return not self._is_rigid[: self.count].all()
+
+    @property
+    def has_sums(self) -> bool:
+        """Whether the pose correctives of each actor were summed before the draw."""
+        return self._offsets.has_sums
 
     def array(
         self, program: moderngl.Program, indices: IndexSet | None = None

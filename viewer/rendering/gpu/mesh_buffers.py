@@ -179,6 +179,11 @@ class MeshBuffers:
         return any(surface.is_physical for surface in self.surfaces)
 
     @property
+    def is_textured(self) -> bool:
+        """Whether a material has a base colour texture."""
+        return any(surface.uniforms["u_textured"] for surface in self.surfaces)
+
+    @property
     def is_blended(self) -> bool:
         """Whether a material is translucent."""
         return any(surface.is_blended for surface in self.surfaces)

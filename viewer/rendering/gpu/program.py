@@ -77,6 +77,7 @@ class Programs:
         skin: str = "",
         geometry: str = "",
         affine: bool = False,
+        summed: bool = False,
         materials: bool = False,
         effects: tuple[str, ...] = (),
     ) -> moderngl.Program:
@@ -96,6 +97,8 @@ class Programs:
             Name of the geometry shader between the two, if any.
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
+        summed : bool
+            Whether pose correctives were summed before, for vertex shaders that skin instances.
         materials : bool
             Whether surfaces have more than a base colour texture, see ``include/surface.glsl``.
         effects : tuple of str
@@ -107,24 +110,31 @@ class Programs:
             If the driver rejects a shader; the message gives the file and line.
         """
         files = name, skin, fragment or name, chunk, geometry
-        return self._get((*files, affine, materials, *effects), ())
+        return self._get((*files, affine, summed, materials, *effects), ())
 
     def feedback(
-        self, name: str, chunk: str, outputs: tuple[str, ...], affine: bool = False
+        self,
+        name: str,
+        chunk: str,
+        outputs: tuple[str, ...],
+        affine: bool = False,
+        summed: bool = False,
     ) -> moderngl.Program:
         """Return a program without a fragment shader, whose interleaved outputs are captured.
 
-        The chunk is a skinning method; ``affine`` tells whether joints may scale or shear.
+        The chunk is a skinning method; see ``drawing`` for ``affine`` and ``summed``.
         """
-        return self._get((name, chunk, "", "", "", affine, False), outputs)
+        return self._get((name, chunk, "", "", "", affine, summed, False), outputs)
 
     def _get(self, key: tuple[str | bool, ...], outputs: tuple[str, ...]) -> moderngl.Program:
         if key not in self._cache:
             name, skin, fragment_name, chunk, middle = (str(part) for part in key[:5])
-            affine, materials, effects = key[5], key[6], tuple(str(part) for part in key[7:])
+            affine, summed, materials = key[5:8]
+            effects = tuple(str(part) for part in key[8:])
             files: list[str] = []
             common = ("MATERIALS",) if materials else ()
             defines = (*common, "AFFINE_PALETTE") if affine else common
+            defines = (*defines, "SUMMED_OFFSETS") if summed else defines
             vertex = _compose(f"{name}.vert", skin, files, defines)
             defines = *common, *effects
             fragment = (

@@ -38,13 +38,13 @@ class SummedOffsets:
     ----------
     n_listed : int
         Length of each instance's list; 0 if there are no correctives.
-    n_summed : int
-        1 if there is a row of sums for each instance, otherwise 0.
+    has_sums : bool
+        Whether there is a row of sums for each instance.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str) -> None:
         self.context, self.mesh, self.way = context, mesh, way
-        self.n_listed = self.n_summed = 0
+        self.n_listed, self.has_sums = 0, False
         self._weights: NDArray[np.float32] = np.zeros((0, 0), "f4")
         self._sums: NDArray[np.float32] = np.zeros((0, 0), "f4")
         self._list: moderngl.Texture | None = None
@@ -62,7 +62,7 @@ class SummedOffsets:
         count : int
             Number of all instances, A.
         """
-        self.n_listed = self.n_summed = 0
+        self.n_listed, self.has_sums = 0, False
         if weights is None:
             self._weights = np.zeros((0, 0), "f4")
             return
@@ -109,14 +109,14 @@ class SummedOffsets:
                 self._summed = None
             self._summed = empty_offsets(self.context, texels)
         write_stacked(self._summed, self._sums[:count])
-        self.n_summed = 1
+        self.has_sums = True
 
     def use(self, list_unit: int, offsets_unit: int) -> None:
         """Bind the textures for summing in the shader, if used."""
         if self.n_listed and self._list is not None:
             self._list.use(list_unit)
             self.mesh.offsets.use(offsets_unit)
-        if self.n_summed and self._summed is not None:
+        if self.has_sums and self._summed is not None:
             self._summed.use(offsets_unit)
 
     def release(self) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.mesh_pass import has_tints, set_surface, shading_of
+from viewer.rendering.passes.mesh_pass import fragment_macros, has_tints, set_surface, shading_of
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.view import View, set_lights
 from viewer.rig.scene import Actor
@@ -99,8 +99,9 @@ def draw_instances(
         "mesh",
         skin=instances.method,
         affine=instances.is_affine,
+        summed=instances.has_sums,
         materials=instances.mesh.has_materials,
-        effects=view.effects.defines,
+        effects=fragment_macros(instances.mesh, view, options),
     )
     instances.place(actors, view)
     instances.use(program, view)
@@ -126,6 +127,7 @@ def draw_instance_shapes(
         fragment=fragment,
         skin=instances.method,
         affine=instances.is_affine,
+        summed=instances.has_sums,
         materials=instances.mesh.has_materials,
     )
     instances.place(actors, view)

@@ -25,7 +25,15 @@ from viewer.rig.mesh import bounding_box, box_size
 if TYPE_CHECKING:
     from viewer.rendering.passes.blended_order import SortedTriangles
 
-__all__ = ["SKIN_COLOR", "MeshPass", "has_tints", "set_surface", "shading_of", "uses_materials"]
+__all__ = [
+    "SKIN_COLOR",
+    "MeshPass",
+    "fragment_macros",
+    "has_tints",
+    "set_surface",
+    "shading_of",
+    "uses_materials",
+]
 
 SKIN_COLOR = (0.62, 0.60, 0.57)
 """Default colour of a surface without texture, linear."""
@@ -86,7 +94,7 @@ class MeshPass:
             "scalar" if look is not None else shading_of(mesh.mesh, options),
             geometry=corners,
             materials=uses_materials(mesh, options),
-            effects=view.effects.defines,
+            effects=fragment_macros(mesh.mesh, view, options),
         )
         set_model(program, view, placement, mesh.center)
         set_lights(program, view, options.lights)
@@ -250,6 +258,12 @@ def shading_of(mesh: MeshBuffers, options: DisplayOptions) -> str:
     if options.shading not in ("auto", "scalar"):
         return options.shading
     return "pbr" if mesh.is_physical else "phong"
+
+
+def fragment_macros(mesh: MeshBuffers, view: View, options: DisplayOptions) -> tuple[str, ...]:
+    """Return the macros of the fragment shader that draws a mesh."""
+    is_textured = mesh.has_materials or (options.texture and mesh.is_textured)
+    return view.effects.defines if is_textured else (*view.effects.defines, "UNTEXTURED")
 
 
 def uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:

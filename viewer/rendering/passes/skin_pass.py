@@ -136,7 +136,6 @@ class PosedMesh:
             "u_rest_shift": tuple(self.mesh.center - self.center),
             "u_center": tuple(self.center),
             "u_blend_factor": how.blend_factor,
-            "u_n_summed": 0,
             "u_n_offsets": self._rest.n_offsets if attached else 0,
             "u_n_sources": len(self.mesh.copies),
             "u_palette": _PALETTE_UNIT,

@@ -63,12 +63,15 @@ class Soles:
         (F, N)
             Heights along the scene's up axis.
         """
-        rows = np.einsum("a,fpab->fpb", axis[:3], world[:, self.movers, :3])
-        heights = np.einsum("fpb,pb->fp", rows[..., :3], self.places) + rows[..., 3] + axis[3]
-        heights -= scale * self.above
-        result = np.empty((len(world), len(self.joints)))
-        for foot in range(len(self.joints)):
-            result[:, foot] = heights[:, self.feet == foot].min(axis=1)
+        points = np.append(self.places, np.ones((len(self.places), 1)), axis=1)
+        result = np.full((len(world), len(self.joints)), np.inf)
+        for mover in set(self.movers.tolist()):
+            row = np.einsum("a,fab->fb", axis[:3], world[:, mover, :3])
+            for foot in range(len(self.joints)):
+                own = (self.movers == mover) & (self.feet == foot)
+                if own.any():
+                    heights = row @ points[own].T + (axis[3] - scale * self.above[own])
+                    result[:, foot] = np.minimum(result[:, foot], heights.min(axis=1))
         return result
 
 

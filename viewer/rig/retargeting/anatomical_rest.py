@@ -22,6 +22,7 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
 _UPRIGHT = np.cos(np.radians(30.0))
 _STOOPED = np.cos(np.radians(60.0))
 _ENOUGH = 0.05  # fraction of the frames
+_SLOPE = np.radians(30.0)  # from the ankle down to the ball of a foot that stands
 _STANCE = 25.0  # percent of the frames in which a foot is lowest, and its sole level
 
 
@@ -34,15 +35,19 @@ def upright_frames(postures: Postures) -> Postures | None:
     return postures.chosen(chosen if chosen.mean() > _ENOUGH else heights > _STOOPED)
 
 
-def anatomical_rest(postures: Postures, skeleton: Skeleton) -> tuple[Floats, list[LimbAxes]]:
+def anatomical_rest(
+    postures: Postures, skeleton: Skeleton, has_stances: bool = True
+) -> tuple[Floats, list[LimbAxes]]:
     """Return the rotations of the joints in a standing pose.
 
     Parameters
     ----------
     postures : Postures
-        Upright poses of the motion.
+        Upright poses of the motion, or righted ones.
     skeleton : Skeleton
         Its skeleton.
+    has_stances : bool
+        Whether the poses are upright, and show the soles; otherwise the feet point forwards.
 
     Returns
     -------
@@ -58,8 +63,9 @@ def anatomical_rest(postures: Postures, skeleton: Skeleton) -> tuple[Floats, lis
     limbs = limb_axes(postures)
     for limb in limbs:
         fixed |= _limb(limb, stands, postures.joints)
-    for side in SIDES:
-        fixed |= _foot(postures, side, stands)
+    for side, limb in zip(SIDES, limbs, strict=False):
+        foot = _foot(postures, side, stands) if has_stances else _toes(postures, limb, stands)
+        fixed |= foot
     result = np.empty((len(parents), 3, 3))
     for joint, parent in enumerate(parents):
         if joint in fixed:
@@ -153,6 +159,22 @@ def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
     sole = np.einsum("fba,b->a", axes, low.up)
     left, up, _ = stands.T
     return {ankle: _axes_along(up, left) @ _axes_along(sole, np.cross(sole, front)).T}
+
+
+def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Floats]:
+    """Return the rotation of the foot of a leg, sideways as its knee, with the toes forward."""
+    side = limb.upper.partition("_")[0]
+    ankle, toes = postures.joints[f"{side}_ankle"], postures.joints.get(f"{side}_foot")
+    if toes is None:
+        return {}
+    axes = postures.rotations[:, ankle]
+    ahead = postures.points[:, toes] - postures.points[:, ankle]
+    front = np.einsum("fba,fb->a", axes, ahead)
+    bends = postures.rotations[:, postures.joints[limb.lower]] @ limb.bends[1]
+    left, up, forward = stands.T
+    wanted = np.cos(_SLOPE) * forward - np.sin(_SLOPE) * up
+    across = np.einsum("fba,fb->a", axes, bends)
+    return {ankle: _axes_along(wanted, left) @ _axes_along(front, across).T}
 
 
 def _axes_along(main: Floats, side: Floats) -> Floats:

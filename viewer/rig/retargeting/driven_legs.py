@@ -26,6 +26,7 @@ from viewer.rig.shape import shaped
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
 _ALIKE = 1e-4  # relative to the body
+_UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
 _STEEP = 0.9  # sine of the steepest foot of a standing person
 
 
@@ -173,6 +174,8 @@ def driven_legs(
     rests = np.stack([rest_translations_of(figure, weights[None])[0], skeleton.rest_scales])
     still = SampledClip("", Timing(1.0, np.zeros(1, dtype=np.int32)), skeleton.rest_rotations[None])
     world = chain_worlds(still, chains, *rests)[0]
+    if not _is_solvable(world[:, :3, :3]):
+        return None
     place = chains.place
     own = tuple(
         Leg(*(int(place[joint]) for joint in (leg.hip, leg.knee, leg.ankle, leg.toe)))
@@ -189,6 +192,13 @@ def driven_legs(
     extensions, size = _extensions(world[None], own)[0], _size(world, own)
     clearance = float(toes.mean() - floor)
     return DrivenLegs(chains, own, moved, heels, level, rests, extensions, size, clearance)
+
+
+def _is_solvable(linear: Floats) -> bool:
+    """Return whether joints are scaled uniformly and not mirrored: (K, 3, 3)."""
+    lengths = np.linalg.norm(linear, axis=-2)
+    is_uniform = np.ptp(lengths, axis=-1) <= _UNEVEN * lengths.min(axis=-1)
+    return bool(is_uniform.all() and (np.linalg.det(linear) > 0.0).all())
 
 
 def _extensions(worlds: Floats, legs: tuple[Leg, ...]) -> Floats:
@@ -284,12 +294,13 @@ def foot_paths(
             ball = ball if toe != ankle else place + own[0]
             result.append(FootPath(ball, ball, above))
             continue
-        upward = np.linalg.solve(rest[ankle, :3, :3], found.to_target.T @ up)
         height = (axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3])) @ up
         length = np.linalg.norm(axes @ (rest[ankle, :3, 3] - rest[toe, :3, 3]))
-        if not 0.0 < height < _STEEP * length:
+        linear = rest[ankle, :3, :3]
+        if not (0.0 < height < _STEEP * length and _is_solvable(linear)):
             result.append(FootPath(place + own[0], place + own[1], above))
             continue
+        upward = np.linalg.solve(linear, found.to_target.T @ up)
         heel = world[:, ankle, :3] @ np.append(-height / found.scale * upward, 1.0)
         result.append(FootPath(ball, heel @ axes.T, above))
     return result

@@ -99,7 +99,7 @@ def plant_feet(
     up = -rest_up if hangs else rest_up
     clip = cast("SampledClip", in_frame_order(found.clip))
     body = driven_legs(figure, clip, [pair.leg for pair in pairs], rest_up) if pairs else None
-    if body is None or clip.n_rows == 0:
+    if body is None or body.size <= 0.0 or clip.n_rows == 0:
         return found.clip, None
     if has_source_proportions(found, figure, pairs, body.size):
         return found.clip, None
@@ -112,13 +112,14 @@ def plant_feet(
         return found.clip, PlantedFeet()
     planted, lowered = _planted(clip, body, worlds, plan)
     after = body.worlds(planted)
+    gaps = [plan.gap(body.heights(each, up), body.facing(each, up)) for each in (worlds, after)]
     changes = PlantedFeet(
         sum(map(len, plan.contacts)),
         plan.slide([(foot.toe, foot.heel) for foot in feet]),
         plan.slide(body.feet(worlds)),
         plan.slide(body.feet(after)),
-        plan.gap(body.heights(worlds, up), body.facing(worlds, up)),
-        plan.gap(body.heights(after, up), body.facing(after, up)),
+        gaps[0],
+        gaps[1],
         lowered,
         body.size,
     )

@@ -62,6 +62,20 @@ class Postures:
         """Return horizontal unit vectors to the front of the body: (F, 3)."""
         return np.cross(self.left(), self.up)
 
+    def righted(self) -> Postures:
+        """Return the poses rotated as a whole, with the trunk along ``up`` and the left along x."""
+        trunk, side = self.trunk(), self.direction("right_hip", "left_hip")
+        ahead = unit(np.cross(side, trunk))
+        own = np.stack([np.cross(trunk, ahead), trunk, ahead], axis=2)
+        left = np.array([1.0, 0.0, 0.0])
+        stands = np.stack([left, self.up, np.cross(left, self.up)], axis=1)
+        turns = stands @ np.swapaxes(own, 1, 2)
+        return replace(
+            self,
+            rotations=turns[:, None] @ self.rotations,
+            points=np.einsum("fab,fjb->fja", turns, self.points),
+        )
+
     def chosen(self, frames: Bools) -> Postures:
         """Return some of the poses."""
         return replace(

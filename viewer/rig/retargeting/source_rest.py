@@ -92,8 +92,11 @@ def with_source_rest(
         return motion, []
     postures = postures_of(motion)
     upright = None if postures is None else upright_frames(postures)
+    if postures is None:
+        return motion, []
     if upright is None:
-        return motion, [Diagnostic("F007.rest-unknown", values=called)]
+        worlds, _ = anatomical_rest(postures.righted(), skeleton, has_stances=False)
+        return _placed(motion, skeleton, worlds), [Diagnostic("F007.rest-lying", values=called)]
     return _estimated(motion, skeleton, upright)
 
 
@@ -114,10 +117,15 @@ def _estimated(
     hidden = [skeleton.names[upright.joints[limb.lower]] for limb in limbs if not limb.is_seen]
     if hidden:
         notes.append(Diagnostic("F007.rest-straight", values={**called, "names": hidden}))
+    return _placed(motion, skeleton, worlds), notes
+
+
+def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> SkeletonMotion:
+    """Return a motion whose skeleton rests with other world rotations: (J, 3, 3)."""
     above = worlds[skeleton.parents]
     above[skeleton.parents < 0] = np.eye(3)
     local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
-    return _replaced(motion, skeleton, local), notes
+    return _replaced(motion, skeleton, local)
 
 
 def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:

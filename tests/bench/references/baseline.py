@@ -1,7 +1,8 @@
 """The minimal program that draws and saves a frame: numpy, moderngl, Pillow, one shader, one PNG.
 
-Run as ``python baseline.py OUTPUT.png``; what ``viewer render`` is measured against. Draws as many
-triangles as the bundled figure has, 1280 x 720, four samples a pixel, without reading any file.
+Run as ``python references/baseline.py OUTPUT.png``; what ``viewer render`` is measured against.
+Draws as many triangles as the bundled figure has, 1280 x 720, four samples a pixel, without reading
+any file.
 """
 
 from __future__ import annotations
