@@ -92,12 +92,12 @@ class _Attempt:
 
 
 class _Worker(SpawnProcess):
-    """A worker process, which is not started any more when its pool is closing."""
+    """A worker process that refuses to start while its pool is closing."""
 
     owner: _Context | None = None
 
     def start(self) -> None:
-        """Start it; raise OSError, which ends the thread of a pool, if that is closing."""
+        """Start the process; raise OSError if the pool is closing, which ends the pool's thread."""
         owner, self.owner = self.owner, None  # it is sent to the new process
         if owner is None:
             super().start()
@@ -131,7 +131,7 @@ class _Context(SpawnContext):
         return worker
 
     def end_workers(self) -> None:
-        """End all workers, and start none until ``is_closing`` is reset."""
+        """Terminate all workers, and start none until ``is_closing`` is reset."""
         with self.lock:
             self.is_closing = True
             for worker in self.workers:
