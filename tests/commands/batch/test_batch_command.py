@@ -1,4 +1,4 @@
-"""``viewer batch``: items as the command's own runs, exit codes, and refusals before the start."""
+"""``viewer batch``: results equal to single runs, exit codes, and early refusals."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def test_resume_runs_only_what_is_not_done(rigs, capsys):
     assert run([*command, "--report", "r.jsonl", "--resume"]) == 0
     assert "1 done, 2 unchanged" in capsys.readouterr().out
     assert Path("a-one.obj").stat().st_mtime_ns == written and Path("b-bad.obj").exists()
-    # Other options give other results, as do other shared files.
+    # Other options or shared files give other results.
     assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
     assert "3 done" in capsys.readouterr().out
     Path("tiny.skin").write_text(skin_text() + "\n")
@@ -138,7 +138,7 @@ def test_pictures_are_drawn_by_workers(rigs):
         assert picture.size == (32, 24)
 
 
-def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
+def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch):
     from viewer.commands import info
 
     monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
