@@ -6,12 +6,12 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.attempts import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
+from viewer.commands._batch.functions import identity_of
 from viewer.commands._batch.jobs import JOBS, job_parser
 from viewer.commands._batch.options import RETRIES
 from viewer.commands._batch.planning import Plan, Request, plan_of
@@ -21,7 +21,6 @@ from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
-from viewer.version import VERSION
 
 if TYPE_CHECKING:
     from viewer.batching.engines import Job
@@ -157,15 +156,7 @@ def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Reques
     """Return a function as a job, and the request with its identity."""
     may_replace = request.force or request.resume
     check_results("function", request.table, request.overview, may_replace, request.output)
-    return FunctionJob(job), replace(request, identity=_identity(job))
-
-
-def _identity(function: Callable[[Item], Any]) -> str:
-    """Return a function's name and a hash of its code."""
-    code = getattr(function, "__code__", None)
-    body = b"" if code is None else code.co_code + repr(code.co_consts).encode()
-    name = getattr(function, "__qualname__", type(function).__qualname__)
-    return f"{function.__module__}.{name} {blake2b(body, digest_size=8).hexdigest()} {VERSION}"
+    return FunctionJob(job), replace(request, identity=identity_of(job))
 
 
 def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, Request]:
