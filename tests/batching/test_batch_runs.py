@@ -101,6 +101,27 @@ def test_changed_inputs_and_lost_outputs_are_processed_again(tmp_path, monkeypat
     assert (tmp_path / "out" / "pose1.sum").read_text() == "6"
 
 
+def test_functions_return_numbers_and_their_outputs_are_kept_track_of(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_numbers(tmp_path / "in" / "deep", 1)
+    (tmp_path / "in" / "top.txt").write_text("1")
+
+    def count(item: Item) -> int:
+        Path(item.output).write_text("3")
+        return 120  # a value, not an exit code
+
+    call = {"job": count, "out": "out", "to": "sum", "workers": 0}
+    report = viewer.batch(["in/deep/pose0.txt", "in/top.txt"], **call)
+    assert [one.values for one in report.results] == [{"value": 120}] * 2
+    assert {one.outputs for one in report.results} == {("out/deep/pose0.sum",), ("out/top.sum",)}
+    Path("out/top.sum").unlink()
+    report = viewer.batch(["in/deep/pose0.txt", "in/top.txt"], **call, resume=True)
+    assert {one.item.name: one.status for one in report.results} == {
+        "deep/pose0.txt": "unchanged",
+        "top.txt": "done",
+    }
+
+
 def test_report_is_not_replaced_by_mistake(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 3)

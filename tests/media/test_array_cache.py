@@ -176,9 +176,16 @@ def test_pixels_of_an_image_are_cached(folder: Path, monkeypatch: pytest.MonkeyP
 def test_option_and_variable_disable_the_cache(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    rows = b"".join(b"v %d.25 %d.5 1\n" % (n, n) for n in range(4000)) + b"f 1 2 3\n"
-    (tmp_path / "a.obj").write_bytes(rows)
-    command = ["info", str(tmp_path / "a.obj")]
+    rows = {
+        "positions": [f"{n}.25 {n}.5 1" for n in range(4000)],
+        "normals": ["0 0 1"] * 4000,
+        "skinweights": ["1 0 1"] * 4000,
+        "triangles": ["0 1 2"],
+        "bindings": ["matrix { 1 0 0 0 1 0 0 0 1 0 0 0 }"],
+    }
+    sections = (f"{name} {len(lines)} {{ {' '.join(lines)} }}" for name, lines in rows.items())
+    (tmp_path / "a.skin").write_text("\n".join(sections))
+    command = ["info", str(tmp_path / "a.skin")]
     assert run([*command, "--no-cache"]) == 0
     plain = capsys.readouterr().out
     monkeypatch.setenv("VIEWER_CACHE", "off")

@@ -144,6 +144,12 @@ def test_page_of_render_contains_small_pictures(tmp_path) -> None:
     assert len(sources) == 1 and sources[0].startswith("data:image/jpeg;base64,")
 
 
+def test_sheet_of_failures_alone_is_drawn(tmp_path) -> None:
+    failed = Result(Item(0, (), "", "a"), "failed", 2, message="no mesh")
+    (line,) = save_overview(tmp_path / "o.png", "render", [failed])
+    assert line.endswith("o.png: 1 item, 1 of them failed") and (tmp_path / "o.png").exists()
+
+
 def test_other_files_and_batches_without_pictures_are_refused(tmp_path) -> None:
     with pytest.raises(UnsupportedFormatError, match=r'expected \.html, \.png.*, found "\.pdf"'):
         check_overview("o.pdf")

@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from app.tiny import SKEL, skin_text, write_rig
 
+import viewer
 from viewer.batching.report import read_results
 from viewer.cli import run
+from viewer.errors import ViewerError
 
 BROKEN = "balljoint root {\noffset 0 zero 0\n}"
 
@@ -144,6 +146,21 @@ def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch):
     monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
     assert run(["batch", "info", "in"]) == 130
     assert "2 items left" in capsys.readouterr().out
+
+
+def test_shards_write_their_own_tables(rigs):
+    for shard in ("0/2", "1/2"):
+        run(["batch", "lint", "in", "--shard", shard, "--table", "t.csv"])
+    rows = [len(Path(f"t.{n}-of-2.csv").read_text().splitlines()) for n in range(2)]
+    assert rows == [3, 2] and not Path("t.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "options", [["--shard", "0/2"], ["--report", "r.jsonl"], ["--force"], ["stray"], "--json"]
+)
+def test_python_refuses_options_without_effect(rigs, options):
+    with pytest.raises(ViewerError, match="options: expected"):
+        viewer.batch("in", "info", options=options)
 
 
 @pytest.mark.parametrize(

@@ -107,6 +107,7 @@ def test_python_grades_with_expected_names_and_workers_see_the_same(course) -> N
     [
         (["--table", "t.xls"], '--table: t.xls: expected .csv, found ".xls"'),
         (["--overview", "o.pdf"], "--overview: o.pdf: expected .html, .png"),
+        (["--overview", "o.png"], "--overview: o.png: expected -o OUT"),
         (["--table", "no/t.csv"], "no/t.csv: the folder no does not exist"),
         (["--table", "grades.csv"], "grades.csv: already exists (--force replaces it)"),
     ],
