@@ -40,7 +40,7 @@ LIMIT = 1 << 29
 
 _OFF = ("off", "0", "no", "none")
 _LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
-_LARGEST = 1 << 25  # bytes of an entry; larger files would displace all others
+_LARGEST = 1 << 25  # bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
 _BINARY = getattr(os, "O_BINARY", 0)

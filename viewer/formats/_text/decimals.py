@@ -48,7 +48,7 @@ def fixed(values: Floats, decimals: int) -> Digits:
         scaled = np.where(is_odd, 0.0, scaled)
     numbers = np.abs(scaled).astype(np.uint64)
     whole = numbers // _TENS[decimals]
-    # The point of a text is part of it: NaN and infinity have none.
+    # Texts formatted by Python include the decimal point, if any: NaN and infinity have none.
     count = np.where(is_odd, 0, decimals)
     odd = _texts(values, is_odd, lambda value: f"{np.round(value, decimals) + 0.0:.{decimals}f}")
     return Digits(scaled < 0.0, whole, numbers - whole * _TENS[decimals], count, None, odd)
