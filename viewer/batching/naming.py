@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import unicodedata
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -26,6 +27,7 @@ FIELDS = {
 }
 """Fields of templates."""
 
+_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of numbers
 _LEFT = ("frame",)  # fields of the commands, for numbered images and meshes
 _LONGEST = 300  # characters of a name in a message
 
@@ -75,13 +77,13 @@ def _fields(template: str) -> list[str]:
     """Return the fields of a template; raise ViewerError for unknown ones."""
     try:
         found = [
-            (name, spec or "")
-            for _, name, spec, _ in Formatter().parse(template)
+            (name, spec or "", conversion)
+            for _, name, spec, conversion in Formatter().parse(template)
             if name is not None
         ]
     except ValueError as problem:
         raise ViewerError(f"-o {printable(template, _LONGEST)}: {problem}") from None
-    for name, spec in found:
+    for name, spec, conversion in found:
         if name not in (*FIELDS, *_LEFT):
             near = did_you_mean(name, FIELDS) or f"there are {', '.join(FIELDS)}"
             raise ViewerError(f"-o: no field is called {{{printable(name, 40)}}}; {near}")
@@ -89,7 +91,11 @@ def _fields(template: str) -> list[str]:
             raise ViewerError(
                 f"-o: expected {{{name}}} without a format, found {printable(spec, 40)}"
             )
-    return [name for name, _ in found]
+        if conversion or (name == "index" and not _NUMBER.fullmatch(spec)):
+            form = f"!{conversion}" if conversion else f":{spec}"
+            wanted = "{index} or {index:05}" if name == "index" else f"{{{name}}}"
+            raise ViewerError(f"-o: expected {wanted}, found {{{name}{printable(form, 40)}}}")
+    return [name for name, _, _ in found]
 
 
 def items_of(inputs: Inputs, template: str = "") -> list[Item]:
