@@ -145,7 +145,7 @@ def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
 
     monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
     assert run(["batch", "info", "in"]) == 130
-    assert "2 items left" in capsys.readouterr().out
+    assert "2 items left; only batches with --report" in capsys.readouterr().out
 
 
 def test_shards_write_their_own_tables(rigs):
