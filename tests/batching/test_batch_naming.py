@@ -44,6 +44,9 @@ def test_items_are_named_by_their_path_below_the_common_folder():
         ("{stem}.bvh", "bvh", "expected a folder"),
         ("{sten}.bvh", "", "did you mean stem"),
         ("{stem:5}.bvh", "", "without a format"),
+        ("{index:zz}.bvh", "", r"\{index:05\}, found \{index:zz\}"),
+        ("{index:>99999999999999999999}.bvh", "", "expected {index}"),
+        ("{stem!r}.bvh", "", r"expected \{stem\}, found \{stem!r\}"),
         ("{stem.bvh", "", "expected '}'"),
     ],
 )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from viewer.batching.items import Item, Result
@@ -126,3 +128,33 @@ def test_key_of_folders_and_archives_depends_on_files_and_names(tmp_path):
     assert len(set(keys)) == 5
     with pytest.raises(OSError):
         item_key(Item(0, (str(tmp_path / "missing"),), "", ""), "")
+
+
+def test_key_of_a_shared_folder_follows_its_files(tmp_path):
+    (tmp_path / "one").write_text("1")
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "a.txt").write_text("old")
+    keys = []
+    for text in ("old", "newer"):  # writing a file does not change the time of its folder
+        (tmp_path / "model" / "a.txt").write_text(text)
+        item = Item(0, (str(tmp_path / "one"),), "", "one")
+        keys.append(item_key(item, "", [str(tmp_path / "model")]))
+    assert keys[0] != keys[1]
+
+
+def test_key_reads_no_devices(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "endless").symlink_to("/dev/zero")
+    (tmp_path / "in" / "lost").symlink_to("nowhere")
+    assert item_key(Item(0, (str(tmp_path / "in"),), "", ""), "")
+    with pytest.raises(OSError, match="not a file"):
+        item_key(Item(0, (str(tmp_path / "in" / "endless"),), "", ""), "")
+
+
+def test_arrays_and_other_keys_of_functions_are_written(tmp_path):
+    values = {"size": np.float32(2.5), "ids": np.arange(3)}
+    with ReportFile(tmp_path / "r.jsonl") as file:
+        file.add(Result(ITEM, "done", values=values))
+        file.add(Result(replace(ITEM, name="b"), "done", values={"n": {(1, 2): np.arange(2)}}))
+    found = [one.values for one in read_results(tmp_path / "r.jsonl")]
+    assert found == [{"size": 2.5, "ids": [0, 1, 2]}, {"n": {"(1, 2)": [0, 1]}}]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import struct
 import threading
 from pathlib import Path
 
@@ -113,6 +114,24 @@ def test_only_the_user_can_read_or_write_entries(folder: Path) -> None:
     assert folder.stat().st_mode & 0o777 == 0o700
     assert entry(folder).stat().st_mode & 0o777 == 0o600
     entry(folder).chmod(0o622)
+    assert slot().load("<f8", 1) is None
+
+
+def test_other_shapes_of_as_many_items_are_ignored(folder: Path) -> None:
+    slot().store(VALUES.reshape(4000, 2))
+    data = entry(folder).read_bytes()
+    for axes in ((2, 4000), (1 << 62, 0)):
+        cut = data[: 56 + len(TEXT)] if 0 in axes else data
+        entry(folder).write_bytes(cut[:32] + struct.pack("<2Q", *axes) + cut[48:])
+        assert slot().load("<f8", 2) is None
+    entry(folder).write_bytes(data)
+    assert slot().load("<f8", 2) is not None
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
+def test_pipes_are_not_waited_for(folder: Path) -> None:
+    folder.mkdir()
+    os.mkfifo(slot().path)
     assert slot().load("<f8", 1) is None
 
 

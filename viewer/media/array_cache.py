@@ -8,7 +8,7 @@ cached.
 ::
 
     entry   header (56 bytes) · bytes that were read · array, little-endian
-    header  version · checksum of the array · length of the bytes · item type · axes (up to 3)
+    header  version · checksum of array and axes · length of the bytes · item type · axes (up to 3)
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import struct
 import sys
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -44,7 +44,9 @@ _LARGEST = 1 << 25  # bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
 _BINARY = getattr(os, "O_BINARY", 0)
-_MAGIC = f"viewer {VERSION}".encode()[:15].ljust(16, b"\0")
+# A link could lead to a device, or to a file of somebody else; opening a pipe would wait for ever.
+_READING = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | _BINARY
+_MAGIC = f"viewer {zlib.crc32(VERSION.encode()):08x}".encode().ljust(16, b"\0")
 _is_off = False
 
 
@@ -133,8 +135,7 @@ class Slot:
             Number of its axes.
         """
         try:
-            # A link could lead to a device, or to another user's file.
-            number = os.open(self.path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | _BINARY)
+            number = os.open(self.path, _READING)
             with open(number, "rb", buffering=0) as stream:  # noqa: PTH123
                 status = os.fstat(number)
                 if not _is_own(status):
@@ -155,16 +156,16 @@ class Slot:
         magic, checksum, length, found, *axes = _HEADER.unpack(header)
         if (magic, length, found) != (_MAGIC, len(self._content), _code(kind, n_axes)):
             return None
-        if any(axes[n_axes:]):
+        if any(axes[n_axes:]) or max(axes) > size:
             return None
         shape, dtype = axes[:n_axes], np.dtype(kind)
-        if _HEADER.size + length + math.prod(shape) * dtype.itemsize != size:
+        if _HEADER.size + length + math.prod(shape) * dtype.itemsize != size or size > _LARGEST:
             return None
         if stream.read(length) != self._content:
             return None
         values = np.empty(shape, dtype)
         flat = values.reshape(-1).view(np.uint8).data
-        if stream.readinto(flat) != len(flat) or zlib.crc32(flat) != checksum:
+        if stream.readinto(flat) != len(flat) or _checksum(flat, axes) != checksum:
             return None
         return values
 
@@ -183,7 +184,7 @@ class Slot:
         flat = values.reshape(-1).view(np.uint8).data
         code = _code(values.dtype.str, values.ndim)
         axes = (*values.shape, 0, 0, 0)[:3]
-        header = _HEADER.pack(_MAGIC, zlib.crc32(flat), len(self._content), code, *axes)
+        header = _HEADER.pack(_MAGIC, _checksum(flat, axes), len(self._content), code, *axes)
         mark = f"{os.getpid()}-{threading.get_ident()}"
         temporary = self.path.with_name(f".{self.path.name}.{mark}")
         try:
@@ -201,6 +202,11 @@ class Slot:
         # Listing the folder for each entry would slow down reading thousands of files.
         if zlib.crc32(header) % 16 == 0 or total > LIMIT // 64:
             _limit_size(self.path.parent)
+
+
+def _checksum(data: memoryview, axes: Sequence[int]) -> int:
+    """Return the checksum of an array and its axes, as others may have as many items."""
+    return zlib.crc32(data, zlib.crc32(struct.pack("<3Q", *axes)))
 
 
 def _code(kind: str, n_axes: int) -> bytes:

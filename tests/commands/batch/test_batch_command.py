@@ -53,12 +53,16 @@ def test_items_are_written_as_the_command_writes_them(rigs, capsys):
 
 def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
-    rows = "".join(f"v {n}.25 {n}.5 1\n" for n in range(4000)) + "f 1 2 3\n"
+    points = " ".join(f"{n}.25 {n}.5 1" for n in range(4000))
+    normals, weights = "0 0 1 " * 4000, "1 0 1 " * 4000
+    bind = "bindings 1 { matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } }"
+    sections = f"positions 4000 {{ {points} }} normals 4000 {{ {normals} }} "
+    sections += f"skinweights 4000 {{ {weights} }} triangles 1 {{ 0 1 2 }} {bind}"
     for name in "ab":
-        (tmp_path / f"{name}.obj").write_text(rows)
-    assert run(["batch", "info", str(tmp_path / "*.obj")]) == 0
+        (tmp_path / f"{name}.skin").write_text(sections)
+    assert run(["batch", "info", str(tmp_path / "*.skin")]) == 0
     assert not (tmp_path / "cache").exists()
-    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert run(["info", str(tmp_path / "a.skin")]) == 0
     assert (tmp_path / "cache").exists()
 
 
@@ -145,7 +149,7 @@ def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch):
 
     monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
     assert run(["batch", "info", "in"]) == 130
-    assert "2 items left" in capsys.readouterr().out
+    assert "2 items left; only batches with --report" in capsys.readouterr().out
 
 
 def test_shards_write_their_own_tables(rigs):
@@ -178,6 +182,9 @@ def test_python_refuses_options_without_effect(rigs, options):
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
         (["lint", "in", "--resume"], "--report FILE"),
+        (["info", "in", "--report", "in/a/one.skel", "--force"], "--report: in/a/one.skel: exp"),
+        (["render", "in", "-o", "out", "--overview", "out/a/one.png"], "the output of a/one.skel"),
+        (["lint", "in", "--table", "t.csv", "--report", "t.csv"], "the file of --report"),
         (["lint", "in", "--workers", "-1"], "expected a number"),
         (["lint", "in", "--workers", "0", "--timeout", "3"], "--workers 1 or more"),
         (["lint", "in", "--timeout", "-3"], "--timeout: expected 0 or more"),
