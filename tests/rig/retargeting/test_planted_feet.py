@@ -143,14 +143,20 @@ def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
 
 
 def test_a_root_with_a_scale_is_supported() -> None:
-    skeleton = OTHER.skeleton
+    table = dict(
+        zip(OTHER.skeleton.names, zip(parents(OTHER), rest_joints(OTHER), strict=True), strict=True)
+    )
+    for toe in TOES:  # the balls are above the soles
+        table[f"{toe}tip"] = toe, table[toe][1] + [0.0, -4.0, 4.0]
+    large = figure_of(table, "tips")
+    skeleton = large.skeleton
     moved, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
     moved[0] *= 0.01
     scales[0] = 0.01
-    small = replace(skeleton, rest_translations=moved, rest_scales=scales)
-    figure = replace(OTHER, skeleton=small)
-    first, second = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    figure = replace(large, skeleton=replace(skeleton, rest_translations=moved, rest_scales=scales))
+    first, second = places(large, planted(large)[1]), places(figure, planted(figure)[1])
     for name in TOES:
+        assert_allclose(first[name][stands(name[:-8])].min(axis=0)[1], 4.0, atol=EXACT)
         assert_allclose(100.0 * second[name], first[name], atol=1e-9)
 
 

@@ -93,8 +93,8 @@ class DrivenLegs:
 
     def heights(self, worlds: Floats, up: Floats) -> Floats:
         """Return the height of the lowest point of each foot: (N, L)."""
-        scale = float(np.linalg.norm(worlds[0, self.legs[0].ankle, :3, 0]))
-        return self.soles.heights(worlds, np.append(up, 0.0), scale)
+        # The matrices have the scales of the joints, and the soles are in the same unit.
+        return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
     def facing(self, worlds: Floats, up: Floats) -> Floats:
         """Return the cosine of the angle between each sole and the ground: (N, L)."""
