@@ -1,9 +1,11 @@
-"""Reports of batches: lines, cut lines, several writers, and what --resume relies on."""
+"""Reports of batches: complete and incomplete lines, several writers, and keys for --resume."""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from viewer.batching.items import Item, Result
@@ -61,7 +63,7 @@ def test_several_writers_add_whole_lines(tmp_path):
     assert len(read_results(path)) == 40 == path.read_bytes().count(b"\n")
 
 
-def test_values_that_are_no_numbers_in_json_become_text(tmp_path):
+def test_numbers_that_json_cannot_store_become_text(tmp_path):
     with ReportFile(tmp_path / "r.jsonl") as file:
         file.add(Result(ITEM, "done", values={"worst": [1.5, float("nan")]}))
 
@@ -72,7 +74,7 @@ def test_values_that_are_no_numbers_in_json_become_text(tmp_path):
     assert line["values"] == {"worst": [1.5, "nan"]}
 
 
-def test_other_files_are_no_reports(tmp_path):
+def test_other_files_are_refused_as_reports(tmp_path):
     (tmp_path / "a.txt").write_text("1\n2\n")
     with pytest.raises(ViewerError, match="expected the report"):
         read_results(tmp_path / "a.txt")
@@ -126,3 +128,33 @@ def test_key_of_folders_and_archives_depends_on_files_and_names(tmp_path):
     assert len(set(keys)) == 5
     with pytest.raises(OSError):
         item_key(Item(0, (str(tmp_path / "missing"),), "", ""), "")
+
+
+def test_key_of_a_shared_folder_follows_its_files(tmp_path):
+    (tmp_path / "one").write_text("1")
+    (tmp_path / "model").mkdir()
+    (tmp_path / "model" / "a.txt").write_text("old")
+    keys = []
+    for text in ("old", "newer"):  # writing a file does not change the time of its folder
+        (tmp_path / "model" / "a.txt").write_text(text)
+        item = Item(0, (str(tmp_path / "one"),), "", "one")
+        keys.append(item_key(item, "", [str(tmp_path / "model")]))
+    assert keys[0] != keys[1]
+
+
+def test_key_reads_no_devices(tmp_path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "endless").symlink_to("/dev/zero")
+    (tmp_path / "in" / "lost").symlink_to("nowhere")
+    assert item_key(Item(0, (str(tmp_path / "in"),), "", ""), "")
+    with pytest.raises(OSError, match="not a file"):
+        item_key(Item(0, (str(tmp_path / "in" / "endless"),), "", ""), "")
+
+
+def test_arrays_and_other_keys_of_functions_are_written(tmp_path):
+    values = {"size": np.float32(2.5), "ids": np.arange(3)}
+    with ReportFile(tmp_path / "r.jsonl") as file:
+        file.add(Result(ITEM, "done", values=values))
+        file.add(Result(replace(ITEM, name="b"), "done", values={"n": {(1, 2): np.arange(2)}}))
+    found = [one.values for one in read_results(tmp_path / "r.jsonl")]
+    assert found == [{"size": 2.5, "ids": [0, 1, 2]}, {"n": {"(1, 2)": [0, 1]}}]

@@ -1,4 +1,4 @@
-"""Runs of batches: nothing is lost and nothing is done twice, whatever ends them."""
+"""Runs of batches: no item is lost or run twice, however a run ends."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_two_thousand_files_of_which_one_in_twenty_is_broken(tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_workers_that_crash_hang_or_eat_memory_cost_no_other_item(tmp_path, monkeypatch):
+def test_workers_that_crash_hang_or_exhaust_memory_affect_no_other_item(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 100)
     status = {"crash": "crashed", "hang": "timeout", "hog": "memory", "term": "crashed"}
@@ -81,7 +81,7 @@ def test_killed_batch_is_resumed(tmp_path, monkeypatch):
     assert ended.returncode == -signal.SIGKILL
     path = tmp_path / "out" / "report.jsonl"
     assert len(read_results(path)) == 30
-    # The kill may also come while a line is written, or between an output and its line.
+    # The process may also be killed while it writes a line, or between an output and its line.
     path.write_bytes(path.read_bytes()[:-20])
     monkeypatch.chdir(tmp_path)
     report = viewer.batch("in/*.txt", add_numbers, "out", to="sum", workers=0, resume=True)
@@ -91,7 +91,7 @@ def test_killed_batch_is_resumed(tmp_path, monkeypatch):
     assert len(read_results(path)) == 60
 
 
-def test_changed_inputs_and_lost_outputs_are_done_again(tmp_path, monkeypatch):
+def test_changed_inputs_and_lost_outputs_are_processed_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 5)
     viewer.batch("in/*.txt", add_numbers, "out", to="sum")
@@ -99,6 +99,27 @@ def test_changed_inputs_and_lost_outputs_are_done_again(tmp_path, monkeypatch):
     report = viewer.batch("in/*.txt", add_numbers, "out", to="sum", resume=True)
     assert {one.item.name for one in report.results if one.status == "done"} == {"pose1.txt"}
     assert (tmp_path / "out" / "pose1.sum").read_text() == "6"
+
+
+def test_functions_return_numbers_and_their_outputs_are_kept_track_of(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_numbers(tmp_path / "in" / "deep", 1)
+    (tmp_path / "in" / "top.txt").write_text("1")
+
+    def count(item: Item) -> int:
+        Path(item.output).write_text("3")
+        return 120  # a value, not an exit code
+
+    call = {"job": count, "out": "out", "to": "sum", "workers": 0}
+    report = viewer.batch(["in/deep/pose0.txt", "in/top.txt"], **call)
+    assert [one.values for one in report.results] == [{"value": 120}] * 2
+    assert {one.outputs for one in report.results} == {("out/deep/pose0.sum",), ("out/top.sum",)}
+    Path("out/top.sum").unlink()
+    report = viewer.batch(["in/deep/pose0.txt", "in/top.txt"], **call, resume=True)
+    assert {one.item.name: one.status for one in report.results} == {
+        "deep/pose0.txt": "unchanged",
+        "top.txt": "done",
+    }
 
 
 def test_report_is_not_replaced_by_mistake(tmp_path, monkeypatch):
@@ -111,7 +132,7 @@ def test_report_is_not_replaced_by_mistake(tmp_path, monkeypatch):
     assert len((tmp_path / "r.jsonl").read_text().splitlines()) == 3
 
 
-def test_shards_are_the_whole_and_share_a_report(tmp_path, monkeypatch):
+def test_shards_cover_all_items_and_share_a_report(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 10)
     for shard in ("0/3", "1/3", "2/3"):
@@ -128,39 +149,41 @@ def test_wrong_shards_are_refused(text):
         shard_of([], text)
 
 
-def struck(at: str, times: int = 1) -> FunctionJob:
-    """Return a job that signals its process in one item."""
+def struck(ctrl_c, at: str, times: int = 1) -> FunctionJob:
+    """Return a job that interrupts its own process during one item."""
 
     def strike(item: Item) -> None:
         for _ in range(times * (item.name == at)):
-            signal.raise_signal(signal.SIGINT)
+            ctrl_c()
 
     return FunctionJob(strike)
 
 
-def test_first_signal_finishes_the_running_item(tmp_path):
+def test_first_signal_finishes_the_running_item(tmp_path, ctrl_c):
     settings = Settings(report=tmp_path / "r.jsonl")
-    report = run_batch(items_called(*"abcd"), struck("b"), settings)
+    report = run_batch(items_called(*"abcd"), struck(ctrl_c, "b"), settings)
     assert [one.item.name for one in report.results] == ["a", "b"]
     assert all(one.status == "done" for one in report.results)
     assert report.signal == signal.SIGINT and not report.is_complete
     assert len(read_results(tmp_path / "r.jsonl")) == 2
 
 
-def test_second_signal_cancels_the_running_item(tmp_path, monkeypatch):
+def test_second_signal_cancels_the_running_item(tmp_path, monkeypatch, ctrl_c):
     monkeypatch.setattr(interrupts, "_SAME", -1.0)  # signals this close count as separate ones
     settings = Settings(report=tmp_path / "r.jsonl")
     with pytest.raises(interrupts.Interrupted):
-        run_batch(items_called(*"abcd"), struck("b", 2), settings)
+        run_batch(items_called(*"abcd"), struck(ctrl_c, "b", 2), settings)
     assert [one.item.name for one in read_results(tmp_path / "r.jsonl")] == ["a"]
 
 
-def test_python_callers_get_their_own_interrupt_when_running_items_are_done(tmp_path, monkeypatch):
+def test_python_callers_get_their_own_interrupt_when_running_items_are_done(
+    tmp_path, monkeypatch, ctrl_c
+):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 3)
     found: list[Result] = []
     with pytest.raises(KeyboardInterrupt):
-        viewer.batch("in/*.txt", struck("pose1.txt").function, on_result=found.append)
+        viewer.batch("in/*.txt", struck(ctrl_c, "pose1.txt").function, on_result=found.append)
     assert [one.item.name for one in found] == ["pose0.txt", "pose1.txt"]
 
 

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import time
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from viewer.batching.items import Item, Result
@@ -32,13 +34,27 @@ class FunctionJob:
     function : callable
         Called with an ``Item``; must be importable by its name if items run in other processes. A
         dict that it returns is the ``values`` of the result, anything else ``values["value"]``.
+        The folder of the item's output exists; an output that it writes is one of the result.
     """
 
     function: Callable[[Item], Any]
 
     def __call__(self, item: Item) -> Result:
         """Run one item in this process."""
-        return attempt(item, self.function)
+        result = attempt(item, self._values)
+        is_written = result.status == "done" and item.output and os.path.lexists(item.output)
+        if is_written and item.output not in result.outputs:
+            # Recorded so that the item is run again if the output is lost.
+            result = replace(result, outputs=(*result.outputs, item.output))
+        return result
+
+    def _values(self, item: Item) -> dict[str, Any]:
+        if item.output:
+            Path(item.output).parent.mkdir(parents=True, exist_ok=True)
+        returned = self.function(item)
+        if isinstance(returned, dict):
+            return {str(name): value for name, value in returned.items()}
+        return {} if returned is None else {"value": returned}
 
 
 def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
@@ -50,7 +66,7 @@ def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
         The item.
     call : callable
         Called with the item. An int that it returns is the exit code, where 0 and 1 stand for
-        success; a dict is the values of the result.
+        success; a dict is the values of the result; anything else is ignored.
 
     Returns
     -------
@@ -98,8 +114,6 @@ def _outcome(item: Item, call: Callable[[Item], Any], record: Record) -> Result:
         # triggered by one file must not discard the results of all others.
         reason = printable(f"{type(problem).__name__}: {problem}", _LONGEST)
         return Result(item, "failed", _DEFECT, message=reason, text="".join(traceback.format_exc()))
-    if isinstance(returned, int) and not isinstance(returned, bool):
+    if isinstance(returned, int):
         return Result(item, "done" if returned in (0, 1) else "failed", returned)
-    if isinstance(returned, dict):
-        return Result(item, "done", values=returned)
-    return Result(item, "done", values={} if returned is None else {"value": returned})
+    return Result(item, "done", values=returned if isinstance(returned, dict) else {})

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
+import re
 import unicodedata
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from string import Formatter
 
@@ -14,7 +15,7 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["FIELDS", "check_outputs", "items_of", "output_folder", "template_of"]
+__all__ = ["FIELDS", "check_outputs", "check_summaries", "items_of", "output_folder", "template_of"]
 
 FIELDS = {
     "parent": "the input's folder, relative to the folder that all inputs share",
@@ -26,6 +27,7 @@ FIELDS = {
 }
 """Fields of templates."""
 
+_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of numbers
 _LEFT = ("frame",)  # fields of the commands, for numbered images and meshes
 _LONGEST = 300  # characters of a name in a message
 
@@ -75,13 +77,13 @@ def _fields(template: str) -> list[str]:
     """Return the fields of a template; raise ViewerError for unknown ones."""
     try:
         found = [
-            (name, spec or "")
-            for _, name, spec, _ in Formatter().parse(template)
+            (name, spec or "", conversion)
+            for _, name, spec, conversion in Formatter().parse(template)
             if name is not None
         ]
     except ValueError as problem:
         raise ViewerError(f"-o {printable(template, _LONGEST)}: {problem}") from None
-    for name, spec in found:
+    for name, spec, conversion in found:
         if name not in (*FIELDS, *_LEFT):
             near = did_you_mean(name, FIELDS) or f"there are {', '.join(FIELDS)}"
             raise ViewerError(f"-o: no field is called {{{printable(name, 40)}}}; {near}")
@@ -89,7 +91,11 @@ def _fields(template: str) -> list[str]:
             raise ViewerError(
                 f"-o: expected {{{name}}} without a format, found {printable(spec, 40)}"
             )
-    return [name for name, _ in found]
+        if conversion or (name == "index" and not _NUMBER.fullmatch(spec)):
+            form = f"!{conversion}" if conversion else f":{spec}"
+            wanted = "{index} or {index:05}" if name == "index" else f"{{{name}}}"
+            raise ViewerError(f"-o: expected {wanted}, found {{{name}{printable(form, 40)}}}")
+    return [name for name, _, _ in found]
 
 
 def items_of(inputs: Inputs, template: str = "") -> list[Item]:
@@ -186,6 +192,51 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     if replaced:
         verb = "is an input" if len(replaced) == 1 else "are inputs"
         raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
+
+
+def check_summaries(
+    files: Mapping[str, str], items: Sequence[Item], more_inputs: Iterable[str] = ()
+) -> None:
+    """Check that files about the whole batch are neither inputs, outputs nor each other.
+
+    Parameters
+    ----------
+    files : dict of str
+        The file of each option, such as ``--table``; empty for none.
+    items : sequence of Item
+        All items, also those of other shards.
+    more_inputs : iterable of str
+        Files that all items read.
+
+    Raises
+    ------
+    ViewerError
+        The message names the option.
+    """
+    real, here = _RealPaths(), os.getcwd()
+    given = {option: path for option, path in files.items() if path}
+    if not given:
+        return
+    # Resolving a million paths takes seconds, so only those of the same name are.
+    last = {os.path.basename(path).casefold() for path in given.values()}
+
+    def is_near(path: str) -> bool:
+        return os.path.basename(path).casefold() in last
+
+    read = (file for item in items for file in item.files)
+    inputs = {real.of(file) for file in filter(is_near, (*read, *more_inputs))}
+    owners = {
+        _identity(here, item.output): f"the output of {item.name}"
+        for item in items
+        if is_near(item.output)
+    }
+    for option, path in given.items():
+        found = "an input" if real.of(path) in inputs else owners.get(_identity(here, path))
+        if found is not None:
+            raise ViewerError(
+                f"{option}: {_shown(path)}: expected a file of its own, found {_shown(found)}"
+            )
+        owners[_identity(here, path)] = f"the file of {option}"
 
 
 def _identity(folder: str, path: str) -> str:

@@ -163,10 +163,15 @@ def _line(result: Result) -> str:
     found = item | {name: getattr(result, name) for name in _NAMES}
     found["seconds"] = round(result.seconds, 6)
     try:
-        return json.dumps(found, default=str, separators=(",", ":"), allow_nan=False)
-    except ValueError:  # JSON has no infinite numbers, and no NaN
+        return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)
+    except (ValueError, TypeError):  # JSON has no infinite numbers, no NaN, and only texts as keys
         found["values"] = plain(result.values)
         return json.dumps(found, default=str, separators=(",", ":"))
+
+
+def _data(value: object) -> object:
+    """Return a value of a function, such as an array, as JSON data."""
+    return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def read_results(path: Path) -> list[Result]:

@@ -1,4 +1,4 @@
-"""Overviews: what they show first, and pages that run no text of other people."""
+"""Overviews: order of their content, and pages that never execute untrusted text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVIL = "<script>alert(1)</script>\" onload='x'"
 
 
 class Page(HTMLParser):
-    """The elements of a page, and its rows as texts."""
+    """Elements of a page, and its rows as text."""
 
     def __init__(self, path) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ def test_page_of_lint_lists_codes_and_the_worst_items_first(tmp_path) -> None:
     assert page.row("broken.glb")[3] == "broken.glb:1: expected <b>"
 
 
-def test_pages_need_no_other_file_and_run_nothing(tmp_path) -> None:
+def test_pages_are_self_contained_and_execute_nothing(tmp_path) -> None:
     results = [linted(0, EVIL, "W001"), replace(linted(1, "a"), status="failed", message=EVIL)]
     path = tmp_path / "o.html"
     save_overview(path, "lint", results)
@@ -142,6 +142,12 @@ def test_page_of_render_contains_small_pictures(tmp_path) -> None:
     save_overview(tmp_path / "o.html", "render", [drawn(tmp_path, 0, (200, 0, 0))])
     sources = [one["src"] for tag, one in Page(tmp_path / "o.html").tags if tag == "img"]
     assert len(sources) == 1 and sources[0].startswith("data:image/jpeg;base64,")
+
+
+def test_sheet_of_failures_alone_is_drawn(tmp_path) -> None:
+    failed = Result(Item(0, (), "", "a"), "failed", 2, message="no mesh")
+    (line,) = save_overview(tmp_path / "o.png", "render", [failed])
+    assert line.endswith("o.png: 1 item, 1 of them failed") and (tmp_path / "o.png").exists()
 
 
 def test_other_files_and_batches_without_pictures_are_refused(tmp_path) -> None:

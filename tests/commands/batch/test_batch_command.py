@@ -1,17 +1,18 @@
-"""``viewer batch``: items as the command's own runs, exit codes, and refusals before the start."""
+"""``viewer batch``: results equal to single runs, exit codes, and early refusals."""
 
 from __future__ import annotations
 
 import json
-import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 from app.tiny import SKEL, skin_text, write_rig
 
+import viewer
 from viewer.batching.report import read_results
 from viewer.cli import run
+from viewer.errors import ViewerError
 
 BROKEN = "balljoint root {\noffset 0 zero 0\n}"
 
@@ -51,12 +52,16 @@ def test_items_are_written_as_the_command_writes_them(rigs, capsys):
 
 def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
-    rows = "".join(f"v {n}.25 {n}.5 1\n" for n in range(4000)) + "f 1 2 3\n"
+    points = " ".join(f"{n}.25 {n}.5 1" for n in range(4000))
+    normals, weights = "0 0 1 " * 4000, "1 0 1 " * 4000
+    bind = "bindings 1 { matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } }"
+    sections = f"positions 4000 {{ {points} }} normals 4000 {{ {normals} }} "
+    sections += f"skinweights 4000 {{ {weights} }} triangles 1 {{ 0 1 2 }} {bind}"
     for name in "ab":
-        (tmp_path / f"{name}.obj").write_text(rows)
-    assert run(["batch", "info", str(tmp_path / "*.obj")]) == 0
+        (tmp_path / f"{name}.skin").write_text(sections)
+    assert run(["batch", "info", str(tmp_path / "*.skin")]) == 0
     assert not (tmp_path / "cache").exists()
-    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert run(["info", str(tmp_path / "a.skin")]) == 0
     assert (tmp_path / "cache").exists()
 
 
@@ -79,7 +84,7 @@ def test_resume_runs_only_what_is_not_done(rigs, capsys):
     assert run([*command, "--report", "r.jsonl", "--resume"]) == 0
     assert "1 done, 2 unchanged" in capsys.readouterr().out
     assert Path("a-one.obj").stat().st_mtime_ns == written and Path("b-bad.obj").exists()
-    # Other options give other results, as do other shared files.
+    # Other options or shared files give other results.
     assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
     assert "3 done" in capsys.readouterr().out
     Path("tiny.skin").write_text(skin_text() + "\n")
@@ -138,12 +143,27 @@ def test_pictures_are_drawn_by_workers(rigs):
         assert picture.size == (32, 24)
 
 
-def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
+def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch, ctrl_c):
     from viewer.commands import info
 
-    monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
+    monkeypatch.setattr(info, "run", lambda arguments: ctrl_c() or 0)
     assert run(["batch", "info", "in"]) == 130
-    assert "2 items left" in capsys.readouterr().out
+    assert "2 items left; only batches with --report" in capsys.readouterr().out
+
+
+def test_shards_write_their_own_tables(rigs):
+    for shard in ("0/2", "1/2"):
+        run(["batch", "lint", "in", "--shard", shard, "--table", "t.csv"])
+    rows = [len(Path(f"t.{n}-of-2.csv").read_text().splitlines()) for n in range(2)]
+    assert rows == [3, 2] and not Path("t.csv").exists()
+
+
+@pytest.mark.parametrize(
+    "options", [["--shard", "0/2"], ["--report", "r.jsonl"], ["--force"], ["stray"], "--json"]
+)
+def test_python_refuses_options_without_effect(rigs, options):
+    with pytest.raises(ViewerError, match="options: expected"):
+        viewer.batch("in", "info", options=options)
 
 
 @pytest.mark.parametrize(
@@ -161,6 +181,9 @@ def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
         (["lint", "in", "--resume"], "--report FILE"),
+        (["info", "in", "--report", "in/a/one.skel", "--force"], "--report: in/a/one.skel: exp"),
+        (["render", "in", "-o", "out", "--overview", "out/a/one.png"], "the output of a/one.skel"),
+        (["lint", "in", "--table", "t.csv", "--report", "t.csv"], "the file of --report"),
         (["lint", "in", "--workers", "-1"], "expected a number"),
         (["lint", "in", "--workers", "0", "--timeout", "3"], "--workers 1 or more"),
         (["lint", "in", "--timeout", "-3"], "--timeout: expected 0 or more"),

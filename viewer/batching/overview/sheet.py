@@ -27,7 +27,7 @@ def save_sheets(path: Path, results: Sequence[Result]) -> list[str]:
     """Write one sheet or several: ``sheet.png``, ``sheet-2.png``; see ``save_overview``."""
     rows = ordered(results)
     shown = rows[: PER_SHEET * _MOST_SHEETS]
-    if not any(result.outputs for result in shown):
+    if not any(result.outputs or result.status not in _FINISHED for result in shown):
         raise ViewerError(
             f"--overview: {printable(path, 300)}: no picture was written; name a page such as "
             f"{printable(path.stem, 100)}.html for a table of the items"

@@ -6,22 +6,22 @@ import os
 import signal
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from hashlib import blake2b
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.attempts import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
+from viewer.commands._batch.functions import identity_of
 from viewer.commands._batch.jobs import JOBS, job_parser
 from viewer.commands._batch.options import RETRIES
 from viewer.commands._batch.planning import Plan, Request, plan_of
 from viewer.commands._batch.requests import request_of
-from viewer.commands._batch.results import check_results, save_results
+from viewer.commands._batch.results import check_results, name_in_shard, save_results
+from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
-from viewer.version import VERSION
 
 if TYPE_CHECKING:
     from viewer.batching.engines import Job
@@ -156,16 +156,12 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
 def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Request]:
     """Return a function as a job, and the request with its identity."""
     may_replace = request.force or request.resume
+    table, overview = (
+        name_in_shard(path, request.shard) for path in (request.table, request.overview)
+    )
+    request = replace(request, table=table, overview=overview)
     check_results("function", request.table, request.overview, may_replace, request.output)
-    return FunctionJob(job), replace(request, identity=_identity(job))
-
-
-def _identity(function: Callable[[Item], Any]) -> str:
-    """Return a function's name and a hash of its code."""
-    code = getattr(function, "__code__", None)
-    body = b"" if code is None else code.co_code + repr(code.co_consts).encode()
-    name = getattr(function, "__qualname__", type(function).__qualname__)
-    return f"{function.__module__}.{name} {blake2b(body, digest_size=8).hexdigest()} {VERSION}"
+    return FunctionJob(job), replace(request, identity=identity_of(job))
 
 
 def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, Request]:
@@ -174,11 +170,13 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
         near = did_you_mean(job, JOBS) or f"there are {', '.join(JOBS)}"
         raise ViewerError(f'no job is called "{printable(job, 60)}"; {near}')
     parser = job_parser(job)
+    _check_options(parser, job, options)
     words = [job, *options]
     words += [word for file in request.shared for word in ("--with", file)]
     words += ["--output", request.output] if request.output else []
     words += ["--table", request.table] if request.table else []
     words += ["--overview", request.overview] if request.overview else []
+    words += ["--shard", request.shard] if request.shard else []
     words += ["--resume"] * request.resume + ["--force"] * request.force
     parser.check_options(words)
     arguments = parser.parse_intermixed_args(words)
@@ -194,3 +192,24 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
         )
     }
     return command, replace(request, **added)
+
+
+_OWN = (
+    *("files", "output", "force", "report", "resume", "shard", "workers", "cluster", "retries"),
+    *("timeout", "limit_memory", "from_list", "table", "overview"),
+)
+"""Arguments that are parameters of ``batch``; in ``options``, they would have no effect."""
+
+
+def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:
+    """Raise ViewerError if options contain an argument for which ``batch`` has a parameter."""
+    if isinstance(options, str):
+        raise ViewerError(f"options: expected a list of strings, found {printable(options)}")
+    parser.check_options([job, *options])
+    given = vars(parser.parse_intermixed_args([job, *options]))
+    for name in _OWN:
+        if name in given and given[name] != parser.get_default(name) and given[name] != []:
+            raise ViewerError(
+                f"options: expected options of {job}, found {printable(given[name], 100)}; "
+                f"viewer.batch has a parameter for it"
+            )

@@ -108,7 +108,8 @@ def summary_lines(report: Report) -> list[str]:
             lines.append(f"and {len(failures) - _MOST} more")
     left = report.n_items - len(report.results)
     if left:
-        lines.append(f"interrupted: {counted(left, 'item')} left; --resume continues")
+        how = "--resume continues" if report.path else "only batches with --report can be resumed"
+        lines.append(f"interrupted: {counted(left, 'item')} left; {how}")
     if report.path is not None:
         lines.append(f"report: {printable(report.path, 300)}")
     return lines

@@ -13,7 +13,13 @@ from viewer.batching.engines import Limits
 from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.inputs import find_inputs
 from viewer.batching.items import Item
-from viewer.batching.naming import check_outputs, items_of, output_folder, template_of
+from viewer.batching.naming import (
+    check_outputs,
+    check_summaries,
+    items_of,
+    output_folder,
+    template_of,
+)
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
 from viewer.errors import OutputError, ViewerError
@@ -85,9 +91,11 @@ def plan_of(request: Request) -> Plan:
     template = template_of(request.output, request.to) if request.output else ""
     items = items_of(inputs, template)
     check_outputs(items, request.shared)
+    report = _report_of(request)
+    names = {"--table": request.table, "--overview": request.overview}
+    check_summaries({"--report": str(report or ""), **names}, items, request.shared)
     if request.shard:
         items = shard_of(items, request.shard)
-    report = _report_of(request)
     if request.resume and report is None:
         raise ViewerError("--resume: expected --report FILE, or a folder for the outputs")
     if not (request.force or request.resume):

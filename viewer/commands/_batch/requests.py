@@ -11,7 +11,7 @@ from viewer.batching.engines import Job
 from viewer.batching.submissions import find_submissions
 from viewer.commands._batch.jobs import JOBS, CommandJob, add_job_arguments
 from viewer.commands._batch.planning import Request
-from viewer.commands._batch.results import check_results
+from viewer.commands._batch.results import check_results, name_in_shard
 from viewer.commands._batch.submitted import submission_job
 from viewer.commands._diff.inputs import input_files
 from viewer.commands._scene import parse_bytes
@@ -68,8 +68,8 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         memory=memory,
         report=arguments.report or "",
         notes=notes,
-        table=arguments.table,
-        overview=getattr(arguments, "overview", ""),
+        table=name_in_shard(arguments.table, arguments.shard),
+        overview=name_in_shard(getattr(arguments, "overview", ""), arguments.shard),
     )
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)

@@ -13,7 +13,7 @@ from viewer.batching.tables import save_table
 from viewer.errors import OutputError, UnsupportedFormatError, ViewerError
 from viewer.phrases import counted, printable
 
-__all__ = ["add_result_arguments", "check_results", "save_results"]
+__all__ = ["add_result_arguments", "check_results", "name_in_shard", "save_results"]
 
 _OVERVIEWS = {"render": "sheet.png", "lint": "page.html", "diff": "page.html"}
 _DRAWN = ("render", "diff")
@@ -26,7 +26,12 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
     ``job``: its name.
     """
     group = parser.add_argument_group("results")
-    group.add_argument("--table", default="", metavar="FILE.csv", help="write one row per input")
+    group.add_argument(
+        "--table",
+        default="",
+        metavar="FILE.csv",
+        help="write one row per input (with --shard 0/8: FILE.0-of-8.csv)",
+    )
     if job in _OVERVIEWS:
         kinds = "a page (.html) of all inputs"
         if job in _DRAWN:
@@ -67,6 +72,11 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
             raise ViewerError(
                 f'--overview: {job} draws nothing: expected .html, found "{Path(overview).suffix}"'
             )
+        if not output and Path(overview).suffix.lower() not in PAGES:
+            raise ViewerError(
+                f"--overview: {printable(overview, 300)}: expected -o OUT for the images of the "
+                "sheet, or a page (.html), found neither"
+            )
     for path in filter(None, (table, overview)):
         if not may_replace and os.path.lexists(path):
             raise OutputError(f"{printable(path, 300)}: already exists (--force replaces it)")
@@ -75,6 +85,20 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
         if not (parent.is_dir() or is_made):
             folder = printable(Path(path).parent, 300)
             raise OutputError(f"{printable(path, 300)}: the folder {folder} does not exist")
+
+
+def name_in_shard(path: str, shard: str) -> str:
+    """Return the name of one shard's file, so that shards do not replace each other's files.
+
+    ``shard``: ``I/N``; empty for the whole batch.
+
+    >>> name_in_shard("a/grades.csv", "0/8"), name_in_shard("grades.csv", "")
+    ('a/grades.0-of-8.csv', 'grades.csv')
+    """
+    if not (path and shard):
+        return path
+    root, suffix = os.path.splitext(path)
+    return f"{root}.{shard.replace('/', '-of-')}{suffix}"
 
 
 def save_results(job: str, table: str, overview: str, results: Sequence[Result]) -> list[str]:
