@@ -248,6 +248,18 @@ def test_legs_that_cannot_be_solved_are_left_alone() -> None:
         assert changes is None and clip is found.clip
 
 
+def test_legs_that_are_folded_at_rest_have_finite_rotations() -> None:
+    skeleton, points = OTHER.skeleton, OTHER.skeleton.rest_translations.copy()
+    thighs, shins = (
+        [skeleton.names.index(f"{side}{part}_") for side in SIDES] for part in ("Leg", "Foot")
+    )
+    points[shins] = -points[thighs]
+    folded = replace(OTHER, skeleton=replace(skeleton, rest_translations=points))
+    with np.errstate(divide="raise", invalid="raise"):
+        _, clip, changes = planted(folded)
+    assert changes is not None and np.isfinite(clip.rotations).all()
+
+
 def test_somebody_who_lies_does_not_stand() -> None:
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     rotations[:] = axis_rotations(0, np.asarray(-np.pi / 2))

@@ -27,6 +27,7 @@ __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "s
 
 _ALIKE = 1e-4  # relative to the body
 _UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
+_FOLDED = 1e-3  # extension of a leg at rest
 _STEEP = 0.9  # sine of the steepest foot of a standing person
 
 
@@ -103,8 +104,12 @@ class DrivenLegs:
         return normals @ up / np.linalg.norm(normals, axis=2)
 
     def straightness(self, worlds: Floats) -> Floats:
-        """Return the distance from hip to ankle relative to that in the rest pose: (N, L)."""
-        return _extensions(worlds, self.legs) / self.extensions
+        """Return the distance from hip to ankle relative to that in the rest pose: (N, L).
+
+        Legs that are folded at rest are compared with straight ones.
+        """
+        usual = np.where(self.extensions > _FOLDED, self.extensions, 1.0)
+        return _extensions(worlds, self.legs) / usual
 
     def feet_from_ankles(self, worlds: Floats) -> list[tuple[Floats, Floats]]:
         """Return the vectors from the ankles to the balls and the heels: (N, 3) each."""
