@@ -6,7 +6,7 @@ import sys
 
 def main() -> int:
     """Run the command line and return its exit code."""
-    # Searching for garbage while modules are imported finds none; ``run`` resumes it.
+    # Garbage collection during imports would find nothing; ``run`` resumes it.
     gc.disable()
     try:
         from viewer.interrupts import watch_program

@@ -115,7 +115,7 @@ def _dispatch(arguments: list[str]) -> int:
 
 
 def _resume_collection() -> None:
-    """Collect garbage from now on, if starting the program suspended it; modules are left out."""
+    """Resume garbage collection, if it was suspended at start-up; imported modules are excluded."""
     if not gc.isenabled():
         gc.freeze()
         gc.enable()

@@ -16,8 +16,8 @@ while pure Python or numpy code runs::
 A signal after the last ``poll`` is too late: the work is done, and the result is success. A second
 signal, a second or more after the first, ends a program that does not respond.
 
-Work that consists of many items asks the user twice: within ``postponed``, the first signal only
-sets a flag, so that the items that run are finished, and the second one raises as described.
+Work on many items can end gracefully: within ``postponed``, the first signal only sets a flag, so
+that the running items are finished, and the second one raises as described.
 """
 
 from __future__ import annotations

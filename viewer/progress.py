@@ -1,4 +1,4 @@
-"""Progress of long work, from the functions that do it to whoever waits for it."""
+"""Progress reports from functions that take long to receivers such as a progress bar."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ _receiver: ContextVar[Receiver | None] = ContextVar("receiver of progress", defa
 
 
 class Cancelled(Exception):  # noqa: N818 - it is no error
-    """Ends the work in which it is raised; files that are being written are removed."""
+    """Cancels the work in which it is raised; incomplete files are removed."""
 
 
 @contextmanager
 def receiving(receive: Receiver) -> Iterator[None]:
-    """Pass the progress of all work in the block, in this thread, to a function."""
+    """Pass progress reported in the block, in this thread, to a function."""
     token = _receiver.set(receive)
     try:
         yield
@@ -34,7 +34,7 @@ def receiving(receive: Receiver) -> Iterator[None]:
 def report(done: int, total: int, unit: str, what: str = "") -> None:
     """Report progress to the receiver, if there is one.
 
-    Called between parts of the work that take a few milliseconds.
+    To be called between parts of the work that take a few milliseconds.
     """
     receive = _receiver.get()
     if receive is not None:

@@ -53,7 +53,7 @@ def _message(hand):
 
 def _dialog(hand):
     dialog = FileDialog(hand.state.paths[0].parent)
-    # Before the field of the path has the focus, which keeps its text.
+    # Before the path field gets the focus, because a focused field keeps its text.
     dialog.folder = Path("/figures")
     hand.state.of(Files).dialog = dialog
 

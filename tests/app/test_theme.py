@@ -1,4 +1,4 @@
-"""Fonts and colours of the interface: letters of further scripts, contrast of text."""
+"""Fonts and colours of the interface: additional scripts, contrast of text."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_fonts_of_the_system_complete_the_font_of_the_panels(hand, monkeypatch):
     n_fonts, n_sources = len(fonts), len(fonts[0].sources)
     theme.add_system_fonts()
     hand.step(2)
-    # Merged into the same font, so that all text uses it.
+    # Merged into the same font, so that all text can use it.
     assert (len(fonts), len(fonts[0].sources)) == (n_fonts, n_sources + 1)
 
 

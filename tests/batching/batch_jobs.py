@@ -1,4 +1,4 @@
-"""Jobs that worker processes import, and that misbehave as their item's name says."""
+"""Jobs for worker processes, which import them; the item's name selects how they misbehave."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from viewer.errors import ViewerError
 
 
 def misbehave(item: Item) -> dict[str, int]:
-    """Return the process; crash, hang, allocate 1 GB or raise where the item says so."""
+    """Return the process ID, or crash, hang, allocate 1 GB or raise, as the item's name says."""
     if item.name == "crash.txt":
         os._exit(3)
     if item.name == "term.txt":
-        os.kill(os.getpid(), signal.SIGTERM)  # as batch systems do at the end of a job's time
+        os.kill(os.getpid(), signal.SIGTERM)  # as batch systems do at the time limit of a job
     if item.name in ("hang.txt", "term.txt"):
         time.sleep(100)
     if item.name == "hog.txt":

@@ -1,4 +1,4 @@
-"""Engines: every item has one result, whatever it does to its worker."""
+"""Engines: every item gets exactly one result, whatever it does to its worker."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ JOB = FunctionJob(misbehave)
 
 
 @pytest.mark.parametrize("name", ENGINES)
-def test_engines_can_run(name):
+def test_engines_can_be_loaded(name):
     assert callable(load_engine(name).run)
 
 

@@ -1,4 +1,4 @@
-"""Inputs of a batch: what is found, in which order, and what is refused."""
+"""Inputs of a batch: search, order, and refused arguments."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_pattern_finds_files_in_all_folders(data):
     )
 
 
-def test_structure_does_not_depend_on_what_a_pattern_matches(data):
+def test_common_folder_does_not_depend_on_what_a_pattern_matches(data):
     assert find_inputs(["data/**/*9.npz"]).base == str(data)
     assert find_inputs(["data/b/walk9.npz"]).base == str(data / "b")
     assert find_inputs(["data/b/walk9.npz", "data/a.bvh"]).base == str(data)
@@ -59,10 +59,10 @@ def test_duplicates_are_used_once_and_counted(data):
     found = find_inputs(["data/a.bvh", "./data/a.bvh", "data/b/walk*.npz", "data/**/*.npz"])
     assert found.paths == ("data/a.bvh", "data/b/walk9.npz", "data/b/walk10.npz")
     assert len(found.notes) == 1
-    assert find_inputs(["data"]).paths[0] == "data/a.bvh"  # ends, despite the loop
+    assert find_inputs(["data"]).paths[0] == "data/a.bvh"  # the search ends despite the loop
 
 
-def test_outputs_of_an_earlier_run_are_no_inputs(data):
+def test_outputs_of_an_earlier_run_are_not_inputs(data):
     (data / "out" / "b").mkdir(parents=True)
     (data / "out" / "b" / "walk9.bvh").touch()
     for words in (["data"], ["data/**/*.bvh"]):
@@ -73,7 +73,7 @@ def test_outputs_of_an_earlier_run_are_no_inputs(data):
     assert "data/out/b/walk9.bvh" in find_inputs(["data"], output="data/ou").paths
 
 
-def test_names_that_exist_are_no_patterns(data):
+def test_names_that_exist_are_not_patterns(data):
     (data / "walk[1].bvh").touch()
     (data / "@x").touch()
     assert find_inputs(["data/walk[1].bvh"]).paths == ("data/walk[1].bvh",)

@@ -1,4 +1,4 @@
-"""Output names of a batch, and what is refused before anything starts."""
+"""Output names of a batch, and errors found before anything starts."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def outputs(output: str, suffix: str = "", inputs: Inputs = INPUTS) -> list[str]
     return [item.output for item in items_of(inputs, template_of(output, suffix))]
 
 
-def test_folder_repeats_the_folders_of_the_inputs():
+def test_output_folder_mirrors_the_folders_of_the_inputs():
     assert outputs("out", ".bvh") == ["out/a/x.bvh", "out/b/x.v2.bvh", "out/take.1.bvh"]
     assert outputs("out/", "folder") == ["out/a/x", "out/b/x.v2", "out/take.1"]
 
@@ -28,7 +28,7 @@ def test_fields_of_templates():
     names = ["out/a/0000-x.npz.png", "out/b/0001-x.v2.npz.png", "out/0002-take.1.png"]
     assert outputs("out/{parent}/{index:04}-{name}.png") == names
     assert outputs("{folder}/{stem}-{suffix}.bvh")[:2] == ["d/a/x-npz.bvh", "d/b/x.v2-npz.bvh"]
-    # Numbered images and meshes keep the field of the command.
+    # Numbered images and meshes keep the command's field.
     assert outputs("o/{stem}_{frame:05}.obj")[0] == "o/x_{frame:05}.obj"
 
 
@@ -56,7 +56,7 @@ def test_wrong_templates_are_refused(output, suffix, part):
 
 
 @pytest.mark.parametrize("names", [("x/A.npz", "y/a.npz"), ("x/Ä.npz", "y/a\u0308.npz")])
-def test_outputs_that_differ_in_case_or_composition_only_clash(names):
+def test_outputs_that_differ_only_in_case_or_composition_clash(names):
     items = items_of(Inputs(names, str(Path.cwd())), "out/{stem}.bvh")
     with pytest.raises(ViewerError) as problem:
         check_outputs(items)

@@ -1,4 +1,4 @@
-"""Reports of batches: lines, cut lines, several writers, and what --resume relies on."""
+"""Reports of batches: complete and incomplete lines, several writers, and keys for --resume."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_several_writers_add_whole_lines(tmp_path):
     assert len(read_results(path)) == 40 == path.read_bytes().count(b"\n")
 
 
-def test_values_that_are_no_numbers_in_json_become_text(tmp_path):
+def test_numbers_that_json_cannot_store_become_text(tmp_path):
     with ReportFile(tmp_path / "r.jsonl") as file:
         file.add(Result(ITEM, "done", values={"worst": [1.5, float("nan")]}))
 
@@ -74,7 +74,7 @@ def test_values_that_are_no_numbers_in_json_become_text(tmp_path):
     assert line["values"] == {"worst": [1.5, "nan"]}
 
 
-def test_other_files_are_no_reports(tmp_path):
+def test_other_files_are_refused_as_reports(tmp_path):
     (tmp_path / "a.txt").write_text("1\n2\n")
     with pytest.raises(ViewerError, match="expected the report"):
         read_results(tmp_path / "a.txt")

@@ -1,4 +1,4 @@
-"""Runs of batches: nothing is lost and nothing is done twice, whatever ends them."""
+"""Runs of batches: no item is lost or run twice, however a run ends."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_two_thousand_files_of_which_one_in_twenty_is_broken(tmp_path, monkeypat
 
 
 @pytest.mark.slow
-def test_workers_that_crash_hang_or_eat_memory_cost_no_other_item(tmp_path, monkeypatch):
+def test_workers_that_crash_hang_or_exhaust_memory_affect_no_other_item(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 100)
     status = {"crash": "crashed", "hang": "timeout", "hog": "memory", "term": "crashed"}
@@ -81,7 +81,7 @@ def test_killed_batch_is_resumed(tmp_path, monkeypatch):
     assert ended.returncode == -signal.SIGKILL
     path = tmp_path / "out" / "report.jsonl"
     assert len(read_results(path)) == 30
-    # The kill may also come while a line is written, or between an output and its line.
+    # The process may also be killed while it writes a line, or between an output and its line.
     path.write_bytes(path.read_bytes()[:-20])
     monkeypatch.chdir(tmp_path)
     report = viewer.batch("in/*.txt", add_numbers, "out", to="sum", workers=0, resume=True)
@@ -91,7 +91,7 @@ def test_killed_batch_is_resumed(tmp_path, monkeypatch):
     assert len(read_results(path)) == 60
 
 
-def test_changed_inputs_and_lost_outputs_are_done_again(tmp_path, monkeypatch):
+def test_changed_inputs_and_lost_outputs_are_processed_again(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 5)
     viewer.batch("in/*.txt", add_numbers, "out", to="sum")
@@ -132,7 +132,7 @@ def test_report_is_not_replaced_by_mistake(tmp_path, monkeypatch):
     assert len((tmp_path / "r.jsonl").read_text().splitlines()) == 3
 
 
-def test_shards_are_the_whole_and_share_a_report(tmp_path, monkeypatch):
+def test_shards_cover_all_items_and_share_a_report(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 10)
     for shard in ("0/3", "1/3", "2/3"):
@@ -165,7 +165,7 @@ def test_wrong_shards_are_refused(text):
 
 
 def struck(at: str, times: int = 1) -> FunctionJob:
-    """Return a job that signals its process in one item."""
+    """Return a job that signals its own process during one item."""
 
     def strike(item: Item) -> None:
         for _ in range(times * (item.name == at)):

@@ -1,4 +1,4 @@
-"""Figures kept between the runs of one process."""
+"""Figures cached between the runs of one process."""
 
 from __future__ import annotations
 
@@ -40,13 +40,13 @@ def test_changed_file_is_read_again(skel):
         skel.write_text(SKEL.replace("arm", "leg"))
         second, warnings = opened(skel)
         assert second.skeleton.names[-1] == "leg" and not warnings
-        # Neither the size nor the name tells.
+        # Neither the size nor the name reveals the change.
         skel.write_text(SKEL)
         os.utime(skel, ns=(1, 1))
         assert opened(skel)[0].skeleton.names == first.skeleton.names
 
 
-def test_only_wanted_files_are_kept_and_only_as_long_as_they_are(skel, tmp_path):
+def test_only_requested_files_are_kept_until_others_are_requested(skel, tmp_path):
     first, _ = opened(skel)
     assert opened(skel)[0] is not first
     with keeping_figures([tmp_path / "other"]):
@@ -59,7 +59,7 @@ def test_only_wanted_files_are_kept_and_only_as_long_as_they_are(skel, tmp_path)
         assert opened(skel)[0] is not first
 
 
-def test_options_of_the_reader_count(skel):
+def test_figures_are_read_again_with_other_options(skel):
     with keeping_figures([skel]):
         first, _ = opened(skel)
         source = Source.open(skel)

@@ -1,4 +1,4 @@
-"""Tables of a batch: numbers, order, and text that a spreadsheet must not run."""
+"""Tables of a batch: numbers, order, and text that a spreadsheet must not execute."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_an_input_that_cannot_be_compared_has_its_own_message(tmp_path) -> None:
     assert saved(tmp_path / "t.csv", "diff", [result])[0]["message"].startswith("a.skin:3")
 
 
-def test_names_are_no_formulas_and_keep_their_letters(tmp_path) -> None:
+def test_names_are_not_formulas_and_keep_their_letters(tmp_path) -> None:
     names = ["=cmd|'/c calc'!A0", "-2+3", "@x", 'Zoë, "Z"']
     results = [Result(Item(n, (), "", name), "done") for n, name in enumerate(names)]
     rows = saved(tmp_path / "t.csv", "convert", results)

@@ -1,8 +1,8 @@
 """1,000 AMASS-like conversions by workers, one process, and a shell loop; overhead per item.
 
-Rates depend on what else the machine does, so ratios are also given by processor time: what they
-would be if all cores were free, for 1,000 files. Workers start once per batch. The first argument
-is the number of files (1,000), the second that of frames per file (120), the third of rounds.
+Rates depend on the load of the machine, so ratios are also given by processor time, as if all cores
+were idle, for 1,000 files. Workers start once per batch. The first argument is the number of files
+(1,000), the second that of frames per file (120), the third of rounds.
 """
 
 from __future__ import annotations
@@ -28,19 +28,19 @@ LOOPED = 20  # files of the shell loop
 JOINTS = 52  # SMPL-H
 RATE = 120.0
 WORKERS = 2
-FILES = 1000  # of the goals
+FILES = 1000  # to which the goals refer
 
 
 @dataclass
 class Cost:
-    """Seconds per item: on the clock, and of processor time in all processes."""
+    """Seconds per item: wall time, and processor time of all processes."""
 
     wall: float
     work: float
 
 
 def write(folder: Path, count: int, n_frames: int) -> list[str]:
-    """Write motions with AMASS's keys: a slow walk of noise; return their paths."""
+    """Write motions with AMASS's keys, as slow random walks; return their paths."""
     rng = np.random.default_rng(0)
     paths = []
     for number in range(count):
@@ -60,11 +60,11 @@ def write(folder: Path, count: int, n_frames: int) -> list[str]:
 
 
 def nothing(item: Item) -> None:
-    """Do nothing, as a job whose time is all overhead."""
+    """Do nothing, so that all measured time is overhead."""
 
 
 def cost(run: Callable[[], object], count: int) -> Cost:
-    """Return what each of ``count`` items costs."""
+    """Return the cost per item of a run with ``count`` items."""
     started, before = time.perf_counter(), _work()
     run()
     return Cost((time.perf_counter() - started) / count, (_work() - before) / count)
@@ -85,7 +85,7 @@ def converted(paths: list[str], out: Path, workers: int, cluster: str = "") -> N
 
 
 def looped(paths: list[str], out: Path) -> None:
-    """Convert files as a shell loop does, one program after another."""
+    """Convert files one by one in new processes, as a shell loop does."""
     out.mkdir(exist_ok=True)
     for path in paths:
         target = str(out / f"{Path(path).stem}.bvh")
@@ -98,14 +98,14 @@ def median(costs: list[Cost], kind: str) -> float:
 
 
 def per_item(costs: list[Cost], start: list[Cost], count: int) -> tuple[float, float]:
-    """Return the processor time of an item, and of the start of its workers."""
+    """Return the processor time of one item, and of starting the workers."""
     few, many = median(start, "work") * WORKERS, median(costs, "work") * count
     each = (many - few) / (count - WORKERS)
     return each, few - WORKERS * each
 
 
 def report(costs: dict[str, list[Cost]], count: int) -> None:
-    """Print rates, and ratios on the clock and by processor time."""
+    """Print rates, and ratios of wall time and of processor time."""
     loop, warm, empty = (costs[name] for name in ("shell loop", "one process", "empty job"))
     for name in ("shell loop", "one process"):
         rate, work = 1.0 / median(costs[name], "wall"), 1e3 * median(costs[name], "work")
@@ -133,10 +133,10 @@ def said(name: str, wall: float, work: float, goal: float) -> None:
 
 
 def main() -> None:
-    """Measure interleaved rounds."""
+    """Measure in interleaved rounds."""
     numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
     count, n_frames, rounds = [*numbers, *(FILES, 120, ROUNDS)[len(numbers) :]]
-    os.environ["PYTHONPYCACHEPREFIX"] = CACHE.name  # for workers
+    os.environ["PYTHONPYCACHEPREFIX"] = CACHE.name  # for the workers
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as name:
         folder = Path(name)
         paths = write(folder / "in", count, n_frames)
@@ -153,7 +153,7 @@ def main() -> None:
 
 
 def works_of(paths: list[str], folder: Path) -> dict[str, tuple[Callable[[], object], int]]:
-    """Return what is measured, and its number of items."""
+    """Return the measured functions and their numbers of items."""
 
     def batch(count: int, workers: int, cluster: str = "") -> tuple[Callable[[], object], int]:
         out = folder / f"out-{workers}{cluster}"

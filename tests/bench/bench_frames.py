@@ -1,9 +1,9 @@
-"""Frames of a figure that moves, read into memory, against the minimal program that draws them.
+"""Frames of a moving figure, read into memory, against a minimal program that draws them.
 
 Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``references/least_frame.py``
-is the minimal program. Processor time of the process, all its threads: a software driver draws with
-it, and other programs on the machine do not change it. Uses the pig if its files exist, else the
-bundled figure.
+is the minimal program. Processor time of all threads of the process, which includes software
+drivers and does not depend on other programs. Uses the pig if its files exist, else the bundled
+figure.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ FRAMES = 5  # per round
 
 
 def main(rounds: int = 25) -> None:
-    """Print the ratios, and the parts of a pose."""
+    """Print the ratios, and the time of the parts of posing."""
     scene = viewer.load(str(PIG)) if PIG.is_dir() else viewer.load()
     figure = scene.actors[0].figure
     mesh = figure.require_mesh()
@@ -48,7 +48,7 @@ def main(rounds: int = 25) -> None:
 def frames(
     scene: Scene, offscreen: Offscreen, other: Offscreen, options: DisplayOptions, samples: int
 ) -> dict[str, Callable[[], object]]:
-    """Return functions that draw ``FRAMES`` frames, ours and the minimal program's."""
+    """Return functions that draw ``FRAMES`` frames: the viewer's and the minimal program's."""
     actor, rng = scene.actors[0], np.random.default_rng(0)
     figure, pose = actor.figure, actor.pose
     assert pose is not None
@@ -92,7 +92,7 @@ def processor_times(
 
 
 def kinematics(scene: Scene, rounds: int) -> None:
-    """Print the time of a pose's matrices."""
+    """Print the time to compute the matrices of a pose."""
     actor, rng = scene.actors[0], np.random.default_rng(1)
     skeleton, pose = actor.figure.require_skeleton(), actor.pose
     assert pose is not None

@@ -77,7 +77,7 @@ def character(has_own_times: bool, has_images: bool = False) -> bytes:
     positions = np.stack([x, y, 0 * x], axis=1).astype("<f4")
     corner = (np.arange(N_SIDE - 1)[:, None] * N_SIDE + np.arange(N_SIDE - 1)).ravel()
     square = corner[:, None] + [0, N_SIDE, 1, 1, N_SIDE, N_SIDE + 1]
-    # Neighbours follow the same joint: triangles that span the picture would measure the driver.
+    # Neighbours follow the same joint, since triangles across the picture would measure the driver.
     joints = np.zeros((len(x), 4), dtype="u1")
     joints[:, 0] = x * N_JOINTS // N_SIDE
     weights = np.zeros((len(x), 4), dtype="<f4")
@@ -121,7 +121,7 @@ def animation(glb: Glb, rng: np.random.Generator, has_own_times: bool) -> dict[s
 
 
 def add_images(glb: Glb, rng: np.random.Generator) -> None:
-    """Add a material with PNG images of smooth noise, which compress as painted ones do."""
+    """Add a material with PNG images of smooth noise, which compress like painted textures."""
     views = []
     for _ in range(N_IMAGES):
         noise = Image.fromarray(rng.integers(256, size=(64, 64, 3), dtype=np.uint8))

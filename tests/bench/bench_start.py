@@ -1,7 +1,7 @@
-"""Whole commands from their start to their end, against the least programs that do as much.
+"""Whole commands, from start to exit, against minimal programs that do the same.
 
-Processor time of the processes: other programs on the machine change it little. A software driver
-draws with it, too. The cache of parsed numbers is filled by a first round.
+Processor time of the processes, which hardly depends on other programs and includes software
+drivers. The cache of parsed numbers is filled by a first round.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ print(json.dumps([code, sizes, sorted(n for n in sys.modules if n.startswith('vi
 
 
 def main(rounds: int = 11) -> None:
-    """Print the ratios, what encoding an image takes, and what was imported."""
+    """Print the ratios, the time to encode an image, and the imported modules."""
     baseline = str(Path(__file__).parent / "references" / "baseline.py")
     with tempfile.TemporaryDirectory() as folder:
         picture = str(Path(folder) / "picture.png")
@@ -84,7 +84,7 @@ def compare(title: str, runs: Mapping[str, list[str]], rounds: int, goal: float 
 
 
 def encoding(picture: str, rounds: int) -> None:
-    """Print what writing an image as PNG takes, against Pillow at its fastest level."""
+    """Print the time to write an image as PNG, against Pillow at its fastest level."""
     with Image.open(picture) as opened:
         pixels = np.array(opened.convert("RGBA"))
 

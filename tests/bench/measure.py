@@ -14,7 +14,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 # Compiled modules, as an installed program has them; the first round fills it.
 CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
-# Readers are measured, not the cache of parsed numbers; processes get one of their own.
+# Readers are measured without the cache of parsed numbers; child processes get their own cache.
 os.environ["VIEWER_CACHE"] = "off"
 
 

@@ -38,7 +38,7 @@ def test_a_saved_map_is_edited_and_used_again(walk, tmp_path, capsys):
     assert "neck by head" in capsys.readouterr().err
 
 
-def test_faults_of_a_map_are_one_line(walk, tmp_path, capsys):
+def test_errors_in_a_map_take_one_line(walk, tmp_path, capsys):
     bad = tmp_path / "bad.txt"
     bad.write_text("# test\nleft_kne = left_knee\n")
     assert convert(walk, "out.bvh", "--joint-map", bad) == 2
@@ -52,7 +52,7 @@ def test_faults_of_a_map_are_one_line(walk, tmp_path, capsys):
     assert not (tmp_path / "out.bvh").exists()
 
 
-def test_maps_without_effect_are_said(walk, tmp_path, capsys):
+def test_maps_without_effect_are_reported(walk, tmp_path, capsys):
     chosen = tmp_path / "map.txt"
     chosen.write_text("head = head\n")
     settings = MotionSettings(joint_map=read_joint_map(Source.open(chosen)))

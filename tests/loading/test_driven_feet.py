@@ -1,4 +1,4 @@
-"""Feet of figures that a file drives, and the option for them."""
+"""Feet of figures driven by a file, and the option ``--feet``."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def feet_notes(scene):
     return [key for key, _ in told(scene.diagnostics) if ".feet-" in key]
 
 
-def test_feet_are_planted_unless_told_otherwise(walking):
+def test_feet_are_planted_by_default(walking):
     (planted,) = load(walking, bundled_body()).actors
     plain = load(walking, bundled_body(), motion=MotionSettings(feet=False))
     assert feet_notes(plain) == []

@@ -33,7 +33,7 @@ def test_options_of_captures_are_reported_for_other_files(tmp_path, settings, na
     path = tmp_path / "walk.bvh"
     path.write_text(person(100.0))
     assert unused(path, **settings) == [f"F007.unused-{name}"]
-    # A model hides nothing: it is read, but it has no rigs.
+    # A model does not suppress the message: it is read, but has no rigs.
     assert unused(path, model=bundled_body(), **settings) == [f"F007.unused-{name}"]
 
 

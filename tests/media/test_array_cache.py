@@ -1,4 +1,4 @@
-"""Arrays come back from the cache only for exactly the bytes that they were made from."""
+"""Cached arrays are used only for exactly the bytes that they were computed from."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_second_run_parses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch
         assert bad == -1
         np.testing.assert_array_equal(values, VALUES)
         forbid(monkeypatch, numbers, "_parse")
-    values[0] = 7.0  # callers own what they get
+    values[0] = 7.0  # callers own the returned array
     assert parse_numbers(TEXT, 0, len(TEXT))[0][0] == 0.5
 
 
@@ -69,14 +69,14 @@ def test_same_checksum_and_length_is_not_enough(folder: Path) -> None:
     assert other.load("<f8", 1) is None
 
 
-def test_text_with_a_fault_is_not_kept(folder: Path) -> None:
+def test_invalid_text_is_not_cached(folder: Path) -> None:
     faulty = TEXT + b"x 1"
     for _ in range(2):
         assert parse_numbers(faulty, 0, len(faulty))[1] == len(VALUES)
     assert not folder.exists()
 
 
-def test_short_texts_are_not_kept(folder: Path) -> None:
+def test_short_texts_are_not_cached(folder: Path) -> None:
     parse_numbers(b"1 2 3", 0, 5)
     assert not folder.exists()
 
@@ -144,7 +144,7 @@ def test_links_are_not_followed(folder: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("what", ["file", "below a file", "no room"])
-def test_unusable_folder_is_silent(
+def test_unusable_folder_silently_disables_the_cache(
     what: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, tiny_disk: Path
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -156,7 +156,7 @@ def test_unusable_folder_is_silent(
     assert cache_use() == (0, 0)
 
 
-def test_oldest_entries_go_when_there_are_too_many(
+def test_oldest_entries_are_removed_when_there_are_too_many(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = 56 + len(TEXT) + VALUES.nbytes
@@ -165,7 +165,7 @@ def test_oldest_entries_go_when_there_are_too_many(
     for age, text in enumerate(texts[:4]):
         slot(text).store(VALUES)
         os.utime(slot(text).path, (1000 + age, 1000 + age))
-    assert slot(texts[0]).load("<f8", 1) is not None  # now it is the one that was used last
+    assert slot(texts[0]).load("<f8", 1) is not None  # now it is the most recently used one
     slot(texts[4]).store(VALUES)
     kept = [slot(text).load("<f8", 1) is not None for text in texts]
     assert kept == [True, False, False, True, True]
@@ -182,7 +182,7 @@ def test_threads_that_write_at_once_leave_one_valid_entry(folder: Path) -> None:
     assert entry(folder) == slot().path
 
 
-def test_pixels_of_an_image_are_kept(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pixels_of_an_image_are_cached(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pixels = np.random.default_rng(0).integers(0, 256, (100, 120, 4), dtype=np.uint8)
     data = encode_png(pixels)
     for _ in range(2):
@@ -192,12 +192,19 @@ def test_pixels_of_an_image_are_kept(folder: Path, monkeypatch: pytest.MonkeyPat
         forbid(monkeypatch, image, "decode_pictures")
 
 
-def test_option_and_variable_switch_it_off(
+def test_option_and_variable_disable_the_cache(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
-    rows = b"".join(b"v %d.25 %d.5 1\n" % (n, n) for n in range(4000)) + b"f 1 2 3\n"
-    (tmp_path / "a.obj").write_bytes(rows)
-    command = ["info", str(tmp_path / "a.obj")]
+    rows = {
+        "positions": [f"{n}.25 {n}.5 1" for n in range(4000)],
+        "normals": ["0 0 1"] * 4000,
+        "skinweights": ["1 0 1"] * 4000,
+        "triangles": ["0 1 2"],
+        "bindings": ["matrix { 1 0 0 0 1 0 0 0 1 0 0 0 }"],
+    }
+    sections = (f"{name} {len(lines)} {{ {' '.join(lines)} }}" for name, lines in rows.items())
+    (tmp_path / "a.skin").write_text("\n".join(sections))
+    command = ["info", str(tmp_path / "a.skin")]
     assert run([*command, "--no-cache"]) == 0
     plain = capsys.readouterr().out
     monkeypatch.setenv("VIEWER_CACHE", "off")

@@ -132,7 +132,7 @@ class HeadlessApp:
 
 
 def _names(state: AppState) -> Iterator[str]:
-    """Yield the names from files that panels may show, and the messages."""
+    """Yield names from files that panels may show, and the messages."""
     yield from (note.text for note in state.messages.notes)
     for actor in state.scene.actors:
         figure = actor.figure

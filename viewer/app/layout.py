@@ -260,7 +260,7 @@ def _notice(layout: Layout) -> None:
 
 
 def _scroll_tabs() -> None:
-    """Scroll tab bars to their targets at once: an idle window draws no frames of an animation."""
+    """Scroll tab bars to their targets immediately: an idle window draws no animation frames."""
     for title in _docked():
         node = imgui.internal.find_window_by_name(title).dock_node
         if node is not None and node.tab_bar is not None:

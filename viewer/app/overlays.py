@@ -178,7 +178,7 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
 
 
 def _notes_corner(state: AppState) -> tuple[float, float]:
-    """Return the lower right corner of the room for messages: beside the hints, or above them."""
+    """Return the lower right corner of the area for messages: beside the hints, or above them."""
     x, y, width, height = state.view_rect
     hint = hint_rect(state)
     gizmo = gizmo_rect(state)

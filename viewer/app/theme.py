@@ -100,7 +100,7 @@ def lacks_letters(texts: Iterable[str]) -> bool:
 
 
 def add_system_fonts() -> None:
-    """Complete the font with those of the system, for Chinese, Arabic and other scripts.
+    """Merge system fonts into the font, for Chinese, Arabic and other scripts.
 
     The files are large, so this is done after the first pictures of a window.
     """

@@ -57,7 +57,7 @@ class TypedKeys:
 
 
 def end_frame_before(queue: Any, key: int, action: int) -> None:
-    """Let the events before a modifier's release have a frame of their own.
+    """Put the events before a modifier's release into a separate frame.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def end_frame_before(queue: Any, key: int, action: int) -> None:
 
 
 def end_frame(queue: Any) -> None:
-    """Let ImGui process the events of its queue, if there are any, before later ones.
+    """Make ImGui process the queued events, if any, in a frame before later ones.
 
     A mouse button needs it: tabs and other widgets that may overlap react to a press only if they
     were hovered in an earlier frame, and the last motion of a drag counts only before its release.

@@ -57,8 +57,8 @@ from viewer.rig.scene import Scene, scene_points  # noqa: E402
 __all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 
 _SIZE = (1280, 800)
-_SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two to settle
-_FIRST_FRAMES = 3  # frames after which fonts for further scripts are read
+_SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two frames
+_FIRST_FRAMES = 3  # frames after which fonts for additional scripts are loaded
 _IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
 _BUSY_SECONDS = 0.05  # the same interval while a file is being read
 

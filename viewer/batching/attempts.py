@@ -44,7 +44,7 @@ class FunctionJob:
         result = attempt(item, self._values)
         is_written = result.status == "done" and item.output and os.path.lexists(item.output)
         if is_written and item.output not in result.outputs:
-            # So that the item is run again if the output is lost.
+            # Recorded so that the item is run again if the output is lost.
             result = replace(result, outputs=(*result.outputs, item.output))
         return result
 

@@ -40,7 +40,7 @@ class Progress:
         if self._bar is None:
             self._bar = _bar()
             self._bar.start()
-        # A bar cannot lose a known total, so new work gets a new one.
+        # The total of a bar cannot become unknown again, so new work gets a new bar.
         for task in self._bar.tasks:
             if (task.description, task.total) != (title, self.total or None):
                 self._bar.remove_task(task.id)

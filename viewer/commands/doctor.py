@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _print_measurements() -> None:
-    """Print how fast this machine is; all times are medians."""
+    """Print the speed of this machine; all times are medians."""
     from viewer.commands._benchmarks import measured
 
     for found in measured():
@@ -223,7 +223,7 @@ def _examine_state_folder() -> Finding:
 
 
 def _examine_cache() -> Finding:
-    """Report where parsed numbers and decoded images are kept, and how many."""
+    """Report the folder and size of the cache of parsed numbers and decoded images."""
     from viewer.media.array_cache import LIMIT, VARIABLE, cache_folder, cache_use
 
     folder = cache_folder()

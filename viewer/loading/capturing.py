@@ -343,7 +343,7 @@ def _order(item: tuple[int, object]) -> tuple[bool, int]:
 
 
 def _grown(first: Drive, second: Drive) -> Drive:
-    """Return what drives a figure over the rows of two motions with the same timeline."""
+    """Return the merged drive of a figure over the rows of two motions with the same timeline."""
     motion = first.motion
     clip = _extended(motion.clip, second.motion.clip)
     return replace(first, motion=replace(motion, clip=clip))

@@ -49,7 +49,7 @@ def carrying_drive(
     joint_map : JointMap, optional
         The requested match of joints.
     plants_feet : bool
-        Whether feet are kept where those of the body stand.
+        Whether feet stay planted while those of the body stand.
     """
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(

@@ -14,7 +14,7 @@ __all__ = ["CleanUp"]
 
 @dataclass(frozen=True, slots=True)
 class CleanUp:
-    """Requested changes of captured motions, in the order in which they are made.
+    """Requested changes to captured motions, in the order in which they are applied.
 
     Attributes
     ----------
@@ -27,14 +27,14 @@ class CleanUp:
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
     locks_feet : bool
-        Whether feet that stand are held in place.
+        Whether standing feet are held in place.
     grounds : bool
         Whether people are moved up or down until their feet rest at height 0.
     frames : (int or None, int or None) or None
-        First frame to keep and the frame after the last one, with the numbers of the file; None for
-        the motion's own ends.
+        First frame to keep and the frame after the last one, numbered as in the file; None for the
+        motion's own ends.
     rate : float or None
-        New frames per second.
+        New frame rate, frames per second.
     """
 
     merged: tuple[tuple[int, ...], ...] = ()

@@ -154,7 +154,7 @@ def _model(
         has_parameters = _all_have_parameters(contents)
         if is_family or (named.parameters is not None and has_parameters):
             return named, False, None
-        # People given by parameters move another figure by way of the model of their parameters.
+        # Bodies given by parameters drive another figure via the model of the parameters.
         carrier = _own_model(cast, contents, settings, "carrier") if has_parameters else None
         return carrier or _bundled(), carrier is None, named
     for index, actor in enumerate(cast.actors):

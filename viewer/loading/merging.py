@@ -105,7 +105,7 @@ def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list
 
 
 def _joined_drives(first: Drive | None, second: Drive | None) -> Drive | None:
-    """Return what drives a person with two tracks; None if one of them is not driven."""
+    """Return the merged drive of a person with two tracks; None if one of them is not driven."""
     if first is None or second is None:
         return None
     motion = first.motion

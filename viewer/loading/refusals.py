@@ -12,12 +12,12 @@ __all__ = ["map_refusal", "model_refusal"]
 
 
 def model_refusal(problem: RigError, path: Path | None) -> RigError:
-    """Return the error that the requested model does not match.
+    """Return the error for a requested model that does not match.
 
     Parameters
     ----------
     problem : RigError
-        Why it does not match; returned unchanged if it has a file of its own, as of a joint map.
+        Why it does not match; returned unchanged if it refers to a file, such as a joint map.
     path : Path or None
         File of the motion.
     """
@@ -28,7 +28,7 @@ def model_refusal(problem: RigError, path: Path | None) -> RigError:
 
 
 def map_refusal(problem: RigError, path: Path | None) -> RigError:
-    """Return the error that a joint map fits no figure; see ``model_refusal``."""
+    """Return the error for a joint map that matches no figure; see ``model_refusal``."""
     cause = problem.cause
     if isinstance(cause, Diagnostic) and cause.path is None:
         return RigError(replace(cause, path=path))

@@ -67,7 +67,7 @@ class MotionSettings:
         the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
         a frame in a T- or A-pose, otherwise an estimate from the anatomy.
     feet : bool
-        Whether the feet of driven figures are kept where those of the motion stand.
+        Whether the feet of driven figures stay planted while those of the motion stand.
     joint_map : JointMap or None
         Joints of driven figures and the joints that drive them; None to match them by name.
     """

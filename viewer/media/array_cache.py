@@ -1,9 +1,9 @@
-"""Arrays made from files' text or pixels, kept between runs in the user's cache folder.
+"""Persistent cache of arrays parsed from text or decoded from images, in the user's cache folder.
 
-An entry contains the bytes that it was made from, and is used only if they are equal to the bytes
-at hand: it cannot be out of date. Its name is their checksum, so no two processes need to agree on
-anything. An entry that is damaged, foreign or from another version is replaced; a folder that
-cannot be read or written is the same as none.
+An entry contains its source bytes, and is used only if they equal the bytes at hand, so it is never
+stale. Its name is their checksum, so processes need no coordination. An entry that is damaged,
+foreign or from another version is replaced; without a readable and writable folder, nothing is
+cached.
 
 ::
 
@@ -40,7 +40,7 @@ LIMIT = 1 << 29
 
 _OFF = ("off", "0", "no", "none")
 _LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
-_LARGEST = 1 << 27  # bytes of an entry
+_LARGEST = 1 << 25  # bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
 _BINARY = getattr(os, "O_BINARY", 0)
@@ -58,7 +58,7 @@ def cache_folder() -> Path | None:
     if asked:
         return Path(os.path.abspath(os.path.expanduser(asked)))  # noqa: PTH100, PTH111
     if sys.platform.startswith("linux"):
-        # As platformdirs would say, whose import takes longer than reading a small entry.
+        # As platformdirs defines it; importing it takes longer than reading a small entry.
         base = os.environ.get("XDG_CACHE_HOME", "").strip()
         home = base if os.path.isabs(base) else os.path.expanduser("~/.cache")  # noqa: PTH111, PTH117
         return Path(home) / "viewer" / "arrays"
@@ -69,7 +69,7 @@ def cache_folder() -> Path | None:
 
 @contextlib.contextmanager
 def without_cache() -> Iterator[None]:
-    """Use no cache in the block, in any thread."""
+    """Disable the cache within the block, in all threads."""
     global _is_off
     before, _is_off = _is_off, True
     try:
@@ -86,16 +86,16 @@ def cache_use() -> tuple[int, int]:
 
 
 def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
-    """Return the place of an array in the cache; None if it would not pay, or there is no cache.
+    """Return the location of an array in the cache; None if caching is not worthwhile or disabled.
 
     Parameters
     ----------
     kind : str
-        What is made of the bytes, for the name of a file; changes when the result does.
+        Kind of result, part of the file name; must change whenever the conversion changes.
     data : bytes
         A file.
     start, end : int
-        The part of the file that the array is made from.
+        The part of the file that the array is computed from.
     """
     if not _LEAST <= end - start <= _LARGEST // 2:
         return None
@@ -106,16 +106,16 @@ def slot_of(kind: str, data: bytes, start: int, end: int) -> Slot | None:
 
 
 class Slot:
-    """Place of one array in the cache.
+    """Location of one array in the cache.
 
     Parameters
     ----------
     folder : Path
         Folder of the cache, which need not exist.
     kind : str
-        What is made of the bytes.
+        Kind of result.
     content : bytes
-        The bytes that the array is made from.
+        The bytes that the array is computed from.
     """
 
     __slots__ = ("_content", "path")
@@ -125,7 +125,7 @@ class Slot:
         self.path = folder / f"{zlib.crc32(content):08x}-{len(content):x}-{kind}{_SUFFIX}"
 
     def load(self, kind: str, n_axes: int) -> NDArray[Any] | None:
-        """Return the array, which may be written to; None if there is no valid entry.
+        """Return the array, which is writable; None if there is no valid entry.
 
         Parameters
         ----------
@@ -144,12 +144,12 @@ class Slot:
         except OSError:
             return None
         if values is not None:
-            with contextlib.suppress(OSError):  # a folder that cannot be written to
+            with contextlib.suppress(OSError):  # the folder is not writable
                 os.utime(self.path)
         return values
 
     def _read(self, stream: Any, size: int, kind: str, n_axes: int) -> NDArray[Any] | None:
-        """Return the array of an open entry; every byte of it is checked."""
+        """Return the array of an open entry, after verifying every byte."""
         header = stream.read(_HEADER.size)
         if len(header) < _HEADER.size:
             return None
@@ -170,7 +170,7 @@ class Slot:
         return values
 
     def store(self, values: NDArray[Any]) -> None:
-        """Keep an array; nothing happens if that is impossible, as the cache is dispensable.
+        """Store an array; failures are ignored, because the cache is optional.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class Slot:
         except BaseException:  # including Ctrl-C
             _remove(temporary)
             raise
-        # Listing the folder at each entry would slow down the reading of thousands of files.
+        # Listing the folder for each entry would slow down reading thousands of files.
         if zlib.crc32(header) % 16 == 0 or total > LIMIT // 64:
             _limit_size(self.path.parent)
 
@@ -210,7 +210,7 @@ def _checksum(data: memoryview, axes: Sequence[int]) -> int:
 
 
 def _code(kind: str, n_axes: int) -> bytes:
-    """Return type and number of axes as in a header."""
+    """Return type and number of axes as encoded in a header."""
     return f"{kind}{n_axes}".encode()
 
 
@@ -229,7 +229,7 @@ def _is_own(status: os.stat_result) -> bool:
 
 
 def _entries(folder: Path) -> list[tuple[float, int, Path]]:
-    """Return time of last use, size and path of each entry, and of what crashes left behind."""
+    """Return time of last use, size and path of each entry and of files left by crashes."""
     found = []
     with contextlib.suppress(OSError), os.scandir(folder) as listing:
         for entry in listing:
@@ -241,7 +241,7 @@ def _entries(folder: Path) -> list[tuple[float, int, Path]]:
 
 
 def _limit_size(folder: Path) -> None:
-    """Remove the entries that were not used for longest, until three quarters of the limit."""
+    """Remove the least recently used entries until the size is three quarters of the limit."""
     entries = sorted(_entries(folder))
     total = sum(size for _, size, _ in entries)
     if total <= LIMIT:

@@ -1,4 +1,4 @@
-"""Contact sheets with names below the pictures, and cells for missing ones.
+"""Contact sheets with captions below the pictures, and cells for missing pictures.
 
 Pillow is imported on first use.
 """
@@ -42,7 +42,7 @@ class CaptionedCell:
     caption : str
         Name, below the picture; shortened in the middle if it is too long.
     pixels : (H, W, 4) uint8 or None
-        Picture; None for a cell with a text.
+        Picture; None for a cell with text.
     text : str
         Text in a cell without a picture; its first line is a title.
     is_failed : bool
@@ -56,12 +56,12 @@ class CaptionedCell:
 
 
 def captioned_sheet(cells: Sequence[CaptionedCell]) -> Bytes:
-    """Return an image of cells in rows, whose width is about 4/3 of its height.
+    """Return an image of a grid of cells with an aspect ratio of about 4:3.
 
     Parameters
     ----------
     cells : sequence of CaptionedCell
-        At least one. Pictures are centred, and reduced already: 240 pixels wide at most.
+        At least one. Pictures are centred; they must be at most 240 pixels wide.
 
     Returns
     -------
@@ -111,14 +111,14 @@ def _draw_text(
 
 
 def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
-    """Return a text that fits, without its middle if it is too long.
+    """Return a text that fits, with its middle elided if it is too long.
 
     Parameters
     ----------
     text : str
         One line.
     width : float
-        Largest length.
+        Maximum length.
     length_of : callable
         Returns the length of a text.
 
@@ -136,7 +136,7 @@ def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
 
 
 def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], float]) -> list[str]:
-    """Return the lines of a text; long words are broken, and what has no room is left out.
+    """Return the lines of a text; long words are broken, and text that does not fit is omitted.
 
     >>> wrapped("expected 3 numbers", 10, 2, len)
     ['expected 3', 'numbers']

@@ -54,7 +54,7 @@ def _packed(pixels: Bytes, channels: int) -> Bytes:
         return np.ascontiguousarray(pixels)
     packed = np.empty((*pixels.shape[:2], channels), dtype=np.uint8)
     for channel in range(channels):
-        # Four times faster than one assignment, whose inner loop would copy three bytes.
+        # Four times faster than a single assignment, whose inner loop would copy three bytes.
         packed[..., channel] = pixels[..., channel]
     return packed
 

@@ -1,4 +1,4 @@
-"""Small copies of images and videos, as pixels or within a page.
+"""Thumbnails of images and videos, as pixels or as URIs for pages.
 
 Pillow is imported on first use.
 """
@@ -65,7 +65,7 @@ def _pixels(path: Path) -> Bytes | None:
 
 
 def data_uri(pixels: Bytes) -> str:
-    """Return an image as a URI that contains it, as JPEG, or as PNG if it is transparent.
+    """Return an image as a data URI: JPEG, or PNG if it is transparent.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Spheres about the joints of a posed figure that contain its skinned vertices."""
+"""Bounding spheres around the joints of a posed figure that contain its skinned vertices."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ _reaches: Memo[Figure, tuple[Floats, Floats]] = Memo()
 
 
 def skin_spheres(figure: Figure, pose: Pose) -> Floats:
-    """Return spheres around the vertices of a figure, from its joints alone.
+    """Return bounding spheres of the vertices of a figure, computed from its joints alone.
 
     A linearly skinned vertex is a weighted mean of its positions under each joint's transform, so
-    it lies in the convex hull of spheres about the joints that reach to their farthest vertices.
+    it lies in the convex hull of spheres around the joints that reach their farthest vertices.
 
     Parameters
     ----------
@@ -47,9 +47,9 @@ def skin_spheres(figure: Figure, pose: Pose) -> Floats:
 
 
 def stretch(matrices: Floats) -> Floats:
-    """Return an upper bound of how much matrices lengthen vectors; exact for rotations.
+    """Return upper bounds of the spectral norms of matrices; exact for rotations.
 
-    The spectral norm is at most the root of the largest row sum of M^T M.
+    The spectral norm is at most the square root of the largest absolute row sum of M^T M.
 
     Parameters
     ----------

@@ -259,7 +259,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     if mesh.uv_triangles is None or mesh.uvs is None:
         identity = np.arange(mesh.n_vertices, dtype=np.int32)
         return identity, identity, mesh.triangles
-    # Only the corners beyond the first texture coordinate of a vertex are sorted: few.
+    # Only corners with a further texture coordinate of a vertex are sorted, which are few.
     corners, uvs, n_uvs = mesh.triangles.ravel(), mesh.uv_triangles.ravel(), len(mesh.uvs)
     lowest = np.full(mesh.n_vertices, n_uvs, dtype=np.int32)
     np.minimum.at(lowest, corners, uvs)
@@ -270,7 +270,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     is_used, n_further = lowest < n_uvs, np.bincount(owners, minlength=mesh.n_vertices)
     counts = is_used + n_further
     starts = np.cumsum(counts) - counts
-    # Within its vertex, a further copy has the position that it has among all further copies.
+    # Further copies of a vertex keep their order among all further copies.
     places = starts[owners] + 1 + np.arange(len(pairs)) - (np.cumsum(n_further) - n_further)[owners]
     triangles = starts[corners]
     triangles[further] = places[which]

@@ -97,7 +97,7 @@ class Actor:
     springs : Swinging or None
         Simulation of its spring joints while its clip plays; None leaves them to the clip.
     drive : Drive or None
-        The motion of another skeleton from which its clip was retargeted; None for other clips.
+        Motion of another skeleton from which the clip was retargeted; None for other clips.
     """
 
     figure: Figure

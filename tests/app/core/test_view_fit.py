@@ -111,7 +111,7 @@ def test_moving_the_camera_ends_the_fit(wide, move):
     assert is_fitted(wide)
     wide.key("tab")
     wide.step(3)
-    assert is_fitted(wide)  # F has fitted it again
+    assert is_fitted(wide)  # F has framed the view again
 
 
 def test_following_ends_the_fit(wide):

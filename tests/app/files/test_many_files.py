@@ -1,4 +1,4 @@
-"""Opening files and playing them, over and over, keeps nothing of the closed ones."""
+"""Repeatedly opening and playing files leaves no objects of closed files behind."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from rendering.gpu.gl_objects import gl_objects
 
 
 def kept(hand: Driver) -> tuple[dict[str, int], int]:
-    """Return the number of OpenGL objects by kind, and of Python's objects."""
+    """Return the numbers of OpenGL objects by kind, and the number of Python objects."""
     gc.collect()
     return dict(gl_objects()), len(gc.get_objects())
 
 
-def test_files_that_were_opened_and_played_leave_nothing(drive, tmp_path) -> None:
+def test_closed_files_leave_no_objects_behind(drive, tmp_path) -> None:
     rig = write_rig(tmp_path)
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, size=(500, 400), samples=4)

@@ -177,14 +177,14 @@ def test_escape_cancels_reading(hand, rig, monkeypatch):
 
 
 def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig, monkeypatch):
-    # The thread waits for both, so a failing test ends it as well.
+    # The thread waits for either event, so a failing test also ends it.
     begun, ended = threading.Event(), threading.Event()
 
     def slow(paths, **_):
         report(0, 430, "MB", "reading tube.skin")
         begun.set()
         try:
-            while not ended.wait(0.01):  # until the report raises
+            while not ended.wait(0.01):  # until the progress report raises
                 report(120, 430, "MB")
         finally:
             ended.set()

@@ -184,7 +184,7 @@ def test_video_has_every_frame(moving, tmp_path):
 
 def test_dialog_shows_the_frames_that_are_recorded(moving):
     state, settings = moving.state, RecordSettings()
-    # 7.6 frames: the last one that begins is number 7. Its end in single precision is still 7.
+    # 7.6 frames: the last one that begins is number 7, even if the end is in single precision.
     for end, n_frames in ((7.6 / 30.0, 8), (float(np.float32(7.0 / 30.0)), 8), (6.9 / 30.0, 7)):
         state.clock.set_range(0.0, end)
         assert playback_frames(state) == (0, n_frames - 1)

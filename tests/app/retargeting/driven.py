@@ -1,4 +1,4 @@
-"""A scene whose figure is driven by a capture with an elbow of unknown name and a tail."""
+"""A scene whose figure is driven by a capture with an unrecognised elbow name and a tail."""
 
 from __future__ import annotations
 

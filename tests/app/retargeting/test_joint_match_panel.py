@@ -1,4 +1,4 @@
-"""The Joint match panel: edits are retargeted at once, undone, saved and loaded."""
+"""The Joint match panel: edits are retargeted immediately, undone, saved and loaded."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def partner(hand, label):
     return shown.source.labels[found] if found >= 0 else "", shown.origins[joint]
 
 
-def test_a_chosen_joint_drives_the_figure_at_once_and_undo_restores_it(panel):
+def test_a_chosen_joint_drives_the_figure_immediately_and_can_be_undone(panel):
     hand, actor = panel, panel.state.actor
     elbow = actor.figure.skeleton.names.index("right_elbow")
     hand.state.clock.seek(0.1)
@@ -137,7 +137,7 @@ def test_saved_maps_can_be_loaded(panel, tmp_path):
     assert state.actor.clip is kept
 
 
-def test_figures_that_nothing_drives_have_no_panel(hand):
+def test_figures_without_a_driving_motion_have_no_panel(hand):
     assert no_edit(hand.state) == "no motion of another skeleton drives this figure"
     assert "Joint match" not in hand.state.item_rects
 

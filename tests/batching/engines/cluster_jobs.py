@@ -1,4 +1,4 @@
-"""Jobs that workers of test clusters run."""
+"""Jobs for workers of test clusters."""
 
 from __future__ import annotations
 
@@ -45,6 +45,6 @@ def fail() -> None:
 
 
 def items(count: int, **names: int) -> list[Item]:
-    """Return items, some with names by their index."""
+    """Return items, some of which have special names, by index."""
     by_index = {index: name for name, index in names.items()}
     return [Item(n, (), "", by_index.get(n, f"{n}.x")) for n in range(count)]

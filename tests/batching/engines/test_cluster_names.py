@@ -1,4 +1,4 @@
-"""Names of clusters, and the job script that SLURM gets."""
+"""Values of --cluster, and the job script submitted to SLURM."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def test_other_names_are_refused(text, message) -> None:
     assert message in str(caught.value)
 
 
-# Importing it here would replace the handler of Ctrl-C in the process of all tests.
+# Importing it here would replace the Ctrl-C handler of the test process.
 needs_jobqueue = pytest.mark.skipif(find_spec("dask_jobqueue") is None, reason="no dask-jobqueue")
 
 
 @pytest.mark.slow
 @needs_jobqueue
-def test_job_script_asks_slurm_for_the_options() -> None:
+def test_job_script_contains_the_slurm_options() -> None:
     from viewer.batching.engines._clusters import slurm_cluster
 
     name = parse_cluster("slurm:partition=gpu,time=2:00:00,cpus=4,gres=gpu:1,exclusive,account=lab")
@@ -53,7 +53,7 @@ def test_job_script_asks_slurm_for_the_options() -> None:
     for wanted in ("-p gpu", "-A lab", "-t 2:00:00", "--cpus-per-task=4", "--gres=gpu:1"):
         assert f"#SBATCH {wanted}" in lines
     assert "#SBATCH --exclusive" in lines
-    # Four workers of 2 GiB, each of which declares a GPU.
+    # Four workers with 2 GiB each, all of which declare a GPU.
     assert "#SBATCH --mem=8G" in lines
     command = lines[-1]
     for wanted in ("--nworkers 4", "--nthreads 1", "--resources GPU=1", "--memory-limit 2.00GiB"):

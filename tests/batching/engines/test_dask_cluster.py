@@ -1,4 +1,4 @@
-"""Batches on Dask workers: real schedulers, real processes, some of which die."""
+"""Batches on Dask workers: real schedulers and processes, some of which are killed."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 @pytest.fixture(scope="module")
 def address(tmp_path_factory):
-    """Start a scheduler with two worker processes, of which the second declares a GPU."""
+    """Start a scheduler with two worker processes; the second declares a GPU."""
     from distributed import Nanny, Scheduler, SpecCluster
 
     folder = str(tmp_path_factory.mktemp("dask"))
@@ -39,7 +39,7 @@ def address(tmp_path_factory):
 
 
 def finished(job, some, limits, on_result=lambda result: None):
-    """Run items; check that nothing is lost or double; return results by index."""
+    """Run items; check that no item is lost or repeated; return results by index."""
     results = []
     for result in dask_cluster.run(some, job, limits):
         results.append(result)
@@ -75,7 +75,7 @@ def test_items_of_a_killed_worker_run_elsewhere(address, tmp_path) -> None:
     assert {one.status for one in found.values()} == {"done"} and first
     runs = [len(path.read_text().split()) for path in tmp_path.iterdir()]
     assert len(runs) == 60
-    # Only what the killed worker had, at most, was run again.
+    # At most the items of the killed worker were run again.
     assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
 
 
@@ -91,13 +91,13 @@ def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
 
 
-def test_shards_together_are_the_whole(address) -> None:
+def test_shards_together_cover_all_items(address) -> None:
     whole = items(30)
     parts = [finished(Job(), whole[shard::3], Limits(cluster=address)) for shard in range(3)]
     assert sorted(n for part in parts for n in part) == list(range(30))
 
 
-def test_stopping_finishes_what_runs_and_starts_no_more(address) -> None:
+def test_stopping_finishes_running_items_and_starts_no_more(address) -> None:
     results = []
     stopping = Limits(2, cluster=address, is_stopping=lambda: len(results) >= 3)
     for result in dask_cluster.run(iter(items(1000)), Job(seconds=0.02), stopping):

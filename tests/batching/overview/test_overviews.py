@@ -1,4 +1,4 @@
-"""Overviews: what they show first, and pages that run no text of other people."""
+"""Overviews: order of their content, and pages that never execute untrusted text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVIL = "<script>alert(1)</script>\" onload='x'"
 
 
 class Page(HTMLParser):
-    """The elements of a page, and its rows as texts."""
+    """Elements of a page, and its rows as text."""
 
     def __init__(self, path) -> None:
         super().__init__()
@@ -77,7 +77,7 @@ def test_page_of_lint_lists_codes_and_the_worst_items_first(tmp_path) -> None:
     assert page.row("broken.glb")[3] == "broken.glb:1: expected <b>"
 
 
-def test_pages_need_no_other_file_and_run_nothing(tmp_path) -> None:
+def test_pages_are_self_contained_and_execute_nothing(tmp_path) -> None:
     results = [linted(0, EVIL, "W001"), replace(linted(1, "a"), status="failed", message=EVIL)]
     path = tmp_path / "o.html"
     save_overview(path, "lint", results)

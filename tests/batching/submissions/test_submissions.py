@@ -1,4 +1,4 @@
-"""Submissions: which files are compared, and archives that must not be trusted."""
+"""Submissions: selection of the compared files, and untrusted archives."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def written(folder: Path, *names: str) -> Path:
 
 
 def chosen(path: Path, expected=(), alike=ALIKE) -> list[str]:
-    """Return the chosen paths, without the folder of the submission or its unpacked archive."""
+    """Return the chosen paths, relative to the submission or its unpacked archive."""
     with opened(path, expected, alike) as found:
         base = path if found.base is None else found.base
         assert all(file.exists() for file in found.files)
@@ -87,7 +87,7 @@ def test_files_like_those_of_the_reference_are_found(tmp_path, names, result, is
         ),
     ],
 )
-def test_missing_and_ambiguous_files_are_named(tmp_path, names, message) -> None:
+def test_missing_and_ambiguous_files_are_reported(tmp_path, names, message) -> None:
     path = zipped(tmp_path / "bob.zip", dict.fromkeys(names, "x"))
     assert refusal(path) == message
 

@@ -1,9 +1,9 @@
-"""The minimal program that draws frames of a figure that moves, for ``bench_frames.py``.
+"""A minimal program that draws frames of a moving figure, for ``bench_frames.py``.
 
 Vertices as in the file, with their four strongest influences as attributes; one shader skins and
-projects them, another shades them with two lights; back faces are culled, the background is one
-colour, and the picture is read as OpenGL stores it. No options, no textures, no errors: not a
-promise, but what the same driver needs at least.
+projects them, another shades them with two lights; back faces are culled, the background has one
+colour, and the picture is read as OpenGL stores it. It has no options, textures or error handling:
+a lower bound for the same driver, not a goal.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class LeastFrame:
     figure : Figure
         Figure with a mesh, a skeleton and a skin.
     camera : Camera
-        The camera, which stays.
+        The camera, which does not move.
     box : (2, 3)
         Bounds for the depth range.
     size : (int, int)
@@ -145,7 +145,7 @@ def _strongest(figure: Figure) -> tuple[Floats, Floats]:
 
 
 def _levels(parents: Floats) -> list[tuple[Floats, Floats]]:
-    """Return the passes of pointer doubling: rows of ancestors and of the joints below them."""
+    """Return the passes of pointer doubling: indices of ancestors and of joints."""
     ancestors, passes = parents.copy(), []
     below = np.flatnonzero(ancestors >= 0)
     while len(below):

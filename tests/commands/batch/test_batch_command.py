@@ -1,4 +1,4 @@
-"""``viewer batch``: items as the command's own runs, exit codes, and refusals before the start."""
+"""``viewer batch``: results equal to single runs, exit codes, and early refusals."""
 
 from __future__ import annotations
 
@@ -53,12 +53,16 @@ def test_items_are_written_as_the_command_writes_them(rigs, capsys):
 
 def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
-    rows = "".join(f"v {n}.25 {n}.5 1\n" for n in range(4000)) + "f 1 2 3\n"
+    points = " ".join(f"{n}.25 {n}.5 1" for n in range(4000))
+    normals, weights = "0 0 1 " * 4000, "1 0 1 " * 4000
+    bind = "bindings 1 { matrix { 1 0 0 0 1 0 0 0 1 0 0 0 } }"
+    sections = f"positions 4000 {{ {points} }} normals 4000 {{ {normals} }} "
+    sections += f"skinweights 4000 {{ {weights} }} triangles 1 {{ 0 1 2 }} {bind}"
     for name in "ab":
-        (tmp_path / f"{name}.obj").write_text(rows)
-    assert run(["batch", "info", str(tmp_path / "*.obj")]) == 0
+        (tmp_path / f"{name}.skin").write_text(sections)
+    assert run(["batch", "info", str(tmp_path / "*.skin")]) == 0
     assert not (tmp_path / "cache").exists()
-    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert run(["info", str(tmp_path / "a.skin")]) == 0
     assert (tmp_path / "cache").exists()
 
 
@@ -81,7 +85,7 @@ def test_resume_runs_only_what_is_not_done(rigs, capsys):
     assert run([*command, "--report", "r.jsonl", "--resume"]) == 0
     assert "1 done, 2 unchanged" in capsys.readouterr().out
     assert Path("a-one.obj").stat().st_mtime_ns == written and Path("b-bad.obj").exists()
-    # Other options give other results, as do other shared files.
+    # Other options or shared files give other results.
     assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
     assert "3 done" in capsys.readouterr().out
     Path("tiny.skin").write_text(skin_text() + "\n")
@@ -140,7 +144,7 @@ def test_pictures_are_drawn_by_workers(rigs):
         assert picture.size == (32, 24)
 
 
-def test_interrupted_batch_says_how_to_go_on(rigs, capsys, monkeypatch):
+def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch):
     from viewer.commands import info
 
     monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)

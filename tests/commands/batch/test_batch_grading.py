@@ -83,7 +83,7 @@ def test_every_submission_has_a_row_and_none_stops_the_others(course, capsys) ->
         "eve.zip": ("failed", "2", "no"),
         "fay.zip": ("failed", "2", ""),
     }
-    # The third vertex was moved by 0.5.
+    # The third vertex is displaced by 0.5.
     assert float(rows["bob + co"]["vertices_max"]) == pytest.approx(0.5, abs=1e-6)
     assert rows["bob + co"]["vertices_worst"] == "vertex 2"
     assert rows["cy"]["message"] == "subs/cy: expected 1 file matching *.skin, found arm.skel"
@@ -120,7 +120,7 @@ def test_files_that_cannot_be_written_are_refused_first(course, options, message
     assert Path("grades.csv").read_text() == "keep"
 
 
-def test_names_with_a_plus_are_joined_by_what_exists(course) -> None:
+def test_plus_separates_files_unless_it_is_part_of_a_name(course) -> None:
     folder = course / "bob + co" / "project"
     files = [folder / "arm.skel", folder / "arm.skin"]
     assert input_files("+".join(map(str, files))) == files

@@ -1,4 +1,4 @@
-"""Identity of functions: what --resume must notice, and what it must not be misled by."""
+"""Identity of functions: changes that --resume must detect, and differences that it must ignore."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.commands._batch.functions import identity_of
 
 
 def defined(source: str) -> Any:
-    """Return a function that was compiled anew, as in another process."""
+    """Return a newly compiled function, as in another process."""
     names: dict[str, object] = {"__name__": "jobs"}
     exec(source, names)
     return names["job"]
@@ -28,7 +28,7 @@ def test_changed_functions_differ():
         "def outer(n):\n def job(item): return job(n)\n return job\njob = outer(2)",
     ]
     assert len({identity_of(defined(source)) for source in sources}) == len(sources)
-    # Nested code and sets are equal however often they are made.
+    # Nested code and sets stay equal when they are created again.
     assert all(identity_of(defined(one)) == identity_of(defined(one)) for one in sources)
 
 
@@ -36,7 +36,7 @@ def scaled(factor, item):
     return factor
 
 
-def test_bound_arguments_and_objects_count():
+def test_bound_arguments_and_objects_are_included():
     class Job:
         def __init__(self, factor):
             self.factor = factor

@@ -1,4 +1,4 @@
-"""``viewer doctor --bench`` measures what it says, here with small numbers."""
+"""``viewer doctor --bench``: its measurements, with few repetitions."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ def test_every_figure_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(found) == 11
     compared = [one.to for one in found if one.to]
     assert compared == ["import numpy", *3 * ["OpenGL context"], *2 * ["a still body"]]
-    assert len(commands) == 3 * 6  # a first round and two that count
+    assert len(commands) == 3 * 6  # a warm-up round and two measured ones
 
 
-def test_relative_figures_name_what_they_are_relative_to() -> None:
+def test_relative_times_name_their_reference() -> None:
     assert str(Measured("a", 2.0)).split() == ["a", "2.00", "ms"]
     assert str(Measured("a", 2.0, 1.5, "b")).split() == ["a", "2.00", "ms", "1.50", "times", "b"]
 

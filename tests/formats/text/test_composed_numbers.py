@@ -64,8 +64,9 @@ def test_fixed_decimals_are_those_of_the_decimal_number(decimals):
 
 def test_fixed_decimals_out_of_range_are_those_of_the_f_format():
     values = [1e15, -1e22, 1e300, 123456789012345678.0, 0.25, -0.0, -1e-9]
-    found = texts(values, lambda part: fixed(part, 1))
-    assert found == [f"{np.round(value, 1) + 0.0:.1f}" for value in values]
+    values += [1.5, math.nan, math.inf, 2.5, -math.inf]
+    found = texts(values, lambda part: fixed(part, 6))
+    assert found == [f"{np.round(value, 6) + 0.0:.6f}" for value in values]
 
 
 def test_integers_of_up_to_16_digits():

@@ -1,4 +1,4 @@
-"""Joint map files: names with any characters come back, and invalid lines are located."""
+"""Joint map files: round trip of names with any characters, and locations of invalid lines."""
 
 from __future__ import annotations
 

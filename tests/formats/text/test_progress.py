@@ -22,7 +22,7 @@ def large_files(tmp_path_factory):
 
 
 @pytest.mark.parametrize(("reader", "size"), [(ply, 2), (obj, 3)])
-def test_reading_reports_megabytes_up_to_all(large_files, reader, size):
+def test_reading_reports_megabytes_up_to_the_total(large_files, reader, size):
     path = large_files / f"a.{reader.__name__.rpartition('.')[2]}"
     found = []
     with receiving(lambda *step: found.append(step)):
@@ -48,7 +48,7 @@ def test_reading_can_be_cancelled_at_any_part(large_files, reader):
     assert len(calls) == 6
 
 
-def test_cancelled_writing_keeps_the_old_file_alone(tmp_path):
+def test_cancelled_writing_leaves_only_the_old_file(tmp_path):
     def receive(done, total, unit, what):
         assert (total, unit, what) == (0, "MB", "writing a.txt")
         raise Cancelled

@@ -1,4 +1,4 @@
-"""Count of OpenGL objects that exist, asked of OpenGL itself."""
+"""Count of existing OpenGL objects, as reported by OpenGL itself."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ __all__ = ["gl_objects"]
 
 _KINDS = ("Buffer", "Texture", "VertexArray", "Framebuffer", "Renderbuffer", "Query")
 _PROGRAMS = ("Program", "Shader")
-_LARGEST = 1024  # names are given out from 1, the smallest free one first
+_LARGEST = 1024  # names are assigned from 1, the smallest free one first
 
 
 def gl_objects() -> Counter[str]:

@@ -1,4 +1,4 @@
-"""Buffers of closed figures and of refused uploads go back to the driver."""
+"""Buffers of closed figures and of failed uploads are freed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def scene(count: int) -> Scene:
     return Scene([*(Actor(figure) for _ in range(count)), Actor(Figure("ball", sphere(6)))])
 
 
-def test_figures_that_were_closed_leave_nothing(offscreen) -> None:
+def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
     found = []
     for _ in range(4):
         # One at a time, and nine as instances; every pose is new, every option makes buffers.
@@ -47,7 +47,7 @@ def test_figures_that_were_closed_leave_nothing(offscreen) -> None:
 
 
 @pytest.mark.parametrize("count", [1, 9])
-def test_a_refused_scene_leaves_nothing_and_the_old_one_as_it_was(
+def test_a_refused_scene_leaves_no_objects_and_the_old_one_unchanged(
     offscreen, monkeypatch, count
 ) -> None:
     old = Scene([Actor(arm(2))])
@@ -75,12 +75,12 @@ def test_a_refused_scene_leaves_nothing_and_the_old_one_as_it_was(
                 assert gl_objects() == before
             monkeypatch.undo()
         refused += 1
-    assert refused > 12  # mesh, skin, palette, texture and skeleton were each refused once
+    assert refused > 12  # mesh, skin, palette, texture and skeleton have each failed once
     np.testing.assert_array_equal(draw(offscreen, old, camera=front()), picture)
 
 
 def test_a_shape_that_does_not_fit_can_be_tried_again(offscreen, monkeypatch) -> None:
-    """The second of two buffers is refused: the first one is freed."""
+    """Allocating the second of two buffers fails: the first one is freed."""
     figure = arm(2)
     mesh = figure.require_mesh()
     opened = Scene([Actor(figure)])

@@ -1,4 +1,4 @@
-"""EGL devices of worker processes; machines with several graphics cards are made up."""
+"""EGL devices of worker processes, on simulated machines with several graphics cards."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ def opened(to=(0.0, 0.0, 1.0)) -> Mesh:
 
 
 def regions(offscreen, scene: Scene, camera: Camera):
-    """Return where back faces are drawn; None for everywhere."""
+    """Return the regions where back faces are drawn; None for everywhere."""
     with offscreen.context:
         mesh = offscreen.renderer.buffers.posed_mesh(scene.actors[0])
     view, projection = camera.view_matrix(), camera.projection_matrix(1.0, np.array([[-1], [1]]))
@@ -43,7 +43,7 @@ def regions(offscreen, scene: Scene, camera: Camera):
 
 
 def drawn_both_ways(offscreen, monkeypatch, scene: Scene, camera: Camera):
-    """Return the picture, where back faces were drawn, and the picture with all back faces."""
+    """Return the picture, the regions with back faces, and the picture with all back faces."""
     picture = draw(offscreen, scene, LIT, camera)
     where = regions(offscreen, scene, camera)
     monkeypatch.setattr(mesh_buffers, "shell_of", lambda *_: None)
@@ -53,7 +53,7 @@ def drawn_both_ways(offscreen, monkeypatch, scene: Scene, camera: Camera):
     return picture, where, whole
 
 
-def test_a_closed_surface_looks_the_same_without_them(offscreen, monkeypatch) -> None:
+def test_a_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch) -> None:
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), front())
     assert where == ()
     np.testing.assert_array_equal(picture, whole)
@@ -81,7 +81,7 @@ def test_a_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize("scale, is_hidden", [(0.5, True), (-0.5, True), (0.0, False)])
-def test_a_skin_has_one_side_while_no_joint_flattens_it(offscreen, scale, is_hidden) -> None:
+def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is_hidden) -> None:
     mesh = closed(8)
     skin = skin_from_lists([[(0, 1.0)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), skin))])
@@ -91,7 +91,7 @@ def test_a_skin_has_one_side_while_no_joint_flattens_it(offscreen, scale, is_hid
     assert (regions(offscreen, scene, front()) == ()) is is_hidden
 
 
-def test_negative_weights_may_lead_the_surface_anywhere(offscreen) -> None:
+def test_negative_weights_give_no_bound_so_all_back_faces_are_drawn(offscreen) -> None:
     mesh = closed(8)
     binding = skin_from_lists([[(0, 1.5), (0, -0.5)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), binding))])

@@ -37,7 +37,7 @@ def test_a_color_fills_the_image_exactly(offscreen, background, color) -> None:
         assert (picture == color).all()
 
 
-def test_a_frame_leaves_nothing_of_the_last_one(offscreen) -> None:
+def test_a_frame_keeps_nothing_of_the_previous_one(offscreen) -> None:
     options = plain(background="gradient")
     empty = draw(offscreen, EMPTY, options)
     draw(offscreen, scene_of(sphere(8)), options, front())

@@ -1,4 +1,4 @@
-"""Products of rotations about axes, compared with one multiplication after the other."""
+"""Products of rotations about axes, compared with multiplying them one by one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rig.geometry.rotation import axis_rotations
 
 
 @pytest.mark.parametrize("shape", [(), (2, 3)])
-def test_products_are_those_of_one_rotation_after_the_other(shape) -> None:
+def test_products_equal_those_multiplied_one_by_one(shape) -> None:
     rng = np.random.default_rng(0)
     # Joints 0 and 3 have three rotations, 1 has none, 2 has five; the DOFs alternate.
     joints = np.array([2, 0, 3, 2, 2, 0, 3, 2, 0, 2, 3], dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Closed surfaces: which meshes hide their inside, and where they are open."""
+"""Closed surfaces: which meshes are closed, and where their openings are."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def cube(triangles=TRIANGLES, positions=CORNERS) -> Mesh:
 
 
 def fine_cube(n=8) -> Mesh:
-    """Return a cube whose sides have n x n cells each, with vertices of their own."""
+    """Return a cube whose sides have n x n cells each, without shared vertices."""
     steps = np.linspace(0.0, 1.0, n + 1)
     u, v = (grid.ravel()[:, None] for grid in np.meshgrid(steps, steps, indexing="ij"))
     points, triangles = [], []
@@ -50,11 +50,11 @@ def test_a_cube_is_closed() -> None:
     ],
     ids=["inwards", "inconsistent", "three at an edge", "open", "empty"],
 )
-def test_other_meshes_are_not(triangles) -> None:
+def test_other_meshes_are_not_closed(triangles) -> None:
     assert shell_of(cube(triangles), None) is None
 
 
-def test_a_part_that_faces_inwards_spoils_the_whole() -> None:
+def test_a_mesh_with_an_inward_facing_part_is_not_closed() -> None:
     both = np.concatenate([TRIANGLES, TRIANGLES[:, ::-1] + 8])
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is None
     both[12:] = TRIANGLES + 8

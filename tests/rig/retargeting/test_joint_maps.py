@@ -23,7 +23,7 @@ SNAKE = {"base": ("", (0, 0, 0)), "mid": ("base", (0, 0, 1)), "tip": ("mid", (0,
 
 
 def matched(drive, figure=BODY_FIGURE):
-    """Return the source's joint and the origin of each joint of a figure."""
+    """Return the source joint and the origin of the match for each joint of a figure."""
     found, names = matches_of(drive, figure), drive.motion.figure.skeleton.names
     return {
         name: (names[partner] if partner >= 0 else "", origin)
@@ -91,7 +91,7 @@ def test_origins_name_how_joints_were_matched():
         ((("pelvis", "Hips"), ("left_knee", "tail")), 4, "F004.mapping-joints"),
     ],
 )
-def test_faults_of_a_map_are_located(pairs, line, key):
+def test_errors_in_a_map_are_located(pairs, line, key):
     table = {**HIK, "a": ("Hips", (0, 0, 1)), "b": ("a", (0, 0, 2))}
     figure = figure_of(table, "mocap")
     names = tuple({"a": "tail", "b": "tail"}.get(name, name) for name in table)

@@ -1,4 +1,4 @@
-"""Legs of animals, found by the shape of the skeleton, and paws that stand."""
+"""Legs of animals, found from the shape of the skeleton, and planted paws."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def test_the_legs_of_the_fox_begin_below_the_scapula():
 
 
 @pytest.mark.parametrize("table", [BODY, HIK])
-def test_people_have_no_legs_of_animals(table):
+def test_people_have_no_animal_legs(table):
     assert legs(figure_of(table, "person")) == []
 
 
-def test_toes_share_a_leg_and_a_tail_on_the_ground_is_none():
+def test_toes_share_a_leg_and_a_tail_on_the_ground_is_not_a_leg():
     table = animal()
     for paw in PAWS:
         place = np.array(table[f"{paw}_toe"][1])
@@ -58,7 +58,7 @@ def test_toes_share_a_leg_and_a_tail_on_the_ground_is_none():
     assert len(legs(lying, np.array([0.0, 0.0, 1.0]))) == 4
 
 
-def test_three_legs_and_points_are_no_animal():
+def test_three_legs_or_points_are_not_an_animal():
     table = {name: row for name, row in animal().items() if not name.startswith("fore_r")}
     assert legs(figure_of(table, "three")) == []
     assert animal_legs(np.array([-1, 0], dtype=np.int32), np.zeros((2, 3)), UP) == []

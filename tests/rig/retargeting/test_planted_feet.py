@@ -1,4 +1,4 @@
-"""Feet of driven figures, kept where those of the source stand."""
+"""Feet of driven figures, planted while those of the source stand."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def person(thigh: float, shin: float, foot: float, hips: float) -> Figure:
         bone(f"{side}Leg", f"{side}UpLeg", thigh)
         bone(f"{side}Foot", f"{side}Leg", shin)
         bone(f"{side}ToeBase", f"{side}Foot", foot)
-    names = {name: f"{name}_" for name in table}  # another hierarchy: joints match by meaning
+    names = {name: f"{name}_" for name in table}  # another hierarchy: joints are matched by meaning
     return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
 
 
@@ -142,15 +142,21 @@ def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
         assert_allclose(found[name], upright[name] @ over.T, atol=1e-9)
 
 
-def test_a_root_with_a_scale_is_understood() -> None:
-    skeleton = OTHER.skeleton
+def test_a_root_with_a_scale_is_supported() -> None:
+    table = dict(
+        zip(OTHER.skeleton.names, zip(parents(OTHER), rest_joints(OTHER), strict=True), strict=True)
+    )
+    for toe in TOES:  # the balls are above the soles
+        table[f"{toe}tip"] = toe, table[toe][1] + [0.0, -4.0, 4.0]
+    large = figure_of(table, "tips")
+    skeleton = large.skeleton
     moved, scales = skeleton.rest_translations.copy(), skeleton.rest_scales.copy()
     moved[0] *= 0.01
     scales[0] = 0.01
-    small = replace(skeleton, rest_translations=moved, rest_scales=scales)
-    figure = replace(OTHER, skeleton=small)
-    first, second = places(OTHER, planted()[1]), places(figure, planted(figure)[1])
+    figure = replace(large, skeleton=replace(skeleton, rest_translations=moved, rest_scales=scales))
+    first, second = places(large, planted(large)[1]), places(figure, planted(figure)[1])
     for name in TOES:
+        assert_allclose(first[name][stands(name[:-8])].min(axis=0)[1], 4.0, atol=EXACT)
         assert_allclose(100.0 * second[name], first[name], atol=1e-9)
 
 
@@ -160,7 +166,7 @@ def test_a_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
     assert changes is None and clip is found.clip
 
 
-def test_a_source_that_never_stands_is_left_alone() -> None:
+def test_feet_of_a_source_that_never_stands_are_unchanged() -> None:
     rotations, path = walk()
     path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s, as on a bicycle
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
@@ -181,13 +187,13 @@ def test_a_foot_held_still_in_the_air_does_not_stand() -> None:
     clip, changes = plant_feet(found, OTHER)
     old, new = places(OTHER, found.clip), places(OTHER, clip)
     assert changes.n_contacts == 1
-    # It follows the body, apart from the lowering for the other leg, which is straight.
+    # It follows the body, except that the body is lowered for the other, straight leg.
     away = (new["RightToeBase_"] - old["RightToeBase_"]) - (new["Hips_"] - old["Hips_"])
     assert_allclose(away[:, [0, 2]], 0.0, atol=1e-9)
     assert away[:, 1].min() > -1e-9 and away[:, 1].max() < changes.lowered + 1e-9
 
 
-def test_motions_of_two_frames_and_with_gaps_are_understood() -> None:
+def test_motions_of_two_frames_and_with_gaps_are_supported() -> None:
     motion = written(t_pose(), *walk(), rate=RATE)
     rows = np.arange(N_WALK)
     rows[100:110] = -1
@@ -203,7 +209,7 @@ def test_motions_of_two_frames_and_with_gaps_are_understood() -> None:
 def test_an_upside_down_world_gives_the_same_feet() -> None:
     rotations, path = walk()
     over = axis_rotations(0, np.asarray(np.pi))
-    # The hips rest at a height of 100, from where their path is measured.
+    # The hips rest at a height of 100, the origin of their path.
     moved = (path + 100.0 * Y) @ over.T - 100.0 * Y
     motion = written(t_pose(), over @ rotations, moved, rate=RATE)
     straight, _ = driven_clip(Drive(written(t_pose(), rotations, path, rate=RATE)), OTHER)

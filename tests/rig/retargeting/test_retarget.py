@@ -192,6 +192,22 @@ def test_the_path_is_scaled_by_leg_length() -> None:
     assert clip.figure_translations is None
 
 
+def test_a_path_in_another_unit_than_the_skeleton_is_scaled_by_leg_length() -> None:
+    source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
+    count, ahead = source.clip.n_rows, np.array([0.0, 0.0, 3.0])
+    metres = replace(
+        source.clip,
+        figure_scales=np.full(count, 0.01),
+        figure_translations=np.tile(ahead, (count, 1)),
+    )
+    clip, notes = retarget(replace(source, clip=metres), figure)
+    plain, moved = places(figure, retarget(source, figure)[0]), places(figure, clip)
+    scale = told(notes)[-1][1]["scale"]
+    assert scale == pytest.approx(100.0 * path_scale())
+    for name, place in plain.items():
+        np.testing.assert_allclose(moved[name], place + scale * ahead, atol=1e-12)
+
+
 def test_a_skinned_figure_moves_as_a_whole() -> None:
     source, bare = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     corners = np.eye(3)

@@ -1,4 +1,4 @@
-"""Animals of other proportions, and a trot whose paws stand exactly, by plane trigonometry."""
+"""Animals of different proportions, and a trot with exactly planted paws, by trigonometry."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing
 
 N_TROT = 160
-STRIDE = 0.2  # metres in 80 frames, of which a paw stands for 45
+STRIDE = 0.2  # metres in 80 frames; each paw stands for 45 of them
 LIFT = 0.04
 PAWS = ("hind_l", "hind_r", "fore_l", "fore_r")
 DIAGONAL = ("hind_l", "fore_r")

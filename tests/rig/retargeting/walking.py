@@ -1,7 +1,7 @@
-"""A walk whose feet stand exactly, built from the paths of the ankles by plane trigonometry.
+"""A walk with exactly planted feet, built from the paths of the ankles by trigonometry.
 
-The person is that of ``rest_twins``. A foot stands for 60 of 100 frames, with the sole on the
-ground, and swings to the next place in the others. Hips, knees and ankles rotate about x only.
+The person is that of ``rest_twins``. Each foot stands for 60 of 100 frames, with the sole on the
+ground, and swings to the next position in the others. Hips, knees and ankles rotate about x only.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def ankle_path(side: str, lift: float = 12.0) -> np.ndarray:
 def plane_angles(
     joints: tuple[np.ndarray, np.ndarray, np.ndarray], away: np.ndarray, front: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far thigh and shin rotate towards +z, radians, by the law of cosines.
+    """Return the rotations of thigh and shin towards +z, radians, by the law of cosines.
 
     ``joints``: hip, knee and ankle at rest, z and y. ``away``: from the hip to the ankle, (N, 2).
     ``front``: 1 if the knee bends forwards, -1 backwards.

@@ -59,7 +59,7 @@ def no_panel(state: AppState, needs: str) -> str:
 
 
 def no_drive(state: AppState) -> str:
-    """Return why the chosen actor has no match of joints."""
+    """Return why the chosen actor has no joint match."""
     actor = state.actor
     if actor.drive is not None and isinstance(actor.clip, SampledClip):
         return ""

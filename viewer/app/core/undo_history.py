@@ -267,7 +267,7 @@ class History:
 
 
 def _extended(look: Look, actor: Actor | None) -> Look:
-    """Return an earlier step's look with the clip and drive that have grown since then."""
+    """Return the state of an earlier step with the clip and drive that have grown since then."""
     if actor is None:
         return look
     # Joints cannot be matched by hand while the motion grows.

@@ -28,13 +28,13 @@ __all__ = [
 
 Color = tuple[float, float, float, float]
 
-# Least difference of values that fitted axes magnify to the height of the plot. Rotations and
+# Smallest value range that fitted axes magnify to the height of the plot. Rotations and
 # positions in single precision, as files store them, are rounded to far smaller steps.
 _LEAST_ANGLE = math.radians(0.1)
 _LEAST_LENGTH = 5e-4  # relative to the size of the scene
 _LEAST = 1e-3  # scales and weights
 _LEAST_RELATIVE = 1e-5  # relative to the values themselves
-_CONSTANT = 0.02  # of the least difference: smaller ones are drawn as constants
+_CONSTANT = 0.02  # of the smallest range: smaller changes are drawn as constants
 _MARGIN = 0.16  # above and below the curves, relative to their height
 
 _COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
@@ -106,7 +106,7 @@ def curve_color(view: Curves, curves: tuple[Curve, ...], row: int) -> Color:
 
 
 def least_height(state: AppState, curves: Sequence[Curve]) -> float:
-    """Return the least height of fitted axes for some curves, in the displayed units."""
+    """Return the minimum height of fitted axes for some curves, in the displayed units."""
     low, high = state.box
     length = _LEAST_LENGTH * float(np.linalg.norm(high - low))
     return max(
@@ -132,7 +132,7 @@ def value_limits(values: Floats, least: float) -> tuple[float, float]:
     values : (N,)
         Values; those that are not finite are ignored.
     least : float
-        Least height of the axis, so that rounding errors do not look like a motion.
+        Minimum height of the axis, so that rounding errors do not look like motion.
 
     >>> value_limits(np.array([0.0, 100.0]), 0.1), value_limits(np.array([30.0, 30.0]), 0.1)
     ((-16.0, 116.0), (15.0, 45.0))

@@ -141,7 +141,7 @@ class FileDialog:
 
 
 def single_suffix(name: str) -> str:
-    """Return a file name without a repetition of its suffix, as typing before the suffix adds.
+    """Return a file name without a repeated suffix, as results from typing before the suffix.
 
     >>> single_suffix("ada.mp4.mp4"), single_suffix("ada.v2.mp4"), single_suffix(".obj")
     ('ada.mp4', 'ada.v2.mp4', '.obj')

@@ -73,7 +73,7 @@ def _draw_content(state: AppState, dialog: FileDialog) -> list[Path]:
 
 
 def _draw_path(state: AppState, dialog: FileDialog) -> Path | None:
-    """Draw the field of the path; return the file whose path was entered."""
+    """Draw the path field; return the file whose path was entered."""
     imgui.set_next_item_width(-1.0)
     if imgui.is_window_appearing() and dialog.purpose != "save":
         imgui.set_keyboard_focus_here()
@@ -126,7 +126,7 @@ def _draw_name(state: AppState, dialog: FileDialog) -> bool:
 
 
 def _close_on_escape(state: AppState) -> None:
-    """Close the dialog if Escape was pressed in the last field, which had nothing to restore."""
+    """Close the dialog if Escape was pressed in the last field and it had no edit to revert."""
     is_left = imgui.is_item_deactivated() and not imgui.is_item_deactivated_after_edit()
     if is_left and imgui.is_key_pressed(imgui.Key.escape, False):
         state.of(Files).dialog = None

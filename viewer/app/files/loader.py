@@ -136,7 +136,7 @@ class Loader:
         return self._progress
 
     def cancel(self) -> None:
-        """End reading at the next part of a file."""
+        """Stop reading at the next part of a file."""
         self._is_cancelled = True
 
     @property

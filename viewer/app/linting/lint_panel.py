@@ -102,7 +102,7 @@ def _draw_buttons(state: AppState, known: Checked | None) -> None:
 
 def _draw_limits(state: AppState) -> None:
     """Draw the limits that depend on the user's intent."""
-    # Fields fill the window, so that it would shrink with them.
+    # Fields fill the width of the window, which would otherwise shrink with them.
     imgui.set_next_window_size((_LIMITS_WIDTH * imgui.get_font_size(), 0.0))
     if not imgui.begin_popup("lint limits"):
         return

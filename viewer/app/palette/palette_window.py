@@ -113,7 +113,7 @@ def _draw_content(state: AppState, palette: Palette) -> Entry | None:
 
 
 def _keep_early_letters(palette: Palette, letters: str) -> None:
-    """Add letters that were typed before the text box takes them, as on a slow machine."""
+    """Add letters typed before the text box accepts input, as happens on a slow machine."""
     palette.query += letters
     editing = imgui.internal.get_input_text_state(imgui.get_item_id())
     if imgui.is_item_activated() and editing is not None:

@@ -32,7 +32,7 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
-    # Not MALLOC_TRIM_THRESHOLD_: arrays would fault in again the memory that others returned.
+    # Omits Dask's MALLOC_TRIM_THRESHOLD_, which returns freed memory: new arrays would page-fault.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
     # These poll the workers many times a second, which takes a tenth or more of the time of short
     # items.

@@ -207,7 +207,7 @@ class _Flight:
         if isinstance(problem, ModuleNotFoundError) and (problem.name or "").startswith("viewer"):
             raise ViewerError(
                 f"--cluster: a worker has no viewer {VERSION} ({printable(problem)}): "
-                "install the same version for the Python of all workers"
+                "install the same version in the environment of all workers"
             )
         reason = printable(f"{type(problem).__name__}: {problem}", 2000)
         return Result(item, "failed", 1, message=reason)
@@ -239,7 +239,7 @@ def _number(key: str) -> int:
 
 
 def _lost() -> ViewerError:
-    return ViewerError("--cluster: the connection to the scheduler was lost; --resume goes on")
+    return ViewerError("--cluster: the scheduler disconnected; use --resume to continue")
 
 
 def _other_version(answer: OtherVersion) -> ViewerError:

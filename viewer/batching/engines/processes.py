@@ -92,12 +92,12 @@ class _Attempt:
 
 
 class _Worker(SpawnProcess):
-    """A worker process, which is not started any more when its pool is closing."""
+    """A worker process that refuses to start while its pool is closing."""
 
     owner: _Context | None = None
 
     def start(self) -> None:
-        """Start it; raise OSError, which ends the thread of a pool, if that is closing."""
+        """Start the process; raise OSError if the pool is closing, which ends the pool's thread."""
         owner, self.owner = self.owner, None  # it is sent to the new process
         if owner is None:
             super().start()
@@ -131,7 +131,7 @@ class _Context(SpawnContext):
         return worker
 
     def end_workers(self) -> None:
-        """End all workers, and start none until ``is_closing`` is reset."""
+        """Terminate all workers, and start none until ``is_closing`` is reset."""
         with self.lock:
             self.is_closing = True
             for worker in self.workers:
@@ -219,7 +219,7 @@ class _Workers:
         """Return the result of an item whose worker has ended."""
         if code == _NO_MEMORY:
             limit = f"{(self.limits.memory or 0) / (1 << 20):,.0f} MiB"
-            return Result(item, "memory", 2, message=f"more memory needed than {limit}")
+            return Result(item, "memory", 2, message=f"needed more memory than {limit}")
         is_ended = code in (-signal.SIGTERM, signal.SIGTERM, 128 + signal.SIGTERM)
         if is_ended and self.stops():
             return Result(item, "cancelled", 2, message="the worker process was terminated")
@@ -232,7 +232,7 @@ class _Workers:
         self._n_breaks += 1
         if self._n_breaks >= _MOST_BREAKS:
             raise ViewerError(
-                "the worker processes end before they do anything; a script that calls "
+                "the worker processes exit before they run any item; a script that calls "
                 'viewer.batch needs the line if __name__ == "__main__": before its own work, and '
                 "a function typed into an interpreter or notebook needs workers=0"
             )
@@ -288,8 +288,8 @@ def _end_of(code: int | None) -> str:
     """Return how a process ended, for a message."""
     if code is not None and code < 0:
         name = signal.Signals(-code).name if -code in signal.valid_signals() else str(-code)
-        often = ", as the system does if memory runs out" if -code == signal.SIGKILL else ""
-        return f"was ended by {name}{often}"
+        often = ", probably because the system ran out of memory" if -code == signal.SIGKILL else ""
+        return f"was killed by {name}{often}"
     return f"exited with {code}"
 
 

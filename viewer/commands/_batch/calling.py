@@ -198,13 +198,13 @@ _OWN = (
     *("files", "output", "force", "report", "resume", "shard", "workers", "cluster", "retries"),
     *("timeout", "limit_memory", "from_list", "table", "overview"),
 )
-"""Arguments that are parameters of ``batch``; among the options, they would have no effect."""
+"""Arguments that are parameters of ``batch``; in ``options``, they would have no effect."""
 
 
 def _check_options(parser: Parser, job: str, options: Sequence[str]) -> None:
-    """Raise ViewerError if options contain something that ``batch`` has a parameter for."""
+    """Raise ViewerError if options contain an argument for which ``batch`` has a parameter."""
     if isinstance(options, str):
-        raise ViewerError(f"options: expected a list of texts, found the text {printable(options)}")
+        raise ViewerError(f"options: expected a list of strings, found {printable(options)}")
     parser.check_options([job, *options])
     given = vars(parser.parse_intermixed_args([job, *options]))
     for name in _OWN:

@@ -1,4 +1,4 @@
-"""Identity of functions, by which ``resume`` recognises that a job has not changed."""
+"""Identity of functions, by which ``resume`` detects whether a job has changed."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["identity_of"]
 
 
 def identity_of(function: Callable[..., Any]) -> str:
-    """Return a text that is equal in all processes, and differs if the function has changed.
+    """Return a text that is the same in all processes, and changes if the function does.
 
     It covers code, defaults, bound arguments, variables of enclosing functions and the program's
     version, but not the code of other functions that it calls.
@@ -28,7 +28,7 @@ def identity_of(function: Callable[..., Any]) -> str:
 
 def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
     yield VERSION.encode()
-    if id(value) in seen:  # a function that calls itself
+    if id(value) in seen:  # a recursive function
         return
     seen.add(id(value))
     if isinstance(value, partial):
@@ -52,11 +52,11 @@ def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
 
 def _code_parts(code: CodeType) -> Iterator[bytes]:
     yield code.co_code
-    yield repr(code.co_names).encode()  # which functions and attributes are used
+    yield repr(code.co_names).encode()  # names of the functions and attributes used
     for one in code.co_consts:
-        if isinstance(one, CodeType):  # its text contains an address
+        if isinstance(one, CodeType):  # its repr contains an address
             yield from _code_parts(one)
-        else:  # sets of texts have another order in each process
+        else:  # the order of sets of str varies between processes
             yield repr(sorted(map(repr, one)) if isinstance(one, frozenset) else one).encode()
 
 
@@ -69,7 +69,7 @@ def _is_set(cell: CellType) -> bool:
 
 
 def _pickled(value: Any) -> bytes:
-    """Return a pickle; the name of the type if there is none."""
+    """Return a pickle, or the name of the type if pickling fails."""
     try:
         return pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError):

@@ -88,7 +88,7 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
 
 
 def name_in_shard(path: str, shard: str) -> str:
-    """Return the name of a file for one shard, so that no shard replaces that of another.
+    """Return the name of one shard's file, so that shards do not replace each other's files.
 
     ``shard``: ``I/N``; empty for the whole batch.
 

@@ -105,7 +105,9 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
     """Return all complete frames: (N, C)."""
     data = source.data
     source.remember("frames", lambda row: source.number_offset(start, len(data), row * width))
-    values, bad = parse_numbers(data, start, len(data))
+    # Motions are usually read once, and exported ones are read back: caching would only waste
+    # space.
+    values, bad = parse_numbers(data, start, len(data), is_kept=False)
     whole, rest = divmod(len(values), width)
     is_whole = bad < 0 and rest == 0 and whole > 0
     if is_whole and (declared is None or whole == declared):

@@ -101,7 +101,8 @@ def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
 
     None if a corner is invalid.
     """
-    values, bad = parse_numbers(rows.body.replace(b"/", b" "), 0, len(rows.body))
+    text = rows.body.replace(b"/", b" ")
+    values, bad = parse_numbers(text, 0, len(text), is_kept=False)
     if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index, and means "missing" below
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)

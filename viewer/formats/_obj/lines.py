@@ -182,7 +182,7 @@ def number_rows(lines: Lines, keyword: str, width: int) -> NumberRows | None:
     """
     rows = rows_of(lines, keyword)
     begins = word_begins(rows.letters)
-    values, bad = parse_numbers(rows.body, 0, len(rows.body))
+    values, bad = parse_numbers(rows.body, 0, len(rows.body), is_kept=False)
     if bad >= 0:
         return None
     firsts = np.searchsorted(begins, rows.starts)

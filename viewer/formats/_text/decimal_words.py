@@ -1,8 +1,9 @@
-"""Values of decimal words, in numpy.
+"""Vectorised parsing of decimal numbers with numpy.
 
-The digits of a word are an integer w, and its value is w * 10^q. If w and 10^|q| are exact in
-float64, their quotient is the correctly rounded value (Clinger 1990). Otherwise the product is
-computed to about 100 bits; if its error could change the rounding, the word is left to ``float()``.
+A word is the text of one number. Its digits form an integer w, and its value is w * 10^q. If w and
+10^|q| are exact in float64, their product or quotient is the correctly rounded value (Clinger
+1990). Otherwise the product is computed to about 100 bits; if its error could change the rounding,
+the word is left to ``float()``.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ _U = np.uint64
 _DOT = ord(".")
 _DOTS = _U(0x2E2E2E2E2E2E2E2E)
 _ZERO = _U(0x30)
-_MOST_DIGITS = 24  # characters before or after the point that are read
+_MOST_DIGITS = 24  # characters read before or after the decimal point
 _HIGHEST = 1843  # upper digits of a 64-bit integer of 20 digits
 _LARGEST = 1.8e19  # below 2^64
 _EXACT = _U(1 << 53)
@@ -42,7 +43,7 @@ _FEW = 0.25  # fraction of words that are evaluated separately
 def parse_short(
     aligned: Words, ends: Indices, lengths: Indices, has_dots: bool
 ) -> tuple[Floats, Bools]:
-    """Parse unsigned words of at most 8 characters; results of longer ones must be replaced.
+    """Parse unsigned words of at most 8 characters; results for longer ones must be replaced.
 
     Parameters
     ----------
@@ -112,7 +113,7 @@ def parse_exponentials(
 
 
 def _first_within(places: Indices, starts: Indices, ends: Indices) -> Indices:
-    """Return the first of some ascending places within each word; its end if there is none."""
+    """Return the first of some ascending offsets within each word; its end if there is none."""
     if len(places) == 0:
         return ends
     if len(places) == len(ends) and (places >= starts).all() and (places < ends).all():
@@ -124,7 +125,7 @@ def _first_within(places: Indices, starts: Indices, ends: Indices) -> Indices:
 def _mantissas(
     letters: NDArray[np.uint8], aligned: Words, starts: Indices, ends: Indices
 ) -> tuple[Words, Indices, Bools]:
-    """Return digits as integers below 2^64, the number of decimals, and words for which they fail.
+    """Return digits as integers below 2^64, numbers of decimals, and words that cannot be parsed.
 
     If a word has several points, the second is rejected as a digit.
     """
@@ -140,7 +141,7 @@ def _mantissas(
 
 
 def _digits(aligned: Words, ends: Indices, lengths: Indices) -> tuple[Words, Bools]:
-    """Evaluate the characters before offsets; also return those that are not digits, or too many.
+    """Evaluate the digits before offsets; also return words with non-digits or too many digits.
 
     The integers are below 2^64.
     """

@@ -1,7 +1,7 @@
-"""Decimal digits of arrays of numbers, with the same texts as Python's formats.
+"""Decimal digits of arrays of numbers, identical to the output of Python's formatting.
 
-Numbers are scaled to integers, to about 100 bits. The few whose rounding the error of the scaled
-number could change, and those out of range, are formatted by Python, one by one.
+Numbers are scaled to integers, to about 100 bits. The few numbers whose rounding could be affected
+by the scaling error, and those out of range, are formatted by Python, one by one.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ def fixed(values: Floats, decimals: int) -> Digits:
         scaled = np.where(is_odd, 0.0, scaled)
     numbers = np.abs(scaled).astype(np.uint64)
     whole = numbers // _TENS[decimals]
-    count = np.full(len(values), decimals)
+    # Texts formatted by Python include the decimal point, if any: NaN and infinity have none.
+    count = np.where(is_odd, 0, decimals)
     odd = _texts(values, is_odd, lambda value: f"{np.round(value, decimals) + 0.0:.{decimals}f}")
     return Digits(scaled < 0.0, whole, numbers - whole * _TENS[decimals], count, None, odd)
 
@@ -71,10 +72,10 @@ def significant(values: Floats, count: int) -> Digits:
 
 
 def shortest(values: Floats) -> Digits:
-    """Return the digits of ``repr(value)``, the shortest that give the same float: (N,).
+    """Return the digits of ``repr(value)``, the shortest that round-trip: (N,).
 
-    Candidates are the nearest multiples of 100, 10 and 1, if the number is scaled to 17 digits. The
-    first that is nearer than half an ulp, 0.5 to 11.1, is the result.
+    The number is scaled to 17 digits; candidates are the nearest multiples of 100, 10 and 1. The
+    first candidate within half an ulp, 0.5 to 11.1, is the result.
     """
     positive, is_odd, exponents = _magnitudes(values)
     total, rest = times_power(positive, None, 16 - exponents)
@@ -88,11 +89,11 @@ def shortest(values: Floats) -> Digits:
     numbers = np.where(
         is_short, by_hundred, np.where(is_medium, by_ten, numbers + ones.astype(np.int64))
     )
-    # Whether the limits themselves give the same float depends on its last bit.
+    # Whether the limits themselves round to the same float depends on its last bit.
     doubtful = (np.abs(distance - half) < _NEAR) | (np.abs(farther - half) < _NEAR)
     doubtful |= is_medium & (np.abs(farther - 5.0) < _NEAR)
     doubtful |= ~is_medium & (np.abs(np.abs(rest - ones) - 0.5) < _NEAR)
-    # Below a power of two, floats are twice as dense.
+    # Below a power of two, floats are twice as dense as above.
     doubtful |= (positive.view(np.uint64) & _MANTISSA) == 0
     is_odd |= doubtful & (distance != 0.0)
     found = np.where(is_odd | (values == 0.0), 0, numbers).view(np.uint64)

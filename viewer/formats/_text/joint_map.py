@@ -31,7 +31,7 @@ _LINE = re.compile(rf"\s*({_NAME})\s*=\s*({_NAME})?(?:\s+#.*|\s*)")
 _COMMENT = re.compile(r"\s*(?:#.*)?")
 _PLAIN = re.compile(r'[^\s="#](?:[^\s="]|[ ](?=[^\s#="]))*')
 
-_LONGEST = 4096  # characters of a line; matching takes quadratic time
+_LONGEST = 4096  # maximum characters of a line; matching takes quadratic time
 
 
 def read_joint_map(source: Source) -> JointMap:

@@ -16,7 +16,7 @@ _LINE_END = re.compile(rb"[\r\n]")
 
 
 def line_sizes(data: bytes, start: int) -> NDArray[np.int32]:
-    r"""Return the number of words in each line that has any, from an offset to the end: (L,).
+    r"""Return the number of words in each non-blank line, from an offset to the end: (L,).
 
     >>> line_sizes(b"1 2\r\n\n3", 0).tolist()
     [2, 1]

@@ -1,4 +1,4 @@
-"""Text of many numbers at once, composed from their digits in numpy.
+"""Vectorised formatting of many numbers, composed from their digits with numpy.
 
 Eight digits are written at a time, right-aligned, with leading zeros. These zeros overwrite the end
 of the previous number, so numbers are written from the last to the first.
@@ -53,7 +53,7 @@ class Digits:
     odd: dict[int, bytes] = field(default_factory=dict)
 
     def put(self, other: Digits, places: Indices) -> None:
-        """Replace the digits of the numbers at some places by those of other numbers."""
+        """Replace the digits of the numbers at some indices by those of other numbers."""
         for name in ("minus", "whole", "fraction", "decimals"):
             getattr(self, name)[places] = getattr(other, name)
         if other.tails is not None:

@@ -1,7 +1,7 @@
 """Products of integers or floats and powers of ten, to about 100 bits.
 
-A power of ten is the sum of two floats, and so is a product (Dekker 1971). Its relative error is
-below ``ERROR``, so that a result that is not within that distance of a tie is correctly rounded.
+Powers of ten and products are represented as sums of two floats (Dekker 1971). The relative error
+is below ``ERROR``, so a result farther than that from a tie is correctly rounded.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def times_power(
     half = values * _SPLIT
     half -= half - values
     rest = values - half
-    # The exact error of the product, as no product of two halves is rounded.
+    # The exact error of the product, because no product of two halves is rounded.
     error = half * upper - product
     error += half * lower
     error += rest * upper

@@ -43,12 +43,12 @@ _KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], d
 
 
 def padded(text: bytes) -> bytes:
-    """Return a text between spaces that ``words_before`` can read."""
+    """Return a text padded with spaces, so that ``words_before`` can read it."""
     return b" " * PAD + text + b" " * (16 - len(text) % 8)
 
 
 def words_before(aligned: Words, ends: Indices, count: int) -> list[Words]:
-    """Return eight characters before each offset, eight before these, and so on.
+    """Return the eight characters before each offset, the eight before these, and so on.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def words_before(aligned: Words, ends: Indices, count: int) -> list[Words]:
     count : int
         Number of words to return, 1 to 3.
     """
-    # Gathering aligned words and shifting them is faster than gathering at any address.
+    # Gathering aligned words and shifting them is faster than gathering unaligned words.
     first = (ends - 8) >> 3
     right = ((ends & 7) << 3).view(np.uint64)
     left = _U(63) - right
@@ -90,7 +90,7 @@ def letters_after(bits: Words) -> Indices:
 
 
 def close_gap(words: Words, bits: Words) -> Words:
-    """Remove a marked character: those before it move one place towards it.
+    """Remove a marked character: those before it move by one position towards it.
 
     The first character becomes a null byte.
     """

@@ -129,7 +129,7 @@ class ActorBuffers:
     def guard(self) -> Iterator[None]:
         """If the block fails, free the buffers that were created in it."""
         with ExitStack() as stack:
-            # The last is left first: posed meshes are freed before the meshes that they use.
+            # Items are freed in reverse order: posed meshes before the meshes that they use.
             for kept in (self.meshes, self._instanced, self.posed, self.skeletons):
                 stack.enter_context(kept.guard())
             yield

@@ -1,9 +1,9 @@
-"""Where the back faces of an actor's surface can be seen, so that hidden ones are not drawn.
+"""Visible regions of the back faces of an actor's surface, so that hidden ones are not drawn.
 
-Half the triangles of a closed surface face away from the eye, and those in front of them hide
-them. Drawing them takes almost half of a frame on software drivers, which shade hidden samples
-too. An open surface, or a camera inside the figure, shows them; small openings show them in the
-part of the image that they cover.
+Half the triangles of a closed surface face away from the eye and are hidden by the other half.
+Drawing them takes almost half of a frame on software drivers, which shade hidden samples too. They
+are visible if the surface is open or the camera is inside the figure; small openings reveal them
+only in the part of the image that the openings cover.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ __all__ = ["BackFaces", "Region"]
 Region = tuple[int, int, int, int]
 """Left, bottom, width and height in pixels, from the lower left corner."""
 
-_MARGIN = 2  # pixels around openings, for the rounding of the rasterizer
-_LARGEST = 0.25  # of the image: with larger openings, drawing twice gains nothing
+_MARGIN = 2  # margin in pixels around openings, for the rounding of the rasterizer
+_LARGEST = 0.25  # fraction of the image: with larger openings, a second draw gains nothing
 
 
 class BackFaces:
-    """The visible back faces of one actor.
+    """Visible back faces of one actor.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class BackFaces:
         self._around: tuple[Mesh, Skin] | None = None
 
     def update(self, figure: Figure, pose: Pose | None, how: Skinning) -> None:
-        """Adopt a pose.
+        """Update to a pose.
 
         Parameters
         ----------
@@ -125,7 +125,7 @@ class BackFaces:
 
 
 def _is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
-    """Return whether coincident vertices are still together before skinning."""
+    """Return whether coincident vertices still coincide before skinning."""
     if not len(shell.copies):
         return True
     corrected = how.correctives and figure.correctives is not None
@@ -133,7 +133,7 @@ def _is_together(shell: Shell, figure: Figure, how: Skinning) -> bool:
 
 
 def _has_one_side(figure: Figure, pose: Pose) -> bool:
-    """Return whether all joints reflect, or none does, and no joint flattens."""
+    """Return whether either all joints or none reflect, and no joint's matrix is singular."""
     palette = posed_skeleton(figure.require_skeleton(), pose).palette(figure.require_skin())
     volumes = np.linalg.det(palette[:, :3, :3])
     return bool((volumes > 0.0).all() or (volumes < 0.0).all())

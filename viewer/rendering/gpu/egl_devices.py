@@ -1,4 +1,4 @@
-"""EGL devices: which of them are graphics cards, and which one a worker process uses."""
+"""EGL devices: detection of graphics cards, and assignment to worker processes."""
 
 from __future__ import annotations
 
@@ -26,9 +26,9 @@ class EglDevice:
     index : int
         Index in EGL's list, as ``--gpu`` takes it.
     cuda : int or None
-        Index of the same graphics card in CUDA; None for other makers.
+        CUDA index of the same graphics card; None for other vendors.
     is_software : bool
-        Whether it renders on the processor.
+        Whether it renders on the CPU.
     """
 
     index: int
@@ -37,7 +37,7 @@ class EglDevice:
 
 
 def egl_devices() -> list[EglDevice]:
-    """Return the devices that EGL lists; none if there is no EGL or it has no such list."""
+    """Return the devices that EGL lists; none if EGL is missing or cannot list devices."""
     if not sys.platform.startswith("linux"):
         return []
     try:
@@ -78,8 +78,8 @@ def device_of_worker(
 ) -> int | None:
     """Return the EGL device that a worker process draws on.
 
-    The first device of ``CUDA_VISIBLE_DEVICES`` is used, which EGL itself ignores and schedulers
-    set for each job. Without it, workers take the graphics cards in turn.
+    The first device of ``CUDA_VISIBLE_DEVICES`` is used, which schedulers set for each job, but EGL
+    ignores. Without it, graphics cards are assigned to workers in turn.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def device_of_worker(
     entries = [entry.strip() for entry in visible.split(",") if entry.strip()]
     if entries and entries[0].isdecimal():
         known = [one for one in cards if one.cuda is not None]
-        # Where the driver counts only visible cards, it has no number for the others.
+        # Drivers that number only visible cards report no number for the others.
         is_relative = len(known) == len(entries) < len(cards)
         wanted = 0 if is_relative else int(entries[0])
         for card in known:

@@ -164,11 +164,11 @@ class MeshBuffers:
 
     @property
     def shell(self) -> Shell | None:
-        """The closed surface that the opaque mesh is; None if its back faces may be visible."""
+        """Closed surface of the opaque mesh; None if its back faces may be visible."""
         if self._shell is None:
             mesh, skin = self.figure.require_mesh(), self.figure.skin
             is_opaque = all(material.alpha_mode == "opaque" for material in mesh.materials)
-            # With negative weights, vertices leave the spheres that bound the surface.
+            # With negative weights, vertices may lie outside the bounding spheres.
             is_bounded = skin is None or not (skin.weights < 0.0).any()
             self._shell = (shell_of(mesh, skin) if is_opaque and is_bounded else None,)
         return self._shell[0]

@@ -1,7 +1,7 @@
-"""Fonts for text in pictures and panels: built in, or the system's for other scripts.
+"""Fonts for text in pictures and panels: built-in fonts, and system fonts for other scripts.
 
-Panels show Arabic and Hebrew letter by letter from left to right, because ImGui does not join or
-order letters; pictures do where Pillow has the Raqm library.
+Panels show Arabic and Hebrew letter by letter from left to right, because ImGui has no text shaping
+or bidirectional layout; pictures have both if Pillow has the Raqm library.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ _GROUPS = (
     ("NotoSansThai-Regular.ttf", "Loma.ttf", "LeelawUI.ttf"),
     ("DejaVuSans.ttf", "Arial Unicode.ttf", "FreeSans.ttf"),
 )
-_NOWHERE = "\uffff"  # not a character: every font draws its box for missing glyphs
+_NOWHERE = "\uffff"  # not a character, so every font draws its glyph for missing characters
 
 
 def interface_font() -> Path | None:
-    """Return the font of the panels, which has Latin, Greek and Cyrillic letters."""
-    # Pictures are also drawn where ImGui is not imported.
+    """Return the font of the panels, which contains Latin, Greek and Cyrillic letters."""
+    # Pictures are also drawn without importing ImGui.
     spec = find_spec("imgui_bundle")
     for folder in (spec.submodule_search_locations or ()) if spec is not None else ():
         path = Path(folder, "assets", "fonts", "DroidSans.ttf")
@@ -63,7 +63,7 @@ def interface_font() -> Path | None:
 
 
 def system_fonts() -> tuple[Path, ...]:
-    """Return the installed fonts for scripts that the built-in fonts lack, most useful first."""
+    """Return the installed fonts for scripts that the built-in fonts lack, most common first."""
     return _installed(tuple(_folders()))
 
 
@@ -95,9 +95,9 @@ def _installed(folders: tuple[Path, ...]) -> tuple[Path, ...]:
 
 
 class Typeface:
-    """Text of one size, each letter in the first font that has it, for pictures.
+    """Text of one size for pictures, with each letter in the first font that contains it.
 
-    Letters that no font has are written as escape sequences.
+    Letters that no font contains are written as escape sequences.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Typeface:
         draw : ImageDraw
             Draws on an image.
         place : (float, float)
-            Left end of the base line's ascender, pixels.
+            Upper left corner: left end of the text at the height of the ascender, pixels.
         text : str
             One line.
         fill : colour
@@ -143,7 +143,7 @@ class Typeface:
         """
         (x, top), base = place, self._fonts[0]
         for font, part in self._runs(text):
-            # All fonts share the base line of the first.
+            # All fonts share the baseline of the first.
             y = top if font is base else top + _ascent(base) - _ascent(font)
             draw.text((x, y), part, fill, font, stroke_width=rim)  # type: ignore[arg-type]
             x += font.getlength(part)
@@ -198,7 +198,7 @@ def _opened(letters: int) -> Iterator[Font]:
 
 
 def _glyph(font: Font, letter: str) -> tuple[object, bytes]:
-    """Return a key of a letter's picture: fonts draw all letters that they lack alike."""
+    """Return a key of a letter's picture: a font draws all missing letters alike."""
     mask = font.getmask(letter)
     return mask.size, bytes(mask)
 

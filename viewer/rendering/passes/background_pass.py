@@ -1,4 +1,4 @@
-"""Background of an image: a colour, or a gradient that is drawn once per size and then copied."""
+"""Background of an image: a colour, or a gradient that is drawn once per image size and copied."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class BackgroundPass:
         self._last_size = 0, 0
 
     def draw(self, target: Target, background: str) -> None:
-        """Clear depth and colours of a target, which must be bound.
+        """Clear the depth and colour of a target, which must be bound.
 
         Parameters
         ----------
@@ -84,7 +84,8 @@ class BackgroundPass:
         if self._picture is not None and self._picture.size != size:
             self._picture.release()
             self._picture = None
-        # The first image of a size is often the only one: a window is resized, a file is rendered.
+        # The first image of a size is often the only one, as while resizing or when rendering a
+        # file.
         if self._picture is None and size == self._last_size and size[0] * size[1] <= _MOST_PIXELS:
             self._picture = _Picture(self.context, self.programs, size)
             with self.context.scope(self._picture.framebuffer):
@@ -104,14 +105,14 @@ class BackgroundPass:
         self._gradient.render(moderngl.TRIANGLES, vertices=3)
 
     def release(self) -> None:
-        """Free vertex array and picture."""
+        """Free the vertex array and the stored image."""
         for item in (self._gradient, self._picture):
             if item is not None:
                 item.release()
 
 
 class _Picture:
-    """An image that is copied instead of being computed again."""
+    """A stored image that is copied instead of being drawn again."""
 
     def __init__(
         self, context: moderngl.Context, programs: Programs, size: tuple[int, int]
@@ -127,11 +128,11 @@ class _Picture:
             self._array = keep(context.vertex_array(program, []))
 
     def copy_to(self, target: Target) -> None:
-        """Replace the colours of a target of the same size, which is bound."""
+        """Replace the colours of a bound target of the same size."""
         if not target.samples:
             self.context.copy_framebuffer(target.framebuffer, self.framebuffer)
             return
-        # Drawing is faster than copying where software drivers have several samples per pixel.
+        # With several samples per pixel, drawing is faster than copying on software drivers.
         set_uniforms(self._array.program, {"u_texture": 0, "u_factor": 1.0})
         self._texture.use(0)
         self._array.render(moderngl.TRIANGLES, vertices=3)

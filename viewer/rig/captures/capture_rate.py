@@ -1,4 +1,4 @@
-"""Frame rate of a capture: requested, stated by its files, that of its video, or assumed."""
+"""Frame rate of a capture: requested, stored in its files, that of its video, or assumed."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ def capture_rate(requested: float | None, own: float | None, video: float | None
     Parameters
     ----------
     requested : float or None
-        What the user wants.
+        Rate requested by the user.
     own : float or None
         Rate of the files, or of the tool that wrote them.
     video : float or None

@@ -1,4 +1,4 @@
-"""Legs that bring the ankles of a moving body to their targets, smoothly over time."""
+"""Inverse kinematics of legs: ankles of a moving body reach their targets, smoothly over time."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ def leg_rotations(
     parents : (J,)
         -1 for a root.
     legs : sequence of Leg
-        The legs, the leftmost first and the rightmost last.
+        The legs, from left to right.
     drop : (N, 3)
         Translation of the whole body.
     shifts : sequence of (N, 3)
         Translation of each leg's ankle, instead of ``drop``.
     """
     result = rotations.copy()
-    # Knees bend about the axis from the right to the left.
+    # Knees bend about the axis from right to left.
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
     old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
     for leg, shift in zip(legs, shifts, strict=True):
@@ -64,7 +64,7 @@ def _reach_for(
     shift: Floats,
     across: Floats,
 ) -> None:
-    """Rotate a leg, in place, so that its ankle is at its old place plus a shift."""
+    """Rotate a leg in place so that its ankle is at its previous position plus a shift."""
     hips, knees, ankles = (world[:, j, :3, 3] + drop for j in (leg.hip, leg.knee, leg.ankle))
     moves = (shift - drop).any(axis=1)
     if not moves.any():
@@ -96,7 +96,7 @@ def lowering(
     up: Floats,
     extended: float = 1.0,
 ) -> Floats:
-    """Return how far the body must be lowered so that all ankles are in reach.
+    """Return how far the body must be lowered so that all ankle targets are in reach.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def lowering(
     up : (3,)
         The up axis.
     extended : float
-        Legs extend up to this fraction of their longest reach, or as far as they did before.
+        Legs extend up to this fraction of their full length, or as far as they did before.
 
     Returns
     -------
@@ -135,19 +135,19 @@ def lowering(
     width = 2 * max(1, round(EASE * rate)) + 1
     padded = np.pad(needed, width - 1, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
-    # The mean of maxima over a window is nowhere below the values themselves.
+    # The moving average of moving maxima is nowhere below the values themselves.
     return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)
 
 
 def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
-    """Return values that fade in and out around the frames that are held; gaps separate runs.
+    """Return values that fade in and out around held frames; gaps separate runs.
 
     Parameters
     ----------
     values : (F, C)
-        Corrections in the frames that are held.
+        Corrections in held frames.
     is_held, present : (F,)
-        Frames that are held, and frames that exist.
+        Masks of held frames and of existing frames.
     ease : int
         Number of frames over which a correction fades.
     """
@@ -162,7 +162,7 @@ def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
         left = np.where(place > 0, frames - before, ease + 1)
         right = np.where(place < len(held), after - frames, ease + 1)
         first, second = falling(left / (ease + 1)), falling(right / (ease + 1))
-        # Between two contacts that are near each other the value moves from one to the other.
+        # Between two close contacts, the value blends from one to the other.
         total = np.maximum(first + second, 1.0)[:, None]
         mixed = first[:, None] * values[before] + second[:, None] * values[after]
         result[start:stop] = np.where(is_held[start:stop, None], values[start:stop], mixed / total)
@@ -170,6 +170,6 @@ def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
 
 
 def falling(x: Floats) -> Floats:
-    """Return 1 at 0 and 0 from 1 on, with slope 0 at both ends."""
+    """Return a smooth step from 1 at 0 to 0 at 1 and beyond, with slope 0 at both ends."""
     x = np.clip(x, 0.0, 1.0)
     return 1.0 - x * x * (3.0 - 2.0 * x)

@@ -20,8 +20,8 @@ _LONGEST = 1000  # frames added at each end
 class OneEuro:
     """One Euro filter, applied forwards and then backwards, so that the delays cancel.
 
-    Before, the motion is continued beyond both ends by its point reflection there, until a pass has
-    settled: uniform motion is unchanged up to its ends, and the end values are kept.
+    First, the motion is extended beyond both ends by point reflection, long enough for a pass to
+    settle: uniform motion is unchanged up to its ends, and the end values are kept.
 
     Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
     is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
@@ -56,7 +56,7 @@ class OneEuro:
         return self._shifted(once[::-1], rate, metres)[::-1][inner]
 
     def _settling(self, rate: float) -> int:
-        """Return after how many frames the initial value of a pass hardly matters."""
+        """Return the number of frames after which the initial value of a pass is negligible."""
         slowest = float(_factor(min(self.cutoff, self.speed_cutoff), rate))
         return min(int(np.ceil(np.log(_SETTLED) / np.log1p(-slowest))), _LONGEST)
 
@@ -89,7 +89,7 @@ class OneEuro:
 def _continued(
     values: Floats, count: int, opposite: Callable[[Floats, Floats], Floats]
 ) -> tuple[Floats, slice]:
-    """Return frames (N, ...) continued beyond both ends, and where the original ones are.
+    """Return frames (N, ...) extended beyond both ends, and the range of the original ones.
 
     ``count``: frames to add at each end.
     ``opposite``: reflects values in a value.

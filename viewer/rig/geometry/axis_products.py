@@ -18,7 +18,7 @@ Indices = NDArray[np.intp]
 class _Factor:
     """One rotation of each of N joints: R = C + cos(a) D + sin(a) E, nine entries row by row.
 
-    Joints that have fewer rotations than others are not in the later factors.
+    Joints with fewer rotations than others do not appear in the later factors.
     """
 
     joints: Indices | None  # None for all joints in order
@@ -50,7 +50,7 @@ class AxisProducts:
         self._n_joints, self._factors = n_joints, factors
 
     def at(self, dofs: Floats) -> Floats:
-        """Return the product of the rotations of every joint.
+        """Return the product of each joint's rotations.
 
         Parameters
         ----------
@@ -60,7 +60,7 @@ class AxisProducts:
         Returns
         -------
         (..., J, 3, 3)
-            Matrices for column vectors; the identity for joints without rotation.
+            Matrices for column vectors; the identity for joints without rotations.
         """
         result: Floats | None = None
         for factor in self._factors:
@@ -84,7 +84,7 @@ def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: Indices) -> Axi
     n_joints : int
         J.
     joints, axes : (N,)
-        Joint and axis (0, 1, 2 for x, y, z) of each rotation; of one joint, the first is applied
+        Joint and axis (0, 1, 2 for x, y, z) of each rotation; the first one of a joint is applied
         first.
     rows : (N,)
         Index of each rotation in the DOFs.
@@ -105,7 +105,7 @@ def axis_products(n_joints: int, joints: Ints, axes: Ints, rows: Indices) -> Axi
 
 
 def _by_rank(joints: Ints) -> list[Indices]:
-    """Return the indices of the first entry of every joint, of the second entries, and so on."""
+    """Return the indices of the first entries of all joints, of the second entries, and so on."""
     order = np.argsort(joints, kind="stable")
     ordered = joints[order]
     is_first = np.concatenate([[True], ordered[1:] != ordered[:-1]])[: len(ordered)]

@@ -1,7 +1,7 @@
-"""Surfaces that enclose a volume, except for small openings: their inside is hidden.
+"""Closed surfaces, up to small openings: their inside is hidden.
 
-A ray from outside meets the front of such a surface before its back, unless it enters through an
-opening. Only where skinning turns the surface inside out does it meet the back first.
+A ray from outside hits the front of such a surface before its back, unless it enters through an
+opening. It hits the back first only where skinning turns the surface inside out.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["Shell", "shell_of"]
 
-_MOST_TRIANGLES = 500_000  # larger meshes take longer to examine than is gained
-_MOST_OPEN = 256  # edges of openings; they are projected in every image
+_MOST_TRIANGLES = 500_000  # for larger meshes, the check takes longer than it saves
+_MOST_OPEN = 256  # edges of openings, which are projected in every image
 # Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
 _CLOSED = 0.25
-_HOLLOW = 1e-6  # volume relative to area^1.5 that is rounding: of two sheets that coincide
+_HOLLOW = 1e-6  # volume relative to area^1.5 that counts as 0, as of two coincident sheets
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +34,7 @@ class Shell:
     borders : (B,) int32
         Vertices around its openings.
     copies, originals : (N,) int32
-        Vertices that are at the same position, in pairs; closed as long as they stay together.
+        Pairs of vertices at the same position; the surface is closed while these coincide.
     """
 
     borders: Ints
@@ -42,12 +42,12 @@ class Shell:
     originals: Ints
 
     def is_closed(self, positions: Floats) -> bool:
-        """Return whether coincident vertices are still together at positions (V, 3)."""
+        """Return whether coincident vertices still coincide at positions (V, 3)."""
         return np.array_equal(positions[self.copies], positions[self.originals])
 
 
 def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
-    """Return the shell that a mesh is; None for any other surface.
+    """Return a mesh as a shell; None if its surface is not closed.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def _face_outwards(
     """Return whether every connected part encloses a positive volume."""
     count = len(corners)
     labels = components(count, pairs)
-    # The mean as the shared corner of all tetrahedra: a small opening hardly changes the sum.
+    # The mean is the common corner of all tetrahedra, so a small opening hardly changes the sum.
     centered = positions - positions.mean(axis=0)
     doubled = area_vectors(centered, corners.astype(np.int32))
     sums = np.einsum("ta,ta->t", centered[corners[:, 0]], doubled)

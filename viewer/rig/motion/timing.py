@@ -56,7 +56,7 @@ def frame_at(seconds: float, rate: float) -> int:
 def frame_times(start: float, end: float, rate: float) -> Floats:
     """Return the times of all frames from a start to an end (F,), seconds."""
     times: Floats = start + np.arange(frame_at(end - start, rate) + 1) / rate
-    # A curve that repeats would be back at its start just after its end.
+    # A repeating curve would be back at its start just after its end.
     return np.minimum(times, end)
 
 

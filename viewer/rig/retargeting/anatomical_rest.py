@@ -22,7 +22,7 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
 _UPRIGHT = np.cos(np.radians(30.0))
 _STOOPED = np.cos(np.radians(60.0))
 _ENOUGH = 0.05  # fraction of the frames
-_SLOPE = np.radians(30.0)  # from the ankle down to the ball of a foot that stands
+_SLOPE = np.radians(30.0)  # from the ankle down to the ball of a standing foot
 _STANCE = 25.0  # percent of the frames in which a foot is lowest, and its sole level
 
 
@@ -162,7 +162,7 @@ def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
 
 
 def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Floats]:
-    """Return the rotation of the foot of a leg, sideways as its knee, with the toes forward."""
+    """Return the rotation of a leg's foot: sideways like its knee, with the toes forward."""
     side = limb.upper.partition("_")[0]
     ankle, toes = postures.joints[f"{side}_ankle"], postures.joints.get(f"{side}_foot")
     if toes is None:

@@ -1,4 +1,4 @@
-"""World matrices of some joints of a moving skeleton, without those of all other joints."""
+"""World matrices of some joints of a moving skeleton, without computing all others."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ __all__ = ["Chains", "chain_worlds", "chains_to"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Chains:
-    """Some joints of a skeleton with all joints above them, numbered anew.
+    """Some joints of a skeleton and all their ancestors, renumbered.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Chains:
 
 
 def chains_to(skeleton: Skeleton, ends: Iterable[int]) -> Chains:
-    """Return the given joints of a skeleton and all joints above them."""
+    """Return the given joints of a skeleton and all their ancestors."""
     parents = skeleton.parents
     chosen = np.zeros(skeleton.n_joints, dtype=np.bool_)
     for end in ends:

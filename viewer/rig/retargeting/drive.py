@@ -1,4 +1,4 @@
-"""Motions that drive figures, kept so that they can be retargeted again with other joints."""
+"""Motions that drive figures, stored so that they can be retargeted again with another match."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ __all__ = ["Drive"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with other joints, and how it is retargeted.
+    """A motion that drives a figure with other joints, and the retargeting options.
 
     Attributes
     ----------
@@ -27,11 +27,11 @@ class Drive:
     keeps_up : bool
         Whether the result keeps the up axis of the motion's world instead of the figure's.
     plants_feet : bool
-        Whether feet are kept where those of the source stand.
+        Whether feet stay planted while those of the source stand.
     hangs : bool
         Whether the up axis of the motion points down.
     finish : callable or None
-        Changes the resulting clip further, as clean-up does.
+        Post-processes the resulting clip, as clean-up does.
     """
 
     motion: SkeletonMotion

@@ -30,7 +30,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     Parameters
     ----------
     drive : Drive
-        Motion, and how its joints are matched.
+        The motion and its joint match.
     figure : Figure
         Figure with a skeleton.
 
@@ -39,7 +39,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     clip : SampledClip
         Motion of the figure.
     notes : list of Diagnostic
-        Messages, as of ``retarget``.
+        Messages, as from ``retarget``.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def matches_of(drive: Drive, figure: Figure) -> Matches:
 
 
 def full_map(drive: Drive, figure: Figure) -> JointMap:
-    """Return the match with a figure as a map of all its joints; raises as ``match_joints``."""
+    """Return the match with a figure as a complete joint map; raises as ``match_joints``."""
     source, target = drive.motion.figure.require_skeleton(), figure.require_skeleton()
     return joint_map_of(matches_of(drive, figure).partners, source, target)
 

@@ -1,4 +1,4 @@
-"""Legs of a driven figure and of the motion that drives it, in every frame."""
+"""Legs of a driven figure and of its source, in every frame."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "s
 
 _ALIKE = 1e-4  # relative to the body
 _UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
-_STEEP = 0.9  # sine of the steepest foot of somebody who stands
+_STEEP = 0.9  # sine of the steepest foot of a standing person
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +39,9 @@ class LegPair:
     leg : Leg
         Joints of the figure.
     hip, ankle, toe : int
-        Joints of the source; ankle and toe are equal if its foot has no ball.
+        Joints of the source; ankle and toe are equal if the foot has no ball joint.
     is_digitigrade : bool
-        Whether the foot stands on its toes, as that of an animal, and never on its heel.
+        Whether the foot stands on its toes, like an animal's, and never on its heel.
     """
 
     leg: Leg
@@ -58,7 +58,7 @@ class DrivenLegs:
     Attributes
     ----------
     chains : Chains
-        Joints of the legs, of the feet, and above them.
+        Joints of the legs and feet, and their ancestors.
     legs : tuple of Leg
         The legs, as indices into ``chains``.
     soles : Soles
@@ -72,7 +72,7 @@ class DrivenLegs:
     extensions : (L,)
         Distance from hip to ankle in the rest pose, as a fraction of the leg's length.
     size : float
-        About the height of the body.
+        Approximate height of the body.
     clearance : float
         Height of the balls above the soles in the rest pose.
     """
@@ -93,8 +93,8 @@ class DrivenLegs:
 
     def heights(self, worlds: Floats, up: Floats) -> Floats:
         """Return the height of the lowest point of each foot: (N, L)."""
-        scale = float(np.linalg.norm(worlds[0, self.legs[0].ankle, :3, 0]))
-        return self.soles.heights(worlds, np.append(up, 0.0), scale)
+        # The matrices have the scales of the joints, and the soles are in the same unit.
+        return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
     def facing(self, worlds: Floats, up: Floats) -> Floats:
         """Return the cosine of the angle between each sole and the ground: (N, L)."""
@@ -123,7 +123,7 @@ class DrivenLegs:
 
 
 def spans_of(timing: Timing) -> list[tuple[int, int]]:
-    """Return the ranges of present frames as ranges of rows, for rows in the order of frames."""
+    """Return the ranges of present frames as ranges of rows, if rows are in frame order."""
     lengths = np.array([b - a for a, b in runs_of(timing.present)], dtype=np.intp)
     stops = np.cumsum(lengths)
     return [(int(b - n), int(b)) for b, n in zip(stops, lengths, strict=True)]
@@ -212,7 +212,7 @@ def _extensions(worlds: Floats, legs: tuple[Leg, ...]) -> Floats:
 
 
 def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
-    """Return about the height of a body, twice the length of its longest leg."""
+    """Return the approximate height of a body, twice the length of its longest leg."""
     points = world[:, :3, 3]
     lengths = [
         np.linalg.norm(points[leg.knee] - points[leg.hip])
@@ -225,7 +225,7 @@ def _size(world: Floats, legs: tuple[Leg, ...]) -> float:
 def has_source_proportions(
     found: Retargeted, figure: Figure, pairs: list[LegPair], size: float
 ) -> bool:
-    """Return whether the legs of a figure are as long as those of the source, as scaled.
+    """Return whether the legs of a figure are as long as the scaled legs of the source.
 
     Parameters
     ----------
@@ -236,7 +236,7 @@ def has_source_proportions(
     pairs : list of LegPair
         The legs.
     size : float
-        About the height of the figure.
+        Approximate height of the figure.
     """
     partners = found.matches.partners
     target, source = figure.require_skeleton(), found.source.figure.require_skeleton()
@@ -271,8 +271,8 @@ def foot_paths(
     pairs : list of LegPair
         The legs.
     vectors : list of ((N, 3), (N, 3))
-        From the ankles of the figure to its balls and heels: they replace those of a source that
-        has no balls, or no standing rest pose.
+        From the ankles of the figure to its balls and heels: they replace those of a source without
+        ball joints or without a standing rest pose.
     up : (3,)
         The up axis.
     """

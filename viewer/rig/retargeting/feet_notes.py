@@ -14,7 +14,7 @@ _ROUNDING = 1e-6  # relative to the body; smaller lengths are shown as 0
 
 
 def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
-    """Return what planting the feet changed.
+    """Return a message about the changes made by planting the feet.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Where and when the feet of a driven figure must stand."""
+"""Plan of where and when the feet of a driven figure must stand."""
 
 from __future__ import annotations
 
@@ -19,8 +19,7 @@ from viewer.rig.retargeting.source_contacts import (
 
 __all__ = ["FootPlan", "foot_plan"]
 
-# Cosine of the angle between the sole and the ground: nothing is held up to the first value, and
-# everything from the second one on.
+# Cosines of the angle between sole and ground between which a foot goes from free to fully held.
 _ON_SOLE = (-0.1, 0.3)
 _SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
 
@@ -36,13 +35,13 @@ class FootPlan:
     contacts : list of list of Contact
         Contacts of each foot, in time order.
     grounds : list of list of float
-        Height of the ground under the figure in each contact.
+        Height of the ground under the figure during each contact.
     spans : list of (int, int)
         Ranges of rows without gaps.
     rate : float
         Rows per second.
     size : float
-        About the height of the body.
+        Approximate height of the body.
     up : (3,)
         The up axis.
     """
@@ -61,14 +60,14 @@ class FootPlan:
             yield contact, slice(contact.start, contact.stop), ground
 
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
-        """Return how a standing foot moves horizontally from row to row.
+        """Return the horizontal displacements of a standing foot from row to row.
 
         Parameters
         ----------
         points : ((N, 3), (N, 3))
             Paths of the ball and the heel.
         contact : Contact
-            The contact, which chooses one of them in each row.
+            The contact, which selects one of them in each row.
         """
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
@@ -76,7 +75,7 @@ class FootPlan:
         return moved - (moved @ self.up)[:, None] * self.up
 
     def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
-        """Return the distance that balls and heels slide while they stand, in total."""
+        """Return the total distance that balls and heels slide while they stand."""
         total = 0.0
         for points, contacts in zip(feet, self.contacts, strict=True):
             for contact in contacts:
@@ -84,7 +83,7 @@ class FootPlan:
         return total
 
     def holds(self, facing: Floats) -> Floats:
-        """Return how far the sole of each foot is held on the ground, 0 to 1: (N, L).
+        """Return the degree to which the sole of each foot is held on the ground, 0 to 1: (N, L).
 
         Parameters
         ----------
@@ -112,8 +111,8 @@ class FootPlan:
     def floor(self, foot: int) -> Floats:
         """Return the height below which a foot with contacts must not sink: (N,).
 
-        This is the lower ground of the contacts before and after. Where the source's own foot is
-        lower, its ground is.
+        This is the ground of the previous or next contact, whichever is lower. Where the source's
+        own foot sinks below that, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))
@@ -141,7 +140,7 @@ def foot_plan(
     feet, spans, rate, up
         As in ``FootPlan``.
     shape : (float, float)
-        About the height of the figure, and the height of its balls above its soles at rest.
+        Approximate height of the figure, and height of its balls above its soles at rest.
     """
     size, clearance = shape
     contacts = foot_contacts(feet, spans, rate, size, up)

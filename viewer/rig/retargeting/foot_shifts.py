@@ -1,4 +1,4 @@
-"""Translations that keep the feet of a moving figure in place, and of its body."""
+"""Translations of the feet and the body of a moving figure that keep standing feet in place."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from viewer.rig.retargeting.foot_plan import FootPlan
 
 __all__ = ["foot_shifts"]
 
-_EASE = 0.3  # seconds over which a correction begins and ends outside contacts
+_EASE = 0.3  # seconds over which a correction fades in and out outside contacts
 _SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the usual translation, relative to a foot that stands
-_STRAIGHT = (0.8, 0.95)  # legs are bent up to the first value, and straight from the second one on
-# Cosine of the angle between the sole and the ground: a foot that is tilted further may sink.
+_FLIGHT = 0.05  # weight of the default translation, relative to a standing foot
+_STRAIGHT = (0.8, 0.95)  # relative lengths up to which a leg is bent, and from which it is straight
+# Cosines of the angle between sole and ground: a foot that is tilted further may sink.
 _ON_SIDE = (-0.1, 0.1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Wanted:
-    """Corrections of one foot where it stands."""
+    """Corrections of one foot during its contacts."""
 
     flat: Floats  # (N, 3), horizontal
     is_flat: Bools  # (N,), rows with horizontal corrections
@@ -41,8 +41,8 @@ def foot_shifts(
 ) -> tuple[list[Floats], Floats]:
     """Return the translations of all feet and of the body.
 
-    A foot is moved where it stands. The body follows feet on straight legs smoothly, so that these
-    need not bend; feet that do not stand follow the body.
+    A foot is corrected while it stands. The body smoothly follows standing feet on straight legs,
+    so that these need not bend; other feet follow the body.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def _wanted(
 
 
 def _shift(plan: FootPlan, wanted: _Wanted, base: Floats) -> Floats:
-    """Return the translation of a foot, which is ``base`` far from contacts: (N, 3)."""
+    """Return the translation of a foot, which approaches ``base`` away from contacts: (N, 3)."""
     up, stands = plan.up, wanted.holds >= 1.0
     rise = base @ up
     flat = base - rise[:, None] * up
@@ -121,7 +121,7 @@ def _shift(plan: FootPlan, wanted: _Wanted, base: Floats) -> Floats:
 
 
 def _eased(plan: FootPlan, values: Floats, is_held: Bools) -> Floats:
-    """Return corrections (N, C) that fade outside the rows that are held."""
+    """Return corrections (N, C) that fade out outside the held rows."""
     result, ease = np.zeros_like(values), max(1, round(_EASE * plan.rate))
     for start, stop in plan.spans:
         part = slice(start, stop)
@@ -131,9 +131,10 @@ def _eased(plan: FootPlan, values: Floats, is_held: Bools) -> Floats:
 
 
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
-    """Return the mean translation of the feet that stand, (N, 3), smooth over time.
+    """Return the mean translation of the standing feet, (N, 3), smooth over time.
 
-    ``weights``: weights of the feet, (N, L). ``usual``: the translation without any, (N, 3).
+    ``weights``: weights of the feet, (N, L). ``usual``: the translation without standing feet, (N,
+    3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):

@@ -1,4 +1,4 @@
-"""Joint maps: the source joint of each joint of a target skeleton, as chosen by the user."""
+"""Joint maps: user-defined assignment of source joints to the joints of a target skeleton."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ UNMAPPED = -2
 class JointMap:
     """Target joints and the source joints that drive them, by label.
 
-    A target joint occurs once; a source joint may drive several. Target joints that are not listed
-    are matched automatically.
+    Each target joint is listed at most once; a source joint may drive several. Target joints that
+    are not listed are matched automatically.
 
     Attributes
     ----------
@@ -85,7 +85,7 @@ def mapped_partners(
     Raises
     ------
     RigError
-        If a skeleton has no joint, or several, of a name in the map, or a joint is listed twice.
+        If a name in the map is missing or ambiguous in a skeleton, or a joint is listed twice.
     """
     partners = np.full(target.n_joints, UNMAPPED, dtype=np.int32)
     joints = _joints_by_label(source), _joints_by_label(target)

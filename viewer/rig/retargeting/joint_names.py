@@ -137,7 +137,7 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def joints_by_place(skeleton: Skeleton) -> set[int]:
-    """Return the joints whose meaning follows from their place, not from their own names.
+    """Return the joints whose meaning follows from their place in the hierarchy, not their names.
 
     These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
     humanoid has none.

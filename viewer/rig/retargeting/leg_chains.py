@@ -1,4 +1,4 @@
-"""Legs of animals, found by the shape of the skeleton: chains of joints down to the ground."""
+"""Legs of animals, found from the shape of the skeleton: chains of joints down to the ground."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ __all__ = ["animal_legs"]
 
 # Lengths are relative to the height of the skeleton.
 _FOOT = 0.12  # height of the last joint of a leg
-_TOE = 0.05  # height of the joint on which a foot stands
+_TOE = 0.05  # maximum height of the joint on which a foot stands
 _PAW = 0.15  # extent of the toes of one foot
 _MIRRORED = 0.05  # distance between a foot and the mirrored foot of the other side
 _FEWEST = 4  # legs
 
 
 def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
-    """Return the legs of an animal with at least four, those of the left side first.
+    """Return the legs of an animal with at least four legs, left ones first.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     list of Leg
         Hip, knee and ankle are the two long bones of a leg, without a scapula. The ankle is the
         hock of a hind leg and the wrist of a front leg. Chains without a counterpart on the other
-        side, such as a tail, are left out. Empty if there are fewer legs.
+        side, such as a tail, are left out. Empty if there are fewer than four legs.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())
@@ -56,7 +56,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
 
 
 def _in_one_leg(parents: Ints, flat: Floats, is_foot: Bools) -> Bools:
-    """Return the joints below which all feet are toes of one foot: (J,)."""
+    """Return the joints below which all ends are toes of one foot: (J,)."""
     low = np.where(is_foot[:, None], flat, np.inf)
     high = np.where(is_foot[:, None], flat, -np.inf)
     for joint in range(len(parents) - 1, -1, -1):
@@ -69,7 +69,7 @@ def _in_one_leg(parents: Ints, flat: Floats, is_foot: Bools) -> Bools:
 
 
 def _path(joint: int, parents: Ints, in_leg: Bools, is_foot: Bools) -> list[int]:
-    """Return the joints from the top of a leg to the first of its toes."""
+    """Return the joints from the top of a leg to the base of its toes."""
     path = [joint]
     while not is_foot[path[-1]]:
         children = np.flatnonzero((parents == path[-1]) & in_leg)
@@ -82,7 +82,7 @@ def _leg(path: list[int], points: Floats, heights: Floats) -> Leg | None:
     stands = next((n for n, joint in enumerate(path) if heights[joint] < _TOE), len(path) - 1)
     if stands < 2:
         return None
-    # A chain with three bones above the foot begins with a scapula or the side of a pelvis.
+    # A chain with three bones above the foot begins with a scapula or one side of the pelvis.
     first = 1 if stands >= 4 else 0
     last = max(stands - 3, 0)
     bones = np.linalg.norm(np.diff(points[path], axis=0), axis=1)

@@ -1,4 +1,4 @@
-"""Ratio of the lengths of two skeletons, by which the path of a motion is scaled."""
+"""Ratio of the sizes of two skeletons, by which the root path of a motion is scaled."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _ARMS = (
 
 
 def path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[float, Phrase]:
-    """Return the ratio of the target's lengths to the source's, and what was compared.
+    """Return the ratio of the target's lengths to the source's, and the kind of lengths compared.
 
     Legs are compared if both have them, otherwise arms, otherwise all matched joints.
 

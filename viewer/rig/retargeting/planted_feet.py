@@ -1,9 +1,9 @@
 """Feet of driven figures, planted where those of the source stand (after Kovar et al. 2002).
 
-Retargeting keeps the directions of limbs, so that feet slide and sink where proportions differ. In
-a contact of the source, the ball or the heel of the figure's foot stays at one place and its sole
-on the ground; before and after, the correction fades. Hips and knees rotate to reach the ankles,
-and the body is lowered where legs are too short.
+Retargeting keeps the directions of limbs, so that feet slide and sink where proportions differ.
+During a contact of the source, the ball or the heel of the figure's foot stays in place and its
+sole on the ground; before and after, the correction fades in and out. Hips and knees rotate to
+reach the ankles, and the body is lowered where legs are too short.
 """
 
 from __future__ import annotations
@@ -43,16 +43,16 @@ class PlantedFeet:
     Attributes
     ----------
     n_contacts : int
-        Number of times a foot stands.
+        Number of contacts of all feet.
     source, before, after : float
-        Distance that feet slide while they stand, in total: in the source, scaled to the figure,
-        and in the figure; figure units.
+        Total distance that feet slide while they stand, in figure units: in the source, scaled to
+        the figure; and in the figure before and after.
     gap_before, gap_after : float
         Largest height of a standing sole above or below the ground.
     lowered : float
         Largest distance by which the body was lowered.
     size : float
-        About the height of the body.
+        Approximate height of the body.
     """
 
     n_contacts: int = 0
@@ -66,7 +66,7 @@ class PlantedFeet:
 
     @property
     def is_better(self) -> bool:
-        """Whether feet slide less or are nearer to the ground, and neither is worse."""
+        """Whether feet slide less or are nearer to the ground, and neither got worse."""
         slack = _ROUNDING * self.size
         slides, gap = self.after - self.before, self.gap_after - self.gap_before
         return max(slides, gap) <= slack and min(slides, gap) < -slack
@@ -89,10 +89,10 @@ def plant_feet(
     Returns
     -------
     clip : SampledClip
-        The motion; unchanged if it would not become better.
+        The motion; unchanged if it would not improve.
     changes : PlantedFeet or None
-        What was changed; None if the figure or the source has no legs of known names, or the
-        figure has the source's proportions.
+        What was changed; None if the figure or the source has no recognised legs, or the figure has
+        the source's proportions.
     """
     pairs = leg_pairs(found, figure)
     rest_up = np.eye(3)["xyz".index(figure.up)]

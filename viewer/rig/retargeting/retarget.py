@@ -83,6 +83,18 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
     )
 
 
+def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return the same motion of a skeleton in the unit of its path, as that of MHR in metres."""
+    clip, scales = motion.clip, motion.clip.figure_scales
+    usual = 1.0 if scales is None or len(scales) == 0 else float(np.median(scales))
+    if scales is None or usual == 1.0 or not 0.0 < usual < np.inf:
+        return motion
+    found = scaled_motion(motion, usual)
+    left = None if (scales == usual).all() else scales / usual
+    place = clip.figure_translations
+    return replace(found, clip=replace(found.clip, figure_translations=place, figure_scales=left))
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Retargeted:
     """Result of a retargeting, and how the two skeletons relate.
@@ -166,6 +178,8 @@ def retargeted(
     if source is None or target is None:
         named = motion.figure.name if source is None else figure.name
         raise RigError(Diagnostic("F004.no-skeleton", values={"figure": named}))
+    motion = _in_path_unit(motion)
+    source = motion.figure.require_skeleton()
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
     rested: list[Diagnostic] = []

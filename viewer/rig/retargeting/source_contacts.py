@@ -1,9 +1,9 @@
 """Contacts of the feet with the ground in a motion that drives a figure.
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
-moves slowly and is no higher than the other point of the foot; both with hysteresis. A foot stands
-only if, at some time in the contact, it is the lowest foot, not one that is held still in the air,
-and if it is below its hip, not beside it as that of somebody who lies. So the ground need not be
+moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A foot
+stands only if, at some time during the contact, it is the lowest foot (not one held still in the
+air), and if it is below its hip (not beside it, as in a lying person). So the ground need not be
 flat: every contact has its own height, as on stairs.
 """
 
@@ -25,10 +25,10 @@ __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"
 _SLOW, _FAST = 0.08, 0.2  # per second: a contact begins, and ends
 _LOW, _HIGH = 0.015, 0.025  # above the lower point of the foot: a contact begins, and ends
 _LOWEST = 0.02  # a foot this far above the other one may be the lowest
-_UPRIGHT = 0.3  # sine of the slope from the heel to the hip of somebody who does not lie
+_UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
 _SHORTEST = 0.1  # seconds
-_LEVEL = 0.015  # heights this close are one level
-_GROUND = (-0.015, 0.06)  # heights of feet that stand on a ground at height 0
+_LEVEL = 0.015  # heights this close count as one level
+_GROUND = (-0.015, 0.06)  # heights of feet standing on a ground at height 0
 _SIMILAR = 1.0 / 3.0  # fraction of the longest duration
 _TILTED = 0.04  # height of the heel above the ball, or of the ball above the heel
 _TIPTOE = 0.07  # the ball of a foot on tiptoe is at most this far above the ground
@@ -51,20 +51,20 @@ class FootPath:
     hip: Floats
 
     def lowest(self, up: Floats) -> Floats:
-        """Return the height of the lower one of both points: (N,)."""
+        """Return the height of the lower of both points: (N,)."""
         return np.minimum(self.toe @ up, self.heel @ up)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Contact:
-    """A foot that stands.
+    """Contact of one foot with the ground.
 
     Attributes
     ----------
     start, stop : int
         Half-open range of rows.
     on_toe : (N,)
-        Rows of the range in which the ball stands; in the others only the heel does.
+        Rows of the range in which the ball stands; in the others, only the heel stands.
     hold : (N,)
         1 in rows in which the foot is slow, less where the contact begins and ends.
     height : float
@@ -95,7 +95,7 @@ def foot_contacts(
     rate : float
         Rows per second.
     size : float
-        About the height of the body.
+        Approximate height of the body.
     up : (3,)
         The up axis.
     """
@@ -152,15 +152,15 @@ def ground_level(
 ) -> tuple[float, bool]:
     """Return the height of feet on the ground, and whether the ground is at height 0.
 
-    This is the height at which feet stand longest, or one with a similar duration at which they
-    stand on a ground at height 0, as on the lowest step of stairs.
+    This is the height at which feet stand longest, or, if their duration is similar, one at which
+    feet stand on a ground at height 0, as on the lowest step of stairs.
 
     Parameters
     ----------
     contacts : sequence of sequence of Contact
         Contacts of every foot, at least one.
     size : float
-        About the height of the body.
+        Approximate height of the body.
     clearance : float
         Probable height of a standing foot's lower point above the ground.
     """
@@ -181,9 +181,9 @@ def ground_level(
 
 
 def step_height(contact: Contact, level: float, size: float) -> float:
-    """Return the height of the ground under a contact above the level of most contacts.
+    """Return the height of the ground under a contact relative to the level of most contacts.
 
-    Small differences count as none, and so does the height of a foot on tiptoe.
+    Small differences, and the height of a foot on tiptoe, count as 0.
     """
     height = contact.height - level
     is_tiptoe = abs(contact.tilt) > _TILTED * size and abs(height) < _TIPTOE * size
