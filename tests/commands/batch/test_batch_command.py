@@ -168,6 +168,14 @@ def test_python_refuses_options_without_effect(rigs, options):
 
 
 @pytest.mark.parametrize(
+    "wrong", [{"workers": -1}, {"retries": -1}, {"memory": -5}, {"timeout": float("nan")}]
+)
+def test_python_refuses_limits_below_zero(rigs, wrong):
+    with pytest.raises(ViewerError, match=f"{next(iter(wrong))}: expected"):
+        viewer.batch("in", "info", **wrong)
+
+
+@pytest.mark.parametrize(
     ("words", "part"),
     [
         ([], "expected a job"),
@@ -182,6 +190,7 @@ def test_python_refuses_options_without_effect(rigs, options):
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
         (["lint", "in", "--resume"], "--report FILE"),
+        (["info", "in", "--limit-memory", "0"], "--limit-memory: expected"),
         (["info", "in", "--report", "in/a/one.skel", "--force"], "--report: in/a/one.skel: exp"),
         (["render", "in", "-o", "out", "--overview", "out/a/one.png"], "the output of a/one.skel"),
         (["lint", "in", "--table", "t.csv", "--report", "t.csv"], "the file of --report"),

@@ -145,8 +145,13 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     Few small inputs are run in this process, because starting workers takes about a second.
     """
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
-    if timeout is not None and timeout < 0.0:
+    if timeout is not None and not timeout >= 0.0:  # NaN too
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
+    for name, value in (("workers", request.workers), ("retries", request.retries)):
+        if value is not None and value < 0:
+            raise ViewerError(f"--{name}: expected 0 or more, found {value}")
+    if request.memory is not None and request.memory <= 0:
+        raise ViewerError(f"--limit-memory: expected more than 0 bytes, found {request.memory}")
     n_workers = request.workers or _cores()
     limits = Limits(n_workers, request.retries, timeout, request.memory, request.cluster)
     if request.cluster:
