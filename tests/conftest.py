@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import itertools
+import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -121,3 +122,11 @@ def ctx(gl_framebuffer: moderngl.Framebuffer) -> Iterator[moderngl.Context]:
         yield context
         assert context.error == "GL_NO_ERROR"
         gl_framebuffer.use()  # the framebuffer bound by the test may have been released
+
+
+@pytest.fixture
+def ctrl_c():
+    """A function that interrupts a test, also if the tests were started with SIGINT ignored."""
+    kept = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield lambda: signal.raise_signal(signal.SIGINT)
+    signal.signal(signal.SIGINT, kept)

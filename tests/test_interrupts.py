@@ -303,14 +303,6 @@ def test_run_works_in_another_thread(tmp_path, capsys):
     assert codes == [0] and not capsys.readouterr().err
 
 
-@pytest.fixture
-def ctrl_c():
-    """Return a function that interrupts these tests, which are started as ordinary programs."""
-    kept = signal.signal(INT, signal.default_int_handler)
-    yield lambda: signal.raise_signal(INT)
-    signal.signal(INT, kept)
-
-
 def test_signal_raises_while_watched(ctrl_c):
     reached = []
     with pytest.raises(Interrupted) as stop, watched():

@@ -164,39 +164,41 @@ def test_wrong_shards_are_refused(text):
         shard_of([], text)
 
 
-def struck(at: str, times: int = 1) -> FunctionJob:
-    """Return a job that signals its own process during one item."""
+def struck(ctrl_c, at: str, times: int = 1) -> FunctionJob:
+    """Return a job that interrupts its own process during one item."""
 
     def strike(item: Item) -> None:
         for _ in range(times * (item.name == at)):
-            signal.raise_signal(signal.SIGINT)
+            ctrl_c()
 
     return FunctionJob(strike)
 
 
-def test_first_signal_finishes_the_running_item(tmp_path):
+def test_first_signal_finishes_the_running_item(tmp_path, ctrl_c):
     settings = Settings(report=tmp_path / "r.jsonl")
-    report = run_batch(items_called(*"abcd"), struck("b"), settings)
+    report = run_batch(items_called(*"abcd"), struck(ctrl_c, "b"), settings)
     assert [one.item.name for one in report.results] == ["a", "b"]
     assert all(one.status == "done" for one in report.results)
     assert report.signal == signal.SIGINT and not report.is_complete
     assert len(read_results(tmp_path / "r.jsonl")) == 2
 
 
-def test_second_signal_cancels_the_running_item(tmp_path, monkeypatch):
+def test_second_signal_cancels_the_running_item(tmp_path, monkeypatch, ctrl_c):
     monkeypatch.setattr(interrupts, "_SAME", -1.0)  # signals this close count as separate ones
     settings = Settings(report=tmp_path / "r.jsonl")
     with pytest.raises(interrupts.Interrupted):
-        run_batch(items_called(*"abcd"), struck("b", 2), settings)
+        run_batch(items_called(*"abcd"), struck(ctrl_c, "b", 2), settings)
     assert [one.item.name for one in read_results(tmp_path / "r.jsonl")] == ["a"]
 
 
-def test_python_callers_get_their_own_interrupt_when_running_items_are_done(tmp_path, monkeypatch):
+def test_python_callers_get_their_own_interrupt_when_running_items_are_done(
+    tmp_path, monkeypatch, ctrl_c
+):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in", 3)
     found: list[Result] = []
     with pytest.raises(KeyboardInterrupt):
-        viewer.batch("in/*.txt", struck("pose1.txt").function, on_result=found.append)
+        viewer.batch("in/*.txt", struck(ctrl_c, "pose1.txt").function, on_result=found.append)
     assert [one.item.name for one in found] == ["pose0.txt", "pose1.txt"]
 
 

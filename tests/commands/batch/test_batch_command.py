@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import signal
 from pathlib import Path
 
 import numpy as np
@@ -144,10 +143,10 @@ def test_pictures_are_drawn_by_workers(rigs):
         assert picture.size == (32, 24)
 
 
-def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch):
+def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch, ctrl_c):
     from viewer.commands import info
 
-    monkeypatch.setattr(info, "run", lambda arguments: signal.raise_signal(signal.SIGINT) or 0)
+    monkeypatch.setattr(info, "run", lambda arguments: ctrl_c() or 0)
     assert run(["batch", "info", "in"]) == 130
     assert "2 items left; only batches with --report" in capsys.readouterr().out
 
