@@ -158,6 +158,19 @@ def test_shards_write_their_own_tables(rigs):
     assert rows == [3, 2] and not Path("t.csv").exists()
 
 
+def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
+    from viewer.batching.overview import sheet
+
+    monkeypatch.setattr(sheet, "PER_SHEET", 2)
+    Path("s-2.png").write_text("mine")
+    command = ["batch", "render", "in", "-o", "out", "--overview"]
+    assert run([*command, "s.png"]) == 5
+    assert "s-2.png: already exists" in capsys.readouterr().err
+    (rigs / "in" / "b" / "p-2.skel").write_text(SKEL)
+    assert run([*command, "out/b/p.png"]) == 2
+    assert "sheet 2: out/b/p-2.png: expected a file of its own" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "options", [["--shard", "0/2"], ["--report", "r.jsonl"], ["--force"], ["stray"], "--json"]
 )
