@@ -143,6 +143,21 @@ def test_shards_cover_all_items_and_share_a_report(tmp_path, monkeypatch):
     assert shard_of(items, "7/9") == []
 
 
+def test_outputs_that_another_shard_replaced_are_written_again(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_numbers(tmp_path / "in", 3)
+
+    def negative(item: Item) -> None:
+        Path(item.output).write_text("-1")
+
+    call = {"out": "out", "to": "sum", "workers": 0, "resume": True}
+    viewer.batch("in/*.txt", add_numbers, **call)
+    viewer.batch("in/*.txt", negative, **call, shard="0/2")
+    report = viewer.batch("in/*.txt", add_numbers, **call)
+    assert report.counts == {"done": 2, "unchanged": 1}
+    assert Path("out/pose2.sum").read_text() == "3"
+
+
 @pytest.mark.parametrize("text", ["3/3", "1", "a/b", "-1/3", "1/0", "1/3/2"])
 def test_wrong_shards_are_refused(text):
     with pytest.raises(ViewerError, match="--shard: expected"):

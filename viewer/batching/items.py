@@ -62,6 +62,8 @@ class Result:
     key : str
         Hash of the inputs, the options and the program's version, by which ``--resume``
         recognises finished items.
+    time : float
+        When it ended, in seconds since 1970; the last of several results counts.
     """
 
     item: Item
@@ -75,3 +77,4 @@ class Result:
     text: str = ""
     values: dict[str, Any] = field(default_factory=dict)
     key: str = ""
+    time: float = 0.0

@@ -83,7 +83,7 @@ class KeyedJob:
             return self.job(item)
         if key in self.finished:
             return Result(item, "unchanged", key=key)
-        return replace(self.job(item), key=key)
+        return replace(self.job(item), key=key, time=time.time())
 
 
 def shard_of(items: Sequence[Item], text: str) -> list[Item]:
@@ -190,13 +190,21 @@ def _earlier(settings: Settings) -> dict[str, Result]:
                 "--force starts it again)"
             )
         return {}
-    found = (one for path in related_reports(settings.report) for one in read_results(path))
-    return {one.key: one for one in found if one.status == "done" and one.key and _is_there(one)}
+    found = [one for path in related_reports(settings.report) for one in read_results(path)]
+    # A later result of another shard or with other options has replaced the same output.
+    last = {one.item.output or one.item.name: one for one in sorted(found, key=_time)}
+    return {
+        one.key: one for one in last.values() if one.status == "done" and one.key and _is_there(one)
+    }
+
+
+def _time(result: Result) -> float:
+    return result.time
 
 
 def _has_content(path: Path) -> bool:
     try:
-        return path.stat().st_size > 0
+        return path.is_file() and path.stat().st_size > 0
     except OSError:
         return False
 

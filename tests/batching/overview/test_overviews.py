@@ -133,7 +133,7 @@ def test_sheet_has_every_picture_and_marks_failed_items(tmp_path, monkeypatch) -
     assert lines == [f"{path}: 3 items, 1 of them failed", f"{tmp_path / 'o-2.png'}: 1 item"]
     second = decode_picture(path, (tmp_path / "o-2.png").read_bytes())
     assert has(second, red) == 60 * 80
-    monkeypatch.setattr(sheet, "_MOST_SHEETS", 1)
+    monkeypatch.setattr(sheet, "MOST_SHEETS", 1)
     lines = save_overview(path, "render", results)
     assert lines[1:] == ["the sheets show the first 3 of 4 items"]
 

@@ -158,12 +158,33 @@ def test_shards_write_their_own_tables(rigs):
     assert rows == [3, 2] and not Path("t.csv").exists()
 
 
+def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
+    from viewer.batching.overview import sheet
+
+    monkeypatch.setattr(sheet, "PER_SHEET", 2)
+    Path("s-2.png").write_text("mine")
+    command = ["batch", "render", "in", "-o", "out", "--overview"]
+    assert run([*command, "s.png"]) == 5
+    assert "s-2.png: already exists" in capsys.readouterr().err
+    (rigs / "in" / "b" / "p-2.skel").write_text(SKEL)
+    assert run([*command, "out/b/p.png"]) == 2
+    assert "sheet 2: out/b/p-2.png: expected a file of its own" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     "options", [["--shard", "0/2"], ["--report", "r.jsonl"], ["--force"], ["stray"], "--json"]
 )
 def test_python_refuses_options_without_effect(rigs, options):
     with pytest.raises(ViewerError, match="options: expected"):
         viewer.batch("in", "info", options=options)
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"workers": -1}, {"retries": -1}, {"memory": -5}, {"timeout": float("nan")}]
+)
+def test_python_refuses_limits_below_zero(rigs, wrong):
+    with pytest.raises(ViewerError, match=f"{next(iter(wrong))}: expected"):
+        viewer.batch("in", "info", **wrong)
 
 
 @pytest.mark.parametrize(
@@ -181,6 +202,7 @@ def test_python_refuses_options_without_effect(rigs, options):
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
         (["lint", "in", "--resume"], "--report FILE"),
+        (["info", "in", "--limit-memory", "0"], "--limit-memory: expected"),
         (["info", "in", "--report", "in/a/one.skel", "--force"], "--report: in/a/one.skel: exp"),
         (["render", "in", "-o", "out", "--overview", "out/a/one.png"], "the output of a/one.skel"),
         (["lint", "in", "--table", "t.csv", "--report", "t.csv"], "the file of --report"),

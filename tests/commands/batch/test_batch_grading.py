@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import errno
+import os
 import zipfile
 from pathlib import Path
 
@@ -125,3 +127,22 @@ def test_plus_separates_files_unless_it_is_part_of_a_name(course) -> None:
     files = [folder / "arm.skel", folder / "arm.skin"]
     assert input_files("+".join(map(str, files))) == files
     assert input_files(str(folder)) == files
+
+
+def test_full_disk_is_no_fault_of_an_archive_and_stops_no_other(course, capsys, monkeypatch):
+    from viewer.batching.submissions import unpacking
+
+    def fill(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(unpacking.shutil, "copyfileobj", fill)
+    assert (
+        run(["batch", "diff", "solution/arm.skel+solution/arm.skin", "subs", "--table", "t.csv"])
+        == 1
+    )
+    rows = rows_of(Path("t.csv"))
+    full = {
+        row["exit_code"] for row in rows.values() if row["message"] == os.strerror(errno.ENOSPC)
+    }
+    assert full == {"5"} and len(rows) == 6
+    assert any(row["status"] == "done" for row in rows.values())

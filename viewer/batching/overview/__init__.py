@@ -9,7 +9,7 @@ from viewer.batching.items import Result
 from viewer.errors import UnsupportedFormatError
 from viewer.phrases import printable
 
-__all__ = ["PAGES", "check_overview", "save_overview"]
+__all__ = ["PAGES", "check_overview", "overview_files", "save_overview"]
 
 PAGES = (".html", ".htm")
 """Suffixes of pages; all others are those of pictures."""
@@ -31,6 +31,24 @@ def check_overview(path: str | Path) -> None:
         raise UnsupportedFormatError(
             f'--overview: {printable(path, 300)}: expected {known}, found "{suffix}"'
         )
+
+
+def overview_files(path: str, count: int) -> list[str]:
+    """Return the files of an overview: a page, or as many sheets as the items need.
+
+    Parameters
+    ----------
+    path : str
+        The first file.
+    count : int
+        Number of items.
+    """
+    if Path(path).suffix.lower() in PAGES:
+        return [path]
+    from viewer.batching.overview.sheet import MOST_SHEETS, PER_SHEET, sheet_path
+
+    numbers = range(2, min(-(-count // PER_SHEET), MOST_SHEETS) + 1)
+    return [path, *(str(sheet_path(Path(path), number)) for number in numbers)]
 
 
 def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list[str]:

@@ -13,12 +13,14 @@ from viewer.media.image import save_image
 from viewer.media.thumbnails import thumbnail
 from viewer.phrases import counted, printable
 
-__all__ = ["PER_SHEET", "save_sheets"]
+__all__ = ["MOST_SHEETS", "PER_SHEET", "save_sheets", "sheet_path"]
 
 PER_SHEET = 120
 """Cells of one sheet."""
 
-_MOST_SHEETS = 50
+MOST_SHEETS = 50
+"""Largest number of sheets; further items are not shown."""
+
 _CELL = (240, 320)  # pixels
 _FINISHED = ("done", "unchanged")
 
@@ -26,7 +28,7 @@ _FINISHED = ("done", "unchanged")
 def save_sheets(path: Path, results: Sequence[Result]) -> list[str]:
     """Write one sheet or several: ``sheet.png``, ``sheet-2.png``; see ``save_overview``."""
     rows = ordered(results)
-    shown = rows[: PER_SHEET * _MOST_SHEETS]
+    shown = rows[: PER_SHEET * MOST_SHEETS]
     if not any(result.outputs or result.status not in _FINISHED for result in shown):
         raise ViewerError(
             f"--overview: {printable(path, 300)}: no picture was written; name a page such as "
@@ -36,7 +38,7 @@ def save_sheets(path: Path, results: Sequence[Result]) -> list[str]:
     for first in range(0, len(shown), PER_SHEET):
         part = shown[first : first + PER_SHEET]
         number = first // PER_SHEET + 1
-        target = path if number == 1 else path.with_stem(f"{path.stem}-{number}")
+        target = sheet_path(path, number)
         save_image(target, captioned_sheet([_cell(result) for result in part]))
         failed = sum(result.status not in _FINISHED for result in part)
         marked = f", {failed} of them failed" if failed else ""
@@ -44,6 +46,11 @@ def save_sheets(path: Path, results: Sequence[Result]) -> list[str]:
     if len(rows) > len(shown):
         lines.append(f"the sheets show the first {len(shown):,} of {len(rows):,} items")
     return lines
+
+
+def sheet_path(path: Path, number: int) -> Path:
+    """Return the file of a sheet; the first has number 1."""
+    return path if number == 1 else path.with_stem(f"{path.stem}-{number}")
 
 
 def _cell(result: Result) -> CaptionedCell:

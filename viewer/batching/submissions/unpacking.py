@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import shutil
 import stat
 import zipfile
@@ -28,6 +29,7 @@ MOST_FILES = 5_000
 """Files that are unpacked from one archive."""
 
 _ENCRYPTED = 0x41  # flag bits 0 and 6
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 _DAMAGE = (*DAMAGE, NotImplementedError)
 
 
@@ -69,6 +71,8 @@ class Archive:
                 with self.archive.open(member) as packed, target.open("xb") as file:
                     shutil.copyfileobj(packed, file, 1 << 20)
         except _DAMAGE as problem:
+            if _is_full(problem):
+                raise
             raise self._fault("F002.submission-zip", reason=_reason(problem)) from None
         return sum(member.file_size for member in members.values())
 
@@ -123,6 +127,8 @@ def open_archive(path: Path, shown: Path, is_junk: Callable[[str], bool]) -> Ite
                     raise FormatError(Diagnostic("F002.submission-twice", shown, values=values))
             yield Archive(shown, storage.size, archive, dict(pairs))
     except _DAMAGE as problem:
+        if _is_full(problem):
+            raise
         values = {"reason": _reason(problem)}
         raise FormatError(Diagnostic("F002.submission-zip", shown, values=values)) from None
 
@@ -138,6 +144,11 @@ def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
         values = {"item": printable(info.filename, 80)}
         raise FormatError(Diagnostic("F002.submission-outside", shown, values=values))
     return "/".join(parts)
+
+
+def _is_full(problem: Exception) -> bool:
+    """Return whether the disk is to blame, and not the archive."""
+    return isinstance(problem, OSError) and problem.errno in _FULL
 
 
 def _reason(problem: Exception) -> str:

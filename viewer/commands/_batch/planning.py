@@ -20,6 +20,7 @@ from viewer.batching.naming import (
     output_folder,
     template_of,
 )
+from viewer.batching.overview import overview_files
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
 from viewer.errors import OutputError, ViewerError
@@ -92,10 +93,11 @@ def plan_of(request: Request) -> Plan:
     items = items_of(inputs, template)
     check_outputs(items, request.shared)
     report = _report_of(request)
-    names = {"--table": request.table, "--overview": request.overview}
-    check_summaries({"--report": str(report or ""), **names}, items, request.shared)
-    if request.shard:
-        items = shard_of(items, request.shard)
+    mine = shard_of(items, request.shard) if request.shard else items
+    names = {"--report": str(report or ""), "--table": request.table}
+    names |= _overview_names(request, len(mine))
+    check_summaries(names, items, request.shared)
+    items = mine
     if request.resume and report is None:
         raise ViewerError("--resume: expected --report FILE, or a folder for the outputs")
     if not (request.force or request.resume):
@@ -105,6 +107,18 @@ def plan_of(request: Request) -> Plan:
         engine, limits, report, _existing(request), request.identity, tuple(request.shared)
     )
     return Plan(items, settings, (*request.notes, *inputs.notes, *note))
+
+
+def _overview_names(request: Request, count: int) -> dict[str, str]:
+    """Return the files of the overview; raise OutputError if a further sheet exists."""
+    if not request.overview:
+        return {}
+    first, *others = overview_files(request.overview, count)
+    for path in others:
+        if os.path.lexists(path) and not (request.force or request.resume):
+            raise OutputError(f"{printable(path, 300)}: already exists (--force replaces it)")
+    names = {f"--overview, sheet {number}": path for number, path in enumerate(others, 2)}
+    return {"--overview": first, **names}
 
 
 def _report_of(request: Request) -> Path | None:
@@ -145,8 +159,13 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     Few small inputs are run in this process, because starting workers takes about a second.
     """
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
-    if timeout is not None and timeout < 0.0:
+    if timeout is not None and not timeout >= 0.0:  # NaN too
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
+    for name, value in (("workers", request.workers), ("retries", request.retries)):
+        if value is not None and value < 0:
+            raise ViewerError(f"--{name}: expected 0 or more, found {value}")
+    if request.memory is not None and request.memory <= 0:
+        raise ViewerError(f"--limit-memory: expected more than 0 bytes, found {request.memory}")
     n_workers = request.workers or _cores()
     limits = Limits(n_workers, request.retries, timeout, request.memory, request.cluster)
     if request.cluster:

@@ -6,25 +6,23 @@ import atexit
 import os
 import shutil
 import tempfile
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+from viewer.batching.attempts import attempt
 from viewer.batching.engines import Job
 from viewer.batching.inputs import is_recording
 from viewer.batching.items import Item, Result
-from viewer.batching.submissions import is_archive, opened
+from viewer.batching.submissions import Submission, is_archive, opened
 from viewer.batching.submissions.choosing import patterns_of
 from viewer.batching.tables import comparisons
 from viewer.commands._diff.inputs import input_files
-from viewer.diagnostics import described
-from viewer.errors import FormatError
 from viewer.phrases import printable
 
 __all__ = ["SubmissionJob", "submission_job"]
-
-_BAD_INPUT = 2  # exit code
 
 
 @dataclass(frozen=True)
@@ -53,14 +51,20 @@ class SubmissionJob:
         path = item.files[0]
         if not is_archive(path) and (not os.path.isdir(path) or is_recording(path)):
             return self.job(item)
-        try:
-            with opened(path, self.expected, self.alike, Path(self.temporary)) as found:
-                files = "+".join(map(str, found.files))
-                result = replace(self.job(replace(item, files=(files,))), item=item)
-        except FormatError as problem:
-            message = printable(problem, 2000)
-            data = [described(problem.diagnostic)]
-            return Result(item, "failed", _BAD_INPUT, message=message, diagnostics=data)
+        with ExitStack() as stack:
+            entered: list[Submission] = []
+
+            def enter(_: Item) -> None:
+                # Whatever an archive or a full disk may cause concerns this item alone.
+                one = opened(path, self.expected, self.alike, Path(self.temporary))
+                entered.append(stack.enter_context(one))
+
+            failed = attempt(item, enter)
+            if not entered:
+                return failed
+            (found,) = entered
+            files = "+".join(map(str, found.files))
+            result = replace(self.job(replace(item, files=(files,))), item=item)
         if found.base is None:
             return result
         shown = (f"{found.base}{os.sep}", f"{path}/")
