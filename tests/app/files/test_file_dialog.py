@@ -155,3 +155,25 @@ def test_dialog_shows_strange_names(dialog, tmp_path):
     assert len(_listed(dialog)) == 8
     dialog.click("file ##id.skel")
     assert {path.name for path in dialog.state.of(Files).dialog.chosen} == {"##id.skel"}
+
+
+@pytest.mark.parametrize(
+    ("typed", "written"),
+    [
+        ("ada.gif.mp4", "ada.gif"),
+        ("ada.GIF.mp4", "ada.GIF"),
+        ("ada.mp4.mp4", "ada.mp4"),
+        ("ada.v2.mp4", "ada.v2.mp4"),  # not the suffix of a video
+        ("ada.mp4.gif", "ada.mp4.gif"),  # the suggested suffix was replaced
+        (".gif.mp4", ".gif.mp4"),
+        ("fox.webm.mp4", "fox.webm.mp4"),  # suggested, not typed
+        ("old.gif.mp4", "old.gif.mp4"),  # an existing file
+        ("ada", "ada.mp4"),
+    ],
+)
+def test_typed_suffix_takes_the_place_of_the_suggested_one(tmp_path, typed, written):
+    (tmp_path / "old.gif.mp4").touch()
+    kinds = (".mp4", ".webm", ".gif")
+    dialog = FileDialog(tmp_path, purpose="save", suffixes=kinds, name="fox.webm.mp4")
+    dialog.name = typed
+    assert dialog.target() == tmp_path / written

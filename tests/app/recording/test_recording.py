@@ -58,6 +58,20 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     assert moving.state.of(Recording).settings is None
 
 
+def test_suffix_typed_over_the_name_chooses_the_kind_of_video(moving, tmp_path):
+    settings = RecordSettings(size="own", own_size=(64, 64), rate=5.0)
+    moving.state.of(Recording).settings = settings
+    moving.step(2)
+    moving.click("Save as…")
+    moving.step(2)
+    moving.type("ada.gif")  # over the stem alone
+    moving.key("enter")
+    finish(moving)
+    assert settings.kind == ".gif"
+    with Image.open(tmp_path / "ada.gif") as picture:
+        assert picture.format == "GIF"
+
+
 def test_preview_is_kept_while_the_panels_still_show_it(moving):
     moving.menu("menu File", "Record pictures or video…")
     moving.screen()

@@ -56,7 +56,7 @@ def draw_formats(
     missing : mapping
         Why formats cannot be written, by suffix.
     """
-    typed = Path(dialog.name.strip()).suffix.lower()
+    typed = Path(dialog.typed_name()).suffix.lower()
     now = typed if typed in formats else dialog.suffix or FOLDER
     flags = imgui.TableFlags_.row_bg | imgui.TableFlags_.scroll_y | imgui.TableFlags_.borders_outer
     height = N_ROWS * imgui.get_text_line_height_with_spacing()
@@ -95,6 +95,6 @@ def _draw_row(state: AppState, suffix: str, kind: Exporter, is_chosen: bool, why
 
 def _choose(dialog: FileDialog, suffix: str, old: str) -> None:
     """Replace the suffix of the name by that of a format."""
-    name = dialog.name.strip()
+    name = dialog.typed_name()
     dialog.suffix = "" if suffix == FOLDER else suffix
     dialog.name = name[: len(name) - len(old)] + dialog.suffix

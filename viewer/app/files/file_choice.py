@@ -10,7 +10,7 @@ from viewer.app.core.state import AppState
 from viewer.formats import FORMATS
 from viewer.phrases import printable
 
-__all__ = ["PICTURES", "FileDialog", "folder_of", "single_suffix"]
+__all__ = ["PICTURES", "FileDialog", "folder_of"]
 
 PICTURES = (".png", ".jpg", ".jpeg")
 """File suffixes of texture images."""
@@ -31,7 +31,8 @@ class FileDialog:
     title : str
         Title of the dialog.
     suffixes : tuple of str
-        Suffixes of the listed files; if empty, those of all formats that can be opened.
+        Suffixes of the listed files, and of those that can be written in place of the suggested
+        one; if empty, those of all formats that can be opened.
     name : str
         Suggested name of the file to write; its suffix is added to names without a suffix.
     more : callable, optional
@@ -111,11 +112,21 @@ class FileDialog:
 
     def target(self) -> Path | None:
         """Return the file to write, with a suffix; None if it has no name."""
-        name = Path(single_suffix(self.name.strip()))
+        name = Path(self.typed_name())
         if not name.name.strip("."):
             return None
         path = self.folder / name
         return path if path.suffix else path.with_name(path.name + self.suffix)
+
+    def typed_name(self) -> str:
+        """Return the name without the suggested suffix after a typed one: ``ada.gif.mp4``."""
+        name = single_suffix(self.name.strip())
+        stem = PurePath(name).stem
+        # A name that was not typed is right: the suggested one, and those of existing files.
+        if name == self.suggested or self.folder / name in self.entries:
+            return name
+        is_typed = PurePath(stem).suffix.lower() in self.suffixes
+        return stem if is_typed and PurePath(name).suffix == self.suffix else name
 
     def move(self, step: int) -> None:
         """Move the highlight in the list, and choose the file that it reaches."""

@@ -13,7 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.text_fields import name_field, text_field
 from viewer.app.core.widgets import button, note_item
-from viewer.app.files.file_choice import FileDialog, single_suffix
+from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.file_list import draw_file_list, is_confirmed_by_key
 from viewer.app.files.state import Files
 from viewer.phrases import printable
@@ -120,7 +120,7 @@ def _draw_name(state: AppState, dialog: FileDialog) -> bool:
     note_item(state, "Name")
     _close_on_escape(state)
     if imgui.is_item_deactivated():
-        dialog.name = single_suffix(dialog.name)
+        dialog.name = dialog.typed_name()
     imgui.same_line()
     return entered and not dialog.follow_name()
 

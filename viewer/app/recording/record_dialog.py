@@ -24,7 +24,13 @@ from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.state import Files
 from viewer.app.recording.preview import preview_size
 from viewer.app.recording.recorded_frames import playback_frames, recorded_times
-from viewer.app.recording.state import KINDS, LEAST_PIXELS, Recording, RecordSettings
+from viewer.app.recording.state import (
+    KINDS,
+    LEAST_PIXELS,
+    VIDEO_KINDS,
+    Recording,
+    RecordSettings,
+)
 from viewer.formats import file_stem
 from viewer.phrases import counted
 from viewer.rendering.options import QUALITIES
@@ -222,11 +228,15 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
     stem = file_stem(state.scene.title)
     names = {"pictures": f"{stem}_{{frame:05}}.png", "sheet": f"{stem}_sheet.png"}
     name = names.get(settings.kind, f"{stem}{settings.kind}")
+    suffixes = (".png",) if settings.kind in names else VIDEO_KINDS
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths), _start, "save", f"Record: {KINDS[settings.kind]}",
-        (Path(name).suffix,), name,
+        suffixes, name,
     )  # fmt: skip
 
 
 def _start(state: AppState, paths: list[Path]) -> None:
-    state.of(Recording).wanted = paths[0]
+    recording, suffix = state.of(Recording), paths[0].suffix.lower()
+    if recording.settings is not None and {suffix, recording.settings.kind} <= {*VIDEO_KINDS}:
+        recording.settings.kind = suffix  # a suffix that was typed over the suggested one
+    recording.wanted = paths[0]

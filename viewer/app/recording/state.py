@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["KINDS", "LEAST_PIXELS", "RecordSettings", "Recording"]
+__all__ = ["KINDS", "LEAST_PIXELS", "VIDEO_KINDS", "RecordSettings", "Recording"]
 
 KINDS = {
     ".mp4": "MP4 video (H.264)",
@@ -15,6 +15,9 @@ KINDS = {
     "sheet": "Contact sheet (PNG)",
 }
 """Kinds of recordings, with their labels."""
+
+VIDEO_KINDS = (".mp4", ".webm", ".gif")
+"""Those that are one video file, by its suffix."""
 
 LEAST_PIXELS = 16
 """Smallest width and height of a recording."""
