@@ -7,6 +7,7 @@ import pytest
 from imgui_bundle import imgui
 
 from viewer.app import theme
+from viewer.app.curves import plotted_keys
 from viewer.app.manual.manual_window import Manual
 from viewer.rendering.overlay.typeface import interface_font
 
@@ -56,5 +57,23 @@ def test_coloured_text_is_legible_on_panels(hand, monkeypatch, name):
     assert len({tuple(color) for color in drawn}) > 3
     background = _luminance(imgui.get_style().color_(imgui.Col_.window_bg))
     for color in drawn:
+        low, high = sorted((_luminance(color), background))
+        assert (high + 0.05) / (low + 0.05) > 3.0
+
+
+@pytest.mark.parametrize("panels", ["dark", "light"])
+def test_selected_keys_and_their_handles_stand_out_from_the_plot(curves, monkeypatch, panels):
+    theme.set_theme(panels)
+    shown = []
+    for name in ("ink", "faint"):
+        color_of = getattr(plotted_keys, name)
+        monkeypatch.setattr(
+            plotted_keys, name, lambda x, of=color_of: shown.append(of(x)) or shown[-1]
+        )
+    curves.click("key arm.x 1")
+    curves.step(2)
+    background = _luminance(imgui.get_style().color_(imgui.Col_.window_bg))
+    assert len(set(shown)) == 2
+    for color in shown:
         low, high = sorted((_luminance(color), background))
         assert (high + 0.05) / (low + 0.05) > 3.0

@@ -7,6 +7,7 @@ import math
 import numpy as np
 from imgui_bundle import imgui, implot
 
+from viewer.app.core.ink import faint, ink
 from viewer.app.curves.axes import Plot, ui_scale
 from viewer.app.curves.editing import (
     add_key_at,
@@ -23,7 +24,7 @@ from viewer.rig.number_text import number_text
 
 __all__ = ["draw_keys", "edit"]
 
-_CHOSEN, _HANDLE = (1.0, 1.0, 1.0, 1.0), (1.0, 0.85, 0.4, 1.0)
+_HANDLE = 1.0, 0.85, 0.4, 1.0
 _FAINT = (0.75, 0.75, 0.8, 0.8)
 _MOST_KEYS = 300  # largest number of visible keys that can be dragged
 _SAME_KEY = 2.0  # points: keys closer than this cannot be distinguished
@@ -76,7 +77,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
     for place, time, value in chosen:
         middle, inner = implot.plot_to_pixels(time, value), plot.color(place[0])
         draw_list = implot.get_plot_draw_list()
-        draw_list.add_circle_filled(middle, 6.0 * ui_scale(), imgui.get_color_u32(_CHOSEN))
+        draw_list.add_circle_filled(middle, 6.0 * ui_scale(), imgui.get_color_u32(faint(1.0)))
         draw_list.add_circle_filled(middle, 3.5 * ui_scale(), imgui.get_color_u32(inner))
     implot.pop_plot_clip_rect()
 
@@ -149,11 +150,11 @@ def _draw_handle(
     points = implot.plot_to_pixels(time, value), implot.plot_to_pixels(end, height)
     implot.push_plot_clip_rect()
     implot.get_plot_draw_list().add_line(
-        points[0], points[1], imgui.get_color_u32(_HANDLE), 1.2 * ui_scale()
+        points[0], points[1], imgui.get_color_u32(ink(_HANDLE)), 1.2 * ui_scale()
     )
     implot.pop_plot_clip_rect()
     moved, x, y, _, hovered, held = implot.drag_point(
-        _HANDLE_ID + side, end, height, _HANDLE, 3.5 * ui_scale(), _FIXED, False, False, False
+        _HANDLE_ID + side, end, height, ink(_HANDLE), 3.5 * ui_scale(), _FIXED, False, False, False
     )
     plot.note(f"tangent {side}", end, height)
     if moved:
