@@ -22,6 +22,7 @@ def test_impossible_surfaces_are_refused(tmp_path, capsys, options):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_files_with_metallic_materials_are_shaded_so(tmp_path):
     """Pr in the .mtl is enough; without it, and with --shading phong, it is Blinn-Phong."""
     shape = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"
