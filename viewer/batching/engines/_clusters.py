@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import logging
 import signal
 from collections.abc import Iterator
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import Limits
 from viewer.batching.engines._cluster_text import ClusterName
+from viewer.batching.engines._process_limits import signals_blocked
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 
@@ -61,14 +61,14 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
             # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
             # batch decides which items are finished.
             folder = stack.enter_context(TemporaryDirectory(prefix="viewer-dask-"))
-            with _signals_blocked(), dask.config.set(_CONFIG):
+            with signals_blocked(), dask.config.set(_CONFIG):
                 if name.kind == "local":
                     target = _local_cluster(limits, folder)
                 else:
                     target = _slurm(name, limits)
             stack.enter_context(target)
         try:
-            with _signals_blocked():
+            with signals_blocked():
                 client = Client(target, timeout=_CONNECT, set_as_default=False)
         except (OSError, ValueError) as problem:
             raise ViewerError(
@@ -169,17 +169,3 @@ def _handlers_kept() -> Iterator[None]:
         for number, handler in zip(numbers, before, strict=True):
             if signal.getsignal(number) is not handler:
                 signal.signal(number, handler)
-
-
-@contextmanager
-def _signals_blocked() -> Iterator[None]:
-    """Block Ctrl-C in threads and processes that are started within the block."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
-    try:
-        yield
-    finally:
-        with contextlib.suppress(ValueError):
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)

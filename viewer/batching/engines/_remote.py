@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import sys
 import threading
 import time
 from collections.abc import Iterator
@@ -13,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from viewer.batching.engines import Job
+from viewer.batching.engines._process_limits import limit_memory
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import name_worker
 from viewer.version import VERSION
@@ -111,18 +111,3 @@ def _ended_after(timeout: float | None, worker: Any, key: str) -> Iterator[None]
         yield
     finally:
         timer.cancel()
-
-
-def limit_memory(size: int) -> None:
-    """Limit the memory that this process may allocate, in bytes; further calls have no effect."""
-    if sys.platform == "win32":
-        return
-    import resource
-
-    # On Linux, the address space also includes mapped files and driver reservations, which use
-    # none.
-    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
-    soft, most = resource.getrlimit(kind)
-    limit = size if most == resource.RLIM_INFINITY else min(size, most)
-    if soft != limit:
-        resource.setrlimit(kind, (limit, most))

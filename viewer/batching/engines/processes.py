@@ -7,11 +7,9 @@ crashes, hangs or exceeds its memory is replaced, and its item is run again.
 
 from __future__ import annotations
 
-import contextlib
 import os
 import pickle
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
@@ -23,6 +21,7 @@ from threading import Lock
 from typing import TYPE_CHECKING, Any
 
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
+from viewer.batching.engines._process_limits import limit_memory, signals_blocked
 from viewer.batching.items import Item, Result
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
@@ -147,7 +146,7 @@ class _Workers:
         self.flying: dict[ProcessFuture[Result], _Attempt] = {}
         self._done: SimpleQueue[ProcessFuture[Result]] = SimpleQueue()
         self._context = _Context()
-        with _blocked():  # starts a process that tracks semaphores
+        with signals_blocked():  # starts a process that tracks semaphores
             self._is_stopping = self._context.Event()
         self._n_breaks = 0
         self._patience, self._moved = _PATIENCE, time.monotonic()
@@ -267,21 +266,9 @@ class _Workers:
         )
         # Ctrl-C and closing the terminal signal all of its processes, but the batch decides what to
         # end. Workers inherit the signal mask, as do the threads that start further workers.
-        with _blocked():
+        with signals_blocked():
             _ = pool.active  # starts it
         return pool
-
-
-@contextlib.contextmanager
-def _blocked() -> Iterator[None]:
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_of(code: int | None) -> str:
@@ -308,20 +295,7 @@ def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
     # items are interrupted. An idle worker ends when the pool closes its queue.
     signal.signal(signal.SIGTERM, _note_termination)
     if memory is not None:
-        _limit_memory(memory)
-
-
-def _limit_memory(size: int) -> None:
-    if sys.platform == "win32":
-        return
-    import resource
-
-    # On Linux, the address space also includes mapped files and driver reservations, which use
-    # none.
-    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
-    most = resource.getrlimit(kind)[1]
-    limit = size if most == resource.RLIM_INFINITY else min(size, most)
-    resource.setrlimit(kind, (limit, most))
+        limit_memory(memory)
 
 
 def _note_termination(number: int, frame: FrameType | None) -> None:

@@ -1,0 +1,39 @@
+"""Memory limit and signal mask of worker processes."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import sys
+from collections.abc import Iterator
+
+__all__ = ["limit_memory", "signals_blocked"]
+
+
+def limit_memory(size: int) -> None:
+    """Limit the memory that this process may allocate, in bytes; further calls have no effect."""
+    if sys.platform == "win32":
+        return
+    import resource
+
+    # On Linux, the address space also includes mapped files and driver reservations, which use
+    # none.
+    kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
+    soft, most = resource.getrlimit(kind)
+    limit = size if most == resource.RLIM_INFINITY else min(size, most)
+    if soft != limit:
+        resource.setrlimit(kind, (limit, most))
+
+
+@contextlib.contextmanager
+def signals_blocked() -> Iterator[None]:
+    """Block Ctrl-C in threads and processes that are started within the block."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, (signal.SIGINT, signal.SIGHUP))
+    try:
+        yield
+    finally:
+        with contextlib.suppress(ValueError):
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
