@@ -9,11 +9,11 @@ figure.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from measure import median_ratio, report
+from measure import interleaved, median_ratio, report
 from references.least_frame import LeastFrame
 
 import viewer
@@ -40,7 +40,7 @@ def main(rounds: int = 25) -> None:
     for name, options, samples, goal in CASES:
         with Offscreen() as offscreen, Offscreen() as other:
             work = frames(scene, offscreen, other, options, samples)
-            times = processor_times(work, rounds)
+            times = per_frame(interleaved(work, rounds, time.process_time))
         report(f"a frame into memory, {name}", times, (*times,), goal)
     kinematics(scene, rounds)
 
@@ -77,18 +77,9 @@ def frames(
     return {"viewer": ours, "minimal program": minimal}
 
 
-def processor_times(
-    work: Mapping[str, Callable[[], object]], rounds: int
-) -> dict[str, list[float]]:
-    """Run each function once per round, in turn; return milliseconds per frame by name."""
-    times: dict[str, list[float]] = {name: [] for name in work}
-    for number in range(rounds + 1):
-        for name, run in work.items():
-            started = time.process_time()
-            run()
-            if number:  # the first round warms caches
-                times[name].append(1e3 * (time.process_time() - started) / FRAMES)
-    return times
+def per_frame(times: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
+    """Return milliseconds of one frame of the rounds."""
+    return {name: [value / FRAMES for value in values] for name, values in times.items()}
 
 
 def kinematics(scene: Scene, rounds: int) -> None:
@@ -106,15 +97,11 @@ def kinematics(scene: Scene, rounds: int) -> None:
 
         return several
 
-    times = processor_times(
-        {
-            "DOFs to world matrices": repeated(lambda: world_matrices(skeleton, pose)),
-            "local to world matrices": repeated(
-                lambda: forward_kinematics(skeleton.parents, local)
-            ),
-        },
-        4 * rounds,
-    )
+    work = {
+        "DOFs to world matrices": repeated(lambda: world_matrices(skeleton, pose)),
+        "local to world matrices": repeated(lambda: forward_kinematics(skeleton.parents, local)),
+    }
+    times = per_frame(interleaved(work, 4 * rounds, time.process_time))
     report(f"forward kinematics, {skeleton.n_joints} joints", times, (*times,))
     assert median_ratio(times, *times) > 0.0
 
