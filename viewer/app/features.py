@@ -54,7 +54,7 @@ class Panel:
         ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
         motion of another skeleton; empty if the panel is always available.
     leads : bool
-        Whether it is brought in front of the other tabs when a scene makes it available.
+        Whether it is brought to the front of its tabs when a scene makes it available.
     on_demand : bool
         Whether it is closed until the user opens it.
     """

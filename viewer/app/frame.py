@@ -65,7 +65,7 @@ __all__ = ["Frame"]
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
 _LAID_OUT = 2
-"""The frame from which on the panels leave the view its own place; ImGui counts from 1."""
+"""First frame in which the panels leave room for the view; ImGui counts from 1."""
 
 
 class Frame:

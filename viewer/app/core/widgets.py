@@ -38,7 +38,7 @@ __all__ = [
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 
-# Plain numbers: Python's own flags take a microsecond per operation, a hundred times in a frame.
+# Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
 _HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
 
@@ -130,7 +130,7 @@ def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
     title : str
         Text of the title bar.
     size : (float, float)
-        Width and height when it first appears, in font sizes; less in a small window.
+        Width and height when it first appears, in font sizes; smaller if the window is small.
 
     Returns
     -------

@@ -104,7 +104,7 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
-    """Return the curves that a selected joint shows: of keyed transforms its angles with keys."""
+    """Return the curves of a selected joint; for keyed transforms, its angles that have keys."""
     rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
     keyed = keyed_of(state.actor)
     if not isinstance(keyed, TransformKeys):
@@ -114,7 +114,7 @@ def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tup
 
 
 def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
-    """Return the joint whose curves are shown first: of keyed transforms the first with keys."""
+    """Return the joint whose curves are shown first; for keyed transforms, the first with keys."""
     keyed, numbers = keyed_of(state.actor), [curve.number for curve in curves]
     if isinstance(keyed, TransformKeys):
         moving = (n for row, n in enumerate(numbers) if keyed.channel(row) is not None)

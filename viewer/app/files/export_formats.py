@@ -1,4 +1,4 @@
-"""List of the formats of an export, and the data that each keeps and omits."""
+"""List of the formats of an export, with the data that each of them keeps and omits."""
 
 from __future__ import annotations
 

@@ -122,7 +122,7 @@ class FileDialog:
         """Return the name without the suggested suffix after a typed one: ``ada.gif.mp4``."""
         name = single_suffix(self.name.strip())
         stem = PurePath(name).stem
-        # A name that was not typed is right: the suggested one, and those of existing files.
+        # Names that were not typed are kept: the suggested one, and those of existing files.
         if name == self.suggested or self.folder / name in self.entries:
             return name
         is_typed = PurePath(stem).suffix.lower() in self.suffixes

@@ -37,7 +37,7 @@ from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
-_MANY = (".obj",)  # one file per frame: only exported by the command line
+_MANY = (".obj",)  # one file per frame: exported by the command line only
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = [
@@ -64,7 +64,7 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def motion_formats(actor: Actor) -> dict[str, Exporter]:
-    """Return the exporters of motions by suffix; of several the one that suits the actor."""
+    """Return exporters of motions by suffix: if there are several, the one that suits the actor."""
     found = {
         suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
         for suffix in motion_suffixes()
@@ -73,7 +73,7 @@ def motion_formats(actor: Actor) -> dict[str, Exporter]:
 
 
 def unsuited_formats(actor: Actor) -> dict[str, str]:
-    """Return why formats cannot hold the motion of an actor, by suffix."""
+    """Return the reasons why formats cannot store the motion of an actor, by suffix."""
     skeleton = actor.figure.skeleton
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
     found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}

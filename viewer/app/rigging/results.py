@@ -72,7 +72,7 @@ TARGET = "target"
 def compare(first: Result, second: Result) -> Comparison:
     """Return the differences between the weights of two results for one target."""
     one, other = first.rigged.figure.skin, second.rigged.figure.skin
-    assert one is not None and other is not None  # both are rigged
+    assert one is not None and other is not None  # both figures are rigged
     joints = np.arange(one.n_joints, dtype=np.int32)
     distances = row_distances(one, other, Pairs(joints, joints, ()))
     same = _dominant(one) == _dominant(other)
@@ -125,7 +125,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
 
 
 def _play(state: AppState, result: Result) -> None:
-    """Show the joints of a result, and play the template's motion, or a trial motion."""
+    """Show the joints of a result, and play the template's motion or a trial motion."""
     state.options.xray = True
     set_motion(state, result, plays=not no_motion_of(result))
     if result.actor.clip is None:

@@ -37,7 +37,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 
-_LINES_HEIGHT = 9.0  # visible lines of the report
+_LINES_HEIGHT = 9.0  # number of visible lines of the report
 
 
 def draw_results(state: AppState) -> None:

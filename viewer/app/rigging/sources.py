@@ -130,7 +130,7 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
         names = ", ".join(printable(path.name, 60) for path in paths)
         raise RigError(f"{names}: expected a figure with mesh, skeleton and skin, found none")
     actor = attached[0]
-    assert actor.pose is not None  # it has a skeleton
+    assert actor.pose is not None  # rigged actors have poses
     return Template(key, actor.figure, actor.pose, actor.clip, None, paths)
 
 

@@ -56,7 +56,7 @@ class OutlineLayer:
                 self.release()
                 self._target = Target(self.context, size, 1)
             if key != self._key:
-                self._key = key  # even if drawing fails: it is retried only after a change
+                self._key = key  # set even if drawing fails, which is retried only after a change
                 renderer.draw_outlines(
                     outlined, state.scene, state.camera, state.options, self._target, state.box
                 )

@@ -186,7 +186,7 @@ def explained(state: AppState) -> Explanation | None:
     if pinned is None:
         return None
     if not is_open(state, "vertex"):
-        unpin(state)  # the panel was closed
+        unpin(state)  # the user has closed the panel
         return None
     is_there = pinned.actor < len(actors) and actors[pinned.actor].figure is pinned.figure
     pose = actors[pinned.actor].pose if is_there else None
