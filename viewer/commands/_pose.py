@@ -145,8 +145,8 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    # A JSON list is detected as a list of people; read as a pose, it is rejected, not being an
-    # object.
+    # A JSON list is detected as a list of people; read as a pose, it is rejected because it is not
+    # an object.
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
@@ -325,7 +325,7 @@ def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
 
 def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
     found = re.fullmatch(r"(.*?)(rad|deg)?", text.strip())
-    assert found is not None  # the pattern matches everything
+    assert found is not None  # the pattern matches any text
     try:
         value = number(found[1])
     except (ValueError, argparse.ArgumentTypeError):
