@@ -264,5 +264,5 @@ def _common(folders: Sequence[str]) -> str:
     """Return the deepest folder that contains all of some absolute folders."""
     try:
         return os.path.commonpath({*folders})
-    except ValueError:  # on several drives
+    except ValueError:  # the folders are on several drives
         return ""

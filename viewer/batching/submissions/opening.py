@@ -17,8 +17,8 @@ from viewer.formats import SUFFIXES
 
 __all__ = ["Submission", "opened"]
 
-_DEEPEST = 3  # levels of nested archives
-_COMPANIONS = {  # files that models refer to
+_DEEPEST = 3  # maximum number of levels of nested archives
+_COMPANIONS = {  # suffixes of files that models refer to
     *(".bin", ".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".gif", ".webp", ".tif", ".tiff"),
     *SUFFIXES,
 }
@@ -49,7 +49,7 @@ def opened(
 ) -> Iterator[Submission]:
     """Open a folder or a zip archive; unpacked files are removed at the end.
 
-    Links that lead out of the folder count as missing files: a submission can't use those of
+    Links that lead out of the folder count as missing files: a submission can't use the files of
     others.
 
     Parameters
