@@ -140,7 +140,7 @@ def _of_person(person: int, note: Diagnostic) -> Diagnostic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One written person: original animation, animation with filled gaps, records, read-back."""
+    """One written person: original animation, animation without gaps, records, data read back."""
 
     original: SampledAnimation
     animation: SampledAnimation
@@ -236,7 +236,7 @@ def _used(rows: Floats, count: int) -> Floats:
 @contextlib.contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder next to ``path/smpl``, and move it there if the block succeeds."""
-    hold()  # also protects the temporary folder, which must not be left behind
+    hold()  # signals must not leave the temporary folder behind
     target = path / _FOLDER
     made = None
     try:

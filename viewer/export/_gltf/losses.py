@@ -117,7 +117,7 @@ def sides(
 def _split(side: Side, sources: Ints) -> Side:
     """Return a posed figure with its vertices duplicated as in the file."""
     whole = side.exact
-    assert side.body is not None  # the caller checked for a mesh
+    assert side.body is not None  # the caller has checked that there is a mesh
     body = body_rows(side.body, sources)
     return replace(
         side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
