@@ -120,7 +120,7 @@ def _assembled_in(
         for path, capture in contents.captures
     ]
     scene = assemble(replace(contents, captures=captures), settings)
-    # Only now: if the switch fails, the old scene is read to its end.
+    # Done last: if the switch fails, the old scene is read to its end.
     for builder in builders:
         builder.is_cut = True
     return scene
@@ -279,7 +279,7 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
     skeleton, skin = figures[0].skeleton, figures[1].skin
-    assert skeleton is not None  # pairs start with the skeleton
+    assert skeleton is not None  # the first figure of a pair is the skeleton
     if skin is None:
         values = {"n": skeleton.n_joints, "skeleton": paths[0]}
         raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
