@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: every finding has a code, a location and a suggested remedy."""
+"""Checks of rigs and motions, whose findings have a code, a location and a suggested remedy."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from viewer.rig.scene import Scene
 
 __all__ = ["Counting", "counting_of"]
 
-_ON_FRAME = 1e-6  # fraction of a frame: times closer than this to a frame count as that frame
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, within which a time counts as that frame's
 
 
 @dataclass(frozen=True, slots=True)

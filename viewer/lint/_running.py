@@ -90,7 +90,7 @@ def lint_scene(
     for index, actor in enumerate(scene.actors):
         lost = invalid[index] if index < len(invalid) else {}
         subjects.append(Subject(actor, index, scene.up, chosen, counting, lost, people))
-    # The rate of the playing animation's keys is no choice for the frames of others.
+    # The key rate of the animation that plays does not apply to the frames of others.
     others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
     steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]
     findings: list[Finding] = []
@@ -137,6 +137,6 @@ def _playing(actor: Actor, animation: int) -> Actor | None:
     other = actor.copy()
     try:
         play_animation(other, animation)
-    except FormatError:  # lint of files reports it when it reads all animations
+    except FormatError:  # reported when lint reads all animations of the file
         return None
     return other
