@@ -14,7 +14,7 @@ from viewer.streams import is_stdout, require_stdout
 __all__ = ["check_folder_target", "check_targets"]
 
 _FORCE = "--force replaces it"
-_Identity = tuple[int, int] | Path  # device and inode of an existing file, else its path
+_Identity = tuple[int, int] | Path  # device and inode of an existing file, otherwise its path
 
 
 def check_targets(
