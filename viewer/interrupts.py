@@ -244,7 +244,7 @@ def raising() -> Iterator[None]:
 class Postponed:
     """The signals received in a ``postponed`` block.
 
-    ``number``: that of the first signal; 0 if there was none.
+    ``number``: number of the first signal; 0 if there was none.
     """
 
     def __init__(self) -> None:

@@ -331,7 +331,7 @@ class Frame:
                 state.say(problem_text)
 
     def stream(self, builders: Sequence[Builder]) -> None:
-        """Begin to read the rest of captures."""
+        """Begin to read the remaining parts of captures."""
         left = [builder for builder in builders if not builder.is_done]
         self.state.of(Files).stream = Stream(left, self.wake) if left else None
 

@@ -22,7 +22,7 @@ def is_held(state: AppState) -> bool:
 def _is_widget_held() -> bool:
     """Return whether a widget is held. A text field changes nothing until it loses the focus.
 
-    Tab goes from field to field without a frame in between, and each number is an edit of its own.
+    Tab goes from field to field without a frame in between, and each number is a separate edit.
     """
     active = imgui.internal.get_active_id()
     # This state persists after typing: the same slider may be dragged afterwards.

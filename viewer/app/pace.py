@@ -1,4 +1,4 @@
-"""Choice of what to draw in each frame: more passes of still scenes, less of moving ones."""
+"""Drawing steps of each frame: more passes of still scenes, lower quality of moving ones."""
 
 from __future__ import annotations
 

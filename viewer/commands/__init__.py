@@ -15,7 +15,7 @@ COMMANDS = {
     "which pose",
     "lint": "check rigs and motions: what is wrong, where, and how to fix it",
     "models": "list body models: found, missing, where they are published, and their licences",
-    "doctor": "check this machine: packages, OpenGL, display, and how to fix what is missing",
+    "doctor": "check this machine: packages, OpenGL, display, and how to install missing parts",
     "help": "show a page of the manual",
     "completion": "print a script that completes commands and options in bash, zsh or tcsh",
 }

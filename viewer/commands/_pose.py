@@ -211,7 +211,7 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
         return apply_record(record, first.figure, first.require_pose())
     figure = next((actor.figure for actor in others if actor.figure.n_shapes), None)
     if figure is not None and figure.blend_shapes is not None:
-        # Given values are those of the sliders, which need not be 0 for the mean body.
+        # The option takes slider values, which need not be 0 for the mean body.
         rows = range(min(len(values), figure.n_shapes))
         values[: len(rows)] -= [figure.blend_shapes.origin(row) for row in rows]
     return _apply_record("--shape", PoseRecord(shape=values), scene)

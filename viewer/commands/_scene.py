@@ -127,8 +127,8 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
-        "figure of its own; may be repeated",
+        help="a file whose motion or animation drives a figure, such as a glTF or FBX file that "
+        "contains another figure; may be repeated",
     )
     group.add_argument(
         "--source-rest",

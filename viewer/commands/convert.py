@@ -193,7 +193,7 @@ def _write_together(
 def _write_apart(
     arguments: argparse.Namespace, scene: Scene, skinning: Skinning, places: Mapping[Actor, Path]
 ) -> list[Diagnostic]:
-    """Write each actor to a file of its own."""
+    """Write each actor to a separate file."""
     optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
     check_targets(files, inputs_of(arguments, scene), arguments.force)

@@ -89,7 +89,7 @@ def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
         "--template-pose",
         dest="pose",
         metavar="FILE|A,B,…",
-        help="the template's pose, roughly that of the target, given as for --pose",
+        help="the template's pose, similar to the target's pose, given as for --pose",
     )
     parser.add_argument(
         "--template-frame",

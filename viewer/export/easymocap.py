@@ -51,7 +51,7 @@ __all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
-_BLOCK = 256  # frames whose numbers are formatted at once
+_BLOCK = 256  # number of frames formatted together
 _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 

@@ -42,7 +42,7 @@ class Counting:
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return a scene's frame numbering: that of its longest capture, or from the earliest start.
+    """Return a scene's frame numbering: its longest capture's, or from the earliest start.
 
     Parameters
     ----------

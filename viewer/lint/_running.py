@@ -79,8 +79,8 @@ def lint_scene(
     Returns
     -------
     list of Finding
-        Findings by actor, in the order of ``CHECKS``, then those of its figure's other animations;
-        each has its actor and locations.
+        Findings by actor, in the order of ``CHECKS``, then findings about its figure's other
+        animations; each has its actor and locations.
     """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
@@ -101,7 +101,7 @@ def lint_scene(
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)
         if number + 1 == len(steps) or steps[number + 1][0] is not subject:
-            subject.tracks.clear()  # a long track takes a lot of memory, and is not needed again
+            subject.tracks.clear()  # a long track uses much memory, and is not needed again
     return findings
 
 

@@ -95,7 +95,7 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return []
-    # If the position of a joint is unknown, so are those of the joints below it.
+    # If the position of a joint is unknown, so are the positions of the joints below it.
     known = subject.valid("joints", skeleton.n_joints)
     for joint, parent in enumerate(skeleton.parents.tolist()):
         known[joint] &= parent < 0 or bool(known[parent])

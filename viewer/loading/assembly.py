@@ -183,7 +183,7 @@ def _switch_on_springs(cast: Cast, up: str) -> None:
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
-    """Pair skeletons with skins: by joint count and name, then by joint count, then the rest."""
+    """Pair skeletons with skins: by joint count and name, then by joint count, then in order."""
     complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
     parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
     skeletons = [index for index, figure in parts if figure.skeleton is not None]

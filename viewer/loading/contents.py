@@ -39,7 +39,7 @@ class Contents:
     Attributes
     ----------
     figures : list of (Path, Figure)
-        All figures, those of groups included.
+        All figures, including the figures of groups.
     groups : list of FigureGroup
         Figures of one file, which keep their places relative to each other and to their cameras.
     called : dict

@@ -144,7 +144,7 @@ def _model(
 ) -> tuple[Figure, bool, Figure | None]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
-    A body model among the files is not shown as an actor of its own. The third result is a figure
+    A body model among the files is not shown as a separate actor. The third result is a figure
     with different joints that the bodies move: that of ``--model``.
     """
     if named is not None:
@@ -321,7 +321,7 @@ def _begin_capture(
     is_bundled: bool,
     target: Figure | None,
 ) -> None:
-    """Read a capture until the first person appears; the rest is read later."""
+    """Read a capture until the first person appears; the remaining frames are read later."""
     capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)

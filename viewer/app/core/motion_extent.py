@@ -132,7 +132,7 @@ class MotionExtent:
         """Return the outermost points at one time; none if all actors are absent."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
-            # Hair and clothes hardly change the size of a motion, but simulating it takes long.
+            # Hair and clothes hardly change the size of a motion, but simulating them takes long.
             actor.springs = None
             if actor.pose is not None:
                 weights = actor.pose.shape_weights

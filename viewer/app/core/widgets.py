@@ -96,7 +96,7 @@ def explain(text: str, why: str = "") -> None:
 
 
 def show_tooltip(text: str) -> None:
-    """Show a tooltip, unless it would cover what is being typed or dragged in the last widget."""
+    """Show a tooltip, unless it would cover text being typed, or a drag, in the last widget."""
     if not imgui.is_item_active():
         imgui.set_tooltip(text)
 
@@ -211,7 +211,7 @@ def button(state: AppState, label: str, why: str = "") -> bool:
 
 
 def offer_files(state: AppState, text: str) -> None:
-    """Draw why a panel is empty, and a button that opens files to fill it."""
+    """Draw the reason why a panel is empty, and a button that opens files to fill it."""
     imgui.text_wrapped(text)
     if button(state, "Open files…"):
         state.wants.add("open dialog")

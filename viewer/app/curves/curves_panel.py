@@ -221,7 +221,7 @@ def _draw_tools(state: AppState) -> None:
         add_key_at(state, view.rows, state.clock.time - state.actor.offset)
     if _button_beside(state, "Key pose", "key the whole pose at the current time"):
         key_present_pose(state)
-    if _button_beside(state, "Key changes", "key only what differs from the clip"):
+    if _button_beside(state, "Key changes", "key only the values that differ from the clip"):
         key_present_pose(state, only_changed=True)
     if isinstance(state.actor.clip, Clip) and _button_beside(
         state, "Save clip…", "save the clip as .anim"

@@ -183,7 +183,7 @@ def opened_suffixes() -> set[str]:
 
 
 def folder_of(paths: Sequence[Path]) -> Path:
-    """Return a dialog's initial folder: that of the first file, the current folder, or home."""
+    """Return a dialog's initial folder: the first file's folder, the current folder, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
     except (OSError, RuntimeError):  # the current folder no longer exists

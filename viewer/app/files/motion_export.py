@@ -175,7 +175,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
         if frames is not None and frames[0] >= frames[1]:
             notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
             continue
-        # Edits made during the export must not change what is written.
+        # Edits made during the export must not change the written motion.
         copied = actor.copy()
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None

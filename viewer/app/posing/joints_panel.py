@@ -223,7 +223,7 @@ def _draw_dof(
     imgui.align_text_to_frame_padding()
     start = imgui.get_cursor_pos_x()
     imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), name)
-    # All sliders of a joint begin at one place, whatever the width of their labels.
+    # All sliders of a joint begin at the same position, regardless of the widths of their labels.
     imgui.same_line(start + _LABEL_WIDTH * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
     low, high = skeleton.dof_limits[dof]

@@ -118,7 +118,7 @@ def _draw_file(state: AppState, settings: RecordSettings) -> None:
             state, "Compression quality###Quality", settings.quality, (0, 100)
         )
         settings.quality = min(max(settings.quality, 0), 100)
-        explain("higher quality gives larger files")
+        explain("higher quality results in larger files")
 
 
 def _draw_picture(state: AppState, settings: RecordSettings) -> None:
@@ -175,7 +175,7 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
 
 
 def _draw_range(state: AppState, settings: RecordSettings) -> None:
-    """Draw the first and last frame, which are those of the playback range unless edited."""
+    """Draw the first and last frame, by default the ends of the playback range."""
     clock = state.clock
     lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
     shown = settings.frames or playback_frames(state)

@@ -107,8 +107,8 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     matrix : (4, 4)
         Matrix that is nearly a similarity, without reflection; rounding errors are removed.
     like : Similarity or None
-        Similarity before the change. If it stretches the template along its own axes, so does the
-        result.
+        Similarity before the change. If it stretches the template along the template's axes, the
+        result does so too.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     own = np.ones(3)

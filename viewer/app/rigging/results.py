@@ -228,7 +228,7 @@ def plays_trial(result: Result) -> bool:
 
 
 def no_trial_of(result: Result) -> str:
-    """Return why a result cannot play the trial motion."""
+    """Return the reason why a result cannot play the trial motion."""
     skeleton = result.rigged.figure.skeleton
     found = None if skeleton is None else trial_clip(skeleton, result.rigged.pose)
     return "" if found is not None else "no joint of the template can rotate"
@@ -244,7 +244,7 @@ def set_trial(state: AppState, result: Result, plays: bool) -> None:
 
 
 def no_motion_of(result: Result | None) -> str:
-    """Return why a result cannot play the motion of its template."""
+    """Return the reason why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
     if isinstance(result.template.clip, JointMotion):

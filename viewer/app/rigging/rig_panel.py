@@ -244,7 +244,7 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         text = "%d" if choices.max_influences else "all"
         limits = (0, _MOST_INFLUENCES)
         most = count_slider(state, "Max. influences", choices.max_influences, limits, text)
-        explain("largest influences to keep per vertex; 0 keeps all", why)
+        explain("number of influences to keep per vertex, largest first; 0 keeps all", why)
         choices.max_influences = max(most, 0)
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("transfer the template's pose correctives, if any", why)

@@ -163,7 +163,7 @@ def start_reading(
 
 
 def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
-    """Return a function that gives a thread the template in its current or aligned pose.
+    """Return a function that provides a thread with the template in its current or aligned pose.
 
     The thread reads the template first if necessary.
     """

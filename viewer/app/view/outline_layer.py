@@ -1,4 +1,4 @@
-"""Image of the outlines over the view, separate from that of the scene.
+"""Image of the outlines over the view, separate from the image of the scene.
 
 The item under the pointer changes often, whereas the image of the scene, which may be the average
 of many passes, is kept.

@@ -37,7 +37,7 @@ _FIRST = ("weight", "field", "class", "parts")
 
 
 def no_view(state: AppState, key: str) -> str:
-    """Return why a scalar quantity cannot be shown; a joint or field may still have to be chosen.
+    """Return the reason why a scalar quantity cannot be shown; a joint or field may yet be chosen.
 
     Parameters
     ----------

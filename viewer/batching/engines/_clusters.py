@@ -35,7 +35,7 @@ _CONFIG = {
     # Without Dask's MALLOC_TRIM_THRESHOLD_: it returns freed memory, so new arrays cause page
     # faults.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
-    # These poll the workers many times a second, which takes a tenth or more of the time of short
+    # These poll the workers many times a second, which takes at least a tenth of the time of short
     # items.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",

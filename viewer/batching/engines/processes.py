@@ -264,8 +264,9 @@ class _Workers:
         pool = ProcessPool(
             self.limits.workers, initializer=_prepare, initargs=given, context=self._context
         )
-        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides what to
-        # end. Workers inherit the signal mask, as do the threads that start further workers.
+        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides which
+        # processes to end. Workers inherit the signal mask, as do the threads that start further
+        # workers.
         with signals_blocked():
             _ = pool.active  # starts the pool
         return pool

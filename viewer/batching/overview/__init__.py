@@ -12,7 +12,7 @@ from viewer.phrases import printable
 __all__ = ["PAGES", "check_overview", "overview_files", "save_overview"]
 
 PAGES = (".html", ".htm")
-"""Suffixes of pages; all others are those of pictures."""
+"""Suffixes of pages; all other suffixes are those of pictures."""
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 

@@ -138,7 +138,7 @@ def _lone_archive(names: Sequence[str]) -> str | None:
 
 
 def _needed(archive: Archive, chosen: Chosen) -> Iterable[str]:
-    """Return the chosen files and what they may refer to: textures and buffers next to them."""
+    """Return the chosen files, and textures and buffers next to them, which they may need."""
     files = [name for name in chosen if name in archive.members]
     folders = {PurePosixPath(name).parent for name in files} or {
         PurePosixPath(name) for name in chosen

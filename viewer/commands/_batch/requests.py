@@ -89,7 +89,7 @@ def _fixed(arguments: argparse.Namespace) -> list[str]:
 
 
 def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """Return the paths of the batch, and messages about those that are left out."""
+    """Return the paths of the batch, and messages about omitted paths."""
     if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
         return arguments.files, []
     found = find_submissions(arguments.files)

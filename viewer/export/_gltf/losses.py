@@ -189,7 +189,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
     """Return a note that lists the parts of a figure that the file does not contain.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())

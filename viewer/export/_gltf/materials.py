@@ -132,7 +132,7 @@ class Materials:
         if key not in self._images:
             data = texture.encoded or encode_png(image)
             added = self._document.picture(data, texture.name or name)
-            # The pixels are kept alive, so that no other array gets their id.
+            # A reference keeps the pixels alive, so that no other array gets their id.
             self._images[key] = added, image
         source, sampler = self._images[key][0], self._sampler(texture)
         pair = source, sampler

@@ -102,7 +102,7 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
 
 
 def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
-    """Return the height by which a figure is raised to stand on the ground; 0 if it nearly does.
+    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there.
 
     ``joints`` (J, 3): their positions.
     ``up`` (3,): vector whose dot product with a position is its height.
