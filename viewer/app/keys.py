@@ -16,8 +16,8 @@ from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
 
 __all__ = ["Keyboard", "handle_keys"]
 
-_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # repeat while held
-_NAVIGATION = {  # keys that move in an open menu or list, and choose from it
+_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # these repeat while held
+_NAVIGATION = {  # these move in an open menu or list, and choose from it
     imgui.Key.left_arrow,
     imgui.Key.right_arrow,
     imgui.Key.up_arrow,
@@ -25,7 +25,7 @@ _NAVIGATION = {  # keys that move in an open menu or list, and choose from it
     imgui.Key.space,
     imgui.Key.enter,
 }
-_ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog is open
+_ALWAYS = ("Esc", "Ctrl+Q")  # these work even while a message or dialog is open
 _Bound = tuple[imgui.Key, bool, Shortcut]
 """A key without modifiers, whether it repeats while held, and its action."""
 
@@ -72,7 +72,7 @@ def handle_keys(state: AppState) -> None:
     held, keyboard.modifiers = now | keyboard.modifiers, now
     if imgui.get_io().want_text_input:
         return
-    # Otherwise ImGui would move the focus with Tab also while nothing is typed.
+    # Otherwise ImGui would move the focus with Tab even while nothing is typed.
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
     if state.of(Palette).is_open:
         # Letters may be typed before the text box of the palette has the focus.
@@ -97,7 +97,7 @@ def handle_keys(state: AppState) -> None:
 
 
 def _bound(chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
-    """Return the keys by their modifiers; to take chords apart in every frame is slow."""
+    """Return the keys by their modifiers; splitting chords in every frame would be slow."""
     mask = int(imgui.Key.mod_mask_)
     bound: dict[int, list[_Bound]] = {}
     for shortcut in KEYS:

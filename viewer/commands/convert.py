@@ -1,4 +1,4 @@
-"""Converts figures, poses and motions to other formats."""
+"""Conversion of figures, poses and motions to other formats."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
-        return  # the files are known only when the motion has been read
+        return  # the files are unknown until the motion has been read
     is_pose = all(kind.writes_pose for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(arguments), arguments.force)
@@ -193,7 +193,7 @@ def _write_together(
 def _write_apart(
     arguments: argparse.Namespace, scene: Scene, skinning: Skinning, places: Mapping[Actor, Path]
 ) -> list[Diagnostic]:
-    """Write each actor to a file of its own."""
+    """Write each actor to a separate file."""
     optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
     check_targets(files, inputs_of(arguments, scene), arguments.force)

@@ -34,7 +34,7 @@ from viewer.rig.units import METRES, UNIT_NAMES
 __all__ = ["export_animation"]
 
 _DEFAULT_UNIT = "cm"
-_SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
+_SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
 
 

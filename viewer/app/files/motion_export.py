@@ -37,7 +37,7 @@ from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
-_MANY = (".obj",)  # one file per frame: only exported by the command line
+_MANY = (".obj",)  # one file per frame: exported by the command line only
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = [
@@ -64,7 +64,7 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def motion_formats(actor: Actor) -> dict[str, Exporter]:
-    """Return the exporters of motions by suffix; of several the one that suits the actor."""
+    """Return exporters of motions by suffix: if there are several, the one that suits the actor."""
     found = {
         suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
         for suffix in motion_suffixes()
@@ -73,7 +73,7 @@ def motion_formats(actor: Actor) -> dict[str, Exporter]:
 
 
 def unsuited_formats(actor: Actor) -> dict[str, str]:
-    """Return why formats cannot hold the motion of an actor, by suffix."""
+    """Return the reasons why formats cannot store the motion of an actor, by suffix."""
     skeleton = actor.figure.skeleton
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
     found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
@@ -175,7 +175,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
         if frames is not None and frames[0] >= frames[1]:
             notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
             continue
-        # Edits made during the export must not change what is written.
+        # Edits made during the export must not change the written motion.
         copied = actor.copy()
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None

@@ -26,7 +26,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, rest_translatio
 from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import Skeleton
 
-_BLOCK = 128  # frames at a time, so that their matrices fit into the processor's cache
+_BLOCK = 128  # frames per block, whose matrices fit into the processor's cache
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 

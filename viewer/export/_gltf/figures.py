@@ -43,7 +43,7 @@ class Added:
     clips : sequence of TransformClip or None
         The animations to write; None if only the pose was written.
     kept : dict of TransformClip
-        Those with an effect, by index in the file.
+        Animations with an effect, by index in the file.
     """
 
     figure: Figure
@@ -112,7 +112,7 @@ def figure_losses(
 ) -> list[Diagnostic]:
     """Return notes with the largest errors of a figure, and about data that is not written.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes

@@ -77,7 +77,7 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
     is_near = _INCHES[0] < size < _INCHES[1]
-    inches = f"; inches would be {metres:.3g} m" if is_near else ""
+    inches = f"; if in inches, {metres:.3g} m" if is_near else ""
     values = {"size": size, "metres": metres if is_near else 0.0}
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
