@@ -32,11 +32,11 @@ class FootLock:
     Attributes
     ----------
     n_contacts : int
-        Number of times a foot stands.
+        Number of contacts of a foot with the ground.
     before, after : float
         Distance that feet slide while they stand, in total, figure units.
     lowered : float
-        Largest distance by which the body was lowered for legs that are too short.
+        Largest distance by which the body was lowered because a leg was too short.
     """
 
     n_contacts: int = 0
@@ -63,9 +63,9 @@ def lock_feet(
 ) -> tuple[SampledClip, FootLock]:
     """Return a motion whose feet do not slide while they stand.
 
-    In a contact of the ball of a foot, or else of its ankle, that joint stays at one place; the
-    foot keeps its orientation. Before and after contacts the correction fades. Hips and knees
-    rotate to reach the ankles; where a leg is too short, the body is lowered.
+    In a contact of the ball of a foot, or else of its ankle, that joint stays fixed; the foot keeps
+    its orientation. Before and after contacts the correction fades. Hips and knees rotate so that
+    the ankles reach their targets; if a leg is too short, the body is lowered.
 
     Parameters
     ----------

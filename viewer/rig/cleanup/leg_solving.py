@@ -135,7 +135,7 @@ def lowering(
     width = 2 * max(1, round(EASE * rate)) + 1
     padded = np.pad(needed, width - 1, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
-    # The moving average of moving maxima is nowhere below the values themselves.
+    # The moving average of moving maxima is never below the values themselves.
     return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)
 
 

@@ -21,7 +21,7 @@ class Measure:
     name : str
         ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
     kind : "length", "angle" or "weight"
-        Lengths are in the first figure's unit, angles in radians, weights dimensionless.
+        Lengths are in the first figure's unit, angles in radians; weights are dimensionless.
     maximum, mean : float
         Maximum and mean over all compared items and steps.
     step, item : str

@@ -148,7 +148,7 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
 
 
 def _taken(rows: Floats, places: Ints) -> Floats:
-    """Return the rows at some places; the array itself if these are all rows."""
+    """Return the rows at some indices; the array itself if these are all rows."""
     if len(places) == len(rows) and (places == np.arange(len(rows))).all():
         return rows
     return rows[places]

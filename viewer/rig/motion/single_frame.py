@@ -42,7 +42,7 @@ def single_frame(
     Returns
     -------
     SampledAnimation
-        Its ``motion`` contains the frame as well: one key per DOF for rigs with keyed clips.
+        Its ``motion`` also contains the frame: one key per DOF for rigs with keyed clips.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def upright_single_frame(
     time: float = 0.0,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose, rotated upright if its own world is upside down.
+    """Return an actor's current pose, rotated upright if its world is upside down.
 
     Parameters
     ----------

@@ -60,7 +60,8 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     Returns
     -------
     Actor
-        Actor with the same placement, which no longer applies; the actor itself if nothing changes.
+        Actor with the same placement, which no longer applies to it; the given actor if nothing
+        changes.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
@@ -96,6 +97,6 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
         shifts = (wanted - upright.figure_translation - within) / pose.figure_scale
         upright.translations[roots] += shifts
     rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
-    # The limits apply to the figure's own world, which is upside down.
+    # The limits apply to the figure's original world, which is upside down.
     set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
     return upright

@@ -19,7 +19,7 @@ def parameter_pose(
 ) -> Pose:
     """Return the pose that SAM 3D Body stores for MHR.
 
-    Its vertices and joints are those of the pose times 0.01, with y and z negated.
+    The tool's vertices and joints are those of the pose times 0.01, with y and z negated.
 
     Parameters
     ----------

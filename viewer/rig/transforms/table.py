@@ -101,7 +101,7 @@ class Curves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """Joints or shapes that one path animates, in the order of the samples.
+    """Joints or shapes animated by one path, in the order of the samples.
 
     Attributes
     ----------
