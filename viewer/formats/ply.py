@@ -77,7 +77,7 @@ def read(source: Source) -> Figure:
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
     materials = _materials(source, header, uvs is not None)
-    # Scans have the colours of their texture at the vertices, too.
+    # Scans also have the colours of their texture at the vertices.
     is_painted = any(material.image is not None for material in materials)
     mesh = Mesh(
         positions=positions,

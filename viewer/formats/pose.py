@@ -299,7 +299,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     Returns
     -------
     list of Diagnostic
-        Empty: the formats hold all that they are given for.
+        Empty: the formats store everything that is written to them.
 
     Raises
     ------

@@ -109,7 +109,7 @@ def _regressor(
 
 
 def _vertices_of(place: object, base: BaseMesh) -> Ints:
-    """Return the vertices whose mean is a position; none if its form is unknown."""
+    """Return the vertices whose mean is a position; an empty list if its form is unknown."""
     told = place if isinstance(place, dict) else {}
     strategy, cube = told.get("strategy"), str(told.get("cube_name"))
     if strategy == "CUBE" and cube in base.quads:
@@ -119,7 +119,7 @@ def _vertices_of(place: object, base: BaseMesh) -> Ints:
     if not isinstance(found, list):
         return np.zeros(0, dtype=np.int32)
     end = len(base.positions)
-    # A vertex that is listed twice counts twice.
+    # A vertex that is listed twice has twice the weight.
     known = [vertex if isinstance(vertex, int) and 0 <= vertex < end else -1 for vertex in found]
     return np.array(known, dtype=np.int32)
 

@@ -155,7 +155,7 @@ class Rows:
     places: list[int] = field(default_factory=list)  # indices in the files' lists of people
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
-        """Record the origin of an accepted record."""
+        """Store the origin of an accepted record."""
         self.frames.append(frame)
         self.paths.append(path)
         self.places.append(place)
@@ -163,7 +163,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return the frames of the recording to which the kept rows belong; absent in others."""
+        """Return the timing of the kept rows; the person is absent in all other frames."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]

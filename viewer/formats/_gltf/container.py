@@ -96,7 +96,7 @@ def _end(source: Source) -> int:
         raise source.fault("F002.gltf-version", found=version)
     if length != size:
         source.warn("G001.length", expected=length, found=size)
-    # A longer file has other data after its chunks; a truncated one ends early.
+    # A file that is too long has other data after its chunks; a truncated one ends early.
     return length if _HEADER.size + _CHUNK.size <= length < size else size
 
 

@@ -15,7 +15,7 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
 _SIZES = {3: "triangle", 4: "quad"}
 
 

@@ -42,9 +42,9 @@ class _Groups:
     """Groups with the same number of bits per delta, above 0."""
 
     starts: list[int] = field(default_factory=list)
-    """Their positions in the stream."""
+    """Positions of the groups in the stream."""
     places: list[int] = field(default_factory=list)
-    """Their positions in the result, in groups."""
+    """Positions of the groups in the result, in units of groups."""
 
 
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:

@@ -26,7 +26,7 @@ Letters = NDArray[np.uint8]
 KEYWORDS = ("v", "vt", "vn", "f")
 """Keywords of the lines that contain numbers."""
 
-_PIECE = 1 << 18  # bytes
+_PIECE = 1 << 18  # bytes per piece
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _LINE_END = re.compile(rb"[\r\n]")
 _PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
@@ -114,7 +114,7 @@ def _split(data: bytes, base: int) -> Lines:
     if len(indented):
         inked = np.append(np.flatnonzero(~_is_blank(letters)), len(letters))
         first = inked[np.searchsorted(inked, starts[indented])]
-        starts[indented] = np.minimum(first, ends[indented] - 1)  # for an empty line, its end
+        starts[indented] = np.minimum(first, ends[indented] - 1)  # the end of an empty line
     first, second, third = (letters.take(starts + k, mode="clip") for k in range(3))
     ends_at_1, ends_at_2 = _is_blank(second), _is_blank(third)
     is_v = first == ord("v")

@@ -39,7 +39,7 @@ __all__ = ["claims_folder", "read", "read_folder", "recognises"]
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
 _TRACKS = "track_info.json"
-_SIZE = 32 << 20  # bytes of the file of tracks
+_SIZE = 32 << 20  # maximum size of the file of tracks, bytes
 
 
 def recognises(archive: Archive) -> bool:
