@@ -21,10 +21,11 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Layout", "lay_out"]
 
-_FEWEST, _MOST = 256, 1024  # labels per batch: the first batch, and the limit of later batches
+_FEWEST, _MOST = 256, 1024  # number of labels in the first batch, and maximum of later batches
 _CELL = 0.5  # side length of a cell in gaps, unless this gives too many cells
-_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # more cells cost more than they save
-_SAMPLES = 5  # columns of a label that are tested first; they detect most overlaps
+# Maximum numbers of cells, above which a grid costs more than it saves.
+_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000
+_SAMPLES = 5  # number of columns of a label that are tested first; they detect most overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +37,7 @@ class Layout:
     chosen : (M,)
         Indices of the placed labels, in the order of placement.
     corners : (M, 2)
-        Their top left corners, integer pixels.
+        Top left corners of the labels, integer pixels.
     ends : (M, 2)
         Point on each label that is nearest to the labelled point, pixels.
     has_line : (M,) bool
@@ -141,13 +142,13 @@ def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
 class _Taken:
     """Mask of the pixels occupied by labels and lines.
 
-    ``picture``: width and height, pixels.
-    ``gap``: pixels between a point and its label.
+    ``picture`` is the width and height, pixels; ``gap`` is the number of pixels between a point and
+    its label.
     """
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:
         self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
-        # Half a gap is kept free on both sides, so that adjacent labels do not read as one.
+        # Half a gap stays free on both sides, so that adjacent labels do not read as one.
         self._apart = round(0.5 * gap)
 
     def may_be_open(self, low: Ints, high: Ints) -> Bools:
