@@ -190,7 +190,7 @@ def drop_unused(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
 
 def flip_for_valence(vertices: Floats, triangles: Ints) -> Ints:
-    """Flip edges where that brings the four valences closer to 6 (4 on the rim)."""
+    """Flip edges if that brings the four valences closer to 6 (4 on the rim)."""
     edges = find_edges(triangles)
     n = len(vertices)
     valence = np.bincount(edges.ends.ravel(), minlength=n)
