@@ -134,7 +134,7 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
     """Return properties side by side, (N, len(names)); None if one is missing.
 
-    Invalid rows are recorded as errors and become NaN; in a text file they are NaN already.
+    Invalid rows are recorded as errors and become NaN; in a text file they are already NaN.
     """
     if any(name not in table.columns for name in names):
         return None
@@ -203,7 +203,7 @@ def _corners(
     if not is_wrong.any():
         return corners
     owners = np.repeat(np.arange(len(counts)), counts)
-    # Words of a text that are not numbers are recorded already.
+    # Words of a text that are not numbers have already been recorded.
     wrong = np.flatnonzero(
         is_wrong & ~np.isnan(values) if faces.offset_of is not None else is_wrong
     )

@@ -297,7 +297,7 @@ def _as_rest_of_line(texture: str | None) -> str | None:
 
 
 def _bindings_text(skin: Skin) -> bytes:
-    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # +0.0 turns -0.0 into 0.0
+    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # adding 0.0 replaces -0.0 by 0.0
     # The rows of the text are the matrix's columns.
     blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
     return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n".encode()

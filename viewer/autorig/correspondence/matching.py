@@ -26,14 +26,15 @@ __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
 _INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
-_TOGETHER = math.radians(80.0)  # between a normal and the centre of its group; see _sides
+# Maximum angle between a normal and the centre of its group; see _sides.
+_TOGETHER = math.radians(80.0)
 # Two sides of a sheet cancel out if less than this fraction of the area around a vertex remains.
 _CANCELLED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """Criteria by which a vertex counts as lying on the template.
+    """Criteria by which a vertex is matched with the template.
 
     Attributes
     ----------
@@ -175,7 +176,7 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
 
 
 def _closest(template: Template, target: Welded) -> SurfacePoints:
-    """Return the closest points, or the vertices identical to the target's own."""
+    """Return the closest points, or the template vertices that are identical to the target's."""
     points, welded = template.surface.closest(target.positions), template.welded
     same = same_vertices(welded, target, points.distances)
     corners = welded.vertices[template.triangles]
@@ -232,7 +233,8 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
         triangles[inside] = facing[part.triangles]
         barycentric[inside], found[inside] = part.barycentric, part.positions
         distances[inside] = part.distances
-    # If no triangle faces that way, the distance is infinite, but the coordinates are valid.
+    # If no triangle faces in that direction, the distance is infinite, but the coordinates are
+    # valid.
     distances[np.isinf(distances)] = np.finfo(float).max
     return SurfacePoints(triangles, barycentric, found, distances)
 

@@ -15,8 +15,8 @@ from viewer.rig.skin import Skin, influence_counts
 
 __all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts", "transfer_joints"]
 
-_ENOUGH = 0.5  # fraction of a joint's weights that must be matched
-_SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
+_ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
+_SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees
 _INSIDE = 0.5  # winding number that separates outside from inside
 
 

@@ -21,7 +21,7 @@ __all__ = [
     "template_lines",
 ]
 
-_LISTED = 5  # islands listed individually
+_LISTED = 5  # maximum number of islands that are listed individually
 _FEW = 0.75  # fraction of matched vertices below which too many weights are estimates
 
 

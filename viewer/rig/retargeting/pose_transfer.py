@@ -128,7 +128,7 @@ def dof_layout(figure: Figure) -> str:
         Figure with a skeleton.
     """
     skeleton = figure.require_skeleton()
-    # Adding 0 turns -0 into 0.
+    # Adding 0 replaces -0 by 0.
     rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0
     parts = (
         repr((skeleton.names, figure.up)).encode("utf-8", "surrogatepass"),
