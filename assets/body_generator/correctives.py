@@ -66,7 +66,7 @@ def _subtree(j: int) -> np.ndarray:
 
 
 def _influence(body: Body, bend: Bend, j: int) -> Floats:
-    """Return 0..1 (V,): 1 near the joint where it or its parent moves the skin."""
+    """Return 0..1 (V,): 1 near the joint where its weights blend with its parent's."""
     far = np.linalg.norm(body.vertices - CENTRES[j], axis=1) / bend.reach
     share = body.weights[:, _subtree(j)].sum(axis=1)
     mixed = np.clip(12 * share * (1 - share), 0, 1)

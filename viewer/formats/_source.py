@@ -139,7 +139,7 @@ class Source:
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
-        """Yield words and braces as matches; a brace is always a word of its own."""
+        """Yield words and braces as matches; a brace is always a separate word."""
         return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
 
     def next_word(self, start: int) -> re.Match[bytes] | None:

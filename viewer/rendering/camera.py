@@ -72,7 +72,7 @@ class Camera:
     front : float
         Azimuth of the front view; named views are relative to it.
     seconds : float
-        Time of the scene, which determines where a moving calibrated camera is.
+        Time of the scene, which determines the position of a moving calibrated camera.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))

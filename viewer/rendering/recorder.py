@@ -124,7 +124,8 @@ class Recording:
     box : (2, 3) or None
         Bounds for the ground grid and the depth range; None for those of the current scene.
     moves : bool
-        Whether clips pose the actors; False keeps their poses, for a turntable of a still pose.
+        Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
+        pose.
     interpolate : bool
         Interpolate across gaps of captures.
     turntable : float

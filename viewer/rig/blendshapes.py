@@ -143,7 +143,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; missing weights count as 0.
+            N <= S; missing weights are treated as 0.
 
         Returns
         -------
@@ -166,7 +166,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; missing weights count as 0.
+            N <= S; missing weights are treated as 0.
 
         Returns
         -------

@@ -31,7 +31,7 @@ __all__ = [
 ]
 
 PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person"]
-"""Whether a part is drawn from outside, from the character's own eyes, or in both views.
+"""Whether a part is drawn from outside, from the character's eyes, or in both views.
 
 ``"auto"`` parts are drawn from outside and, unless they have triangles that move with the head,
 from the eyes.

@@ -35,7 +35,7 @@ class MorphTarget:
     positions : (N, 3)
         In the mesh's own space and unit.
     normals : (N, 3) or None
-        Normals as stored; None keeps the normals of the mesh.
+        Normals as stored; None if the normals of the mesh are unchanged.
     """
 
     name: str

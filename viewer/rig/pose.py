@@ -44,7 +44,7 @@ class Pose:
     rotations, scales : (J, 4), (J, 3)
         Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
     shape_weights : (S,)
-        Weights of the figure's blend shapes; missing trailing weights count as 0.
+        Weights of the figure's blend shapes; missing trailing weights are treated as 0.
     figure_scale : float
         Scale of the whole skinned figure about its origin, applied after skinning.
     figure_translation : (3,)

@@ -273,7 +273,7 @@ def normalized(skin: Skin) -> Skin:
 
 
 def merged(skin: Skin) -> Skin:
-    """Return the skin with duplicate influences of a joint on a vertex summed into one."""
+    """Return the skin with duplicate influences of a joint on a vertex merged."""
     keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     if len(unique) == len(keys):

@@ -2,8 +2,8 @@
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
-moves all joints at once (``pose_step``). Corresponding points may be far apart at first, as for
-lowered and outstretched arms, and come closer with every iteration.
+moves all joints simultaneously (``pose_step``). Corresponding points may be far apart at first, as
+for lowered and outstretched arms, and come closer with every iteration.
 """
 
 from __future__ import annotations

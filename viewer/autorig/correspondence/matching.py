@@ -70,12 +70,12 @@ class Matches:
     Attributes
     ----------
     points : SurfacePoints
-        W points of the template: for each matched vertex, the closest with an agreeing normal; for
-        others, the closest.
+        W points of the template: for each matched vertex, the closest point with an agreeing
+        normal; for other vertices, the closest point.
     matched : (W,) bool
         Whether each vertex lies on the template.
     angles : (W,)
-        Angles between the normals, radians; 0 where the target has no normal.
+        Angles between the normals, radians; 0 if the target has no normal.
     inside_out : (I,) int32
         Islands of the target that were reversed.
     """
@@ -115,7 +115,7 @@ class Template:
 
 
 def sheet_normals(mesh: Welded) -> Floats:
-    """Return the unit normal of each vertex, 0 where there is none.
+    """Return the unit normal of each vertex, 0 if there is none.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def sheet_normals(mesh: Welded) -> Floats:
     Returns
     -------
     (W, 3)
-        0 for vertices without triangles, and where the two sides of a sheet cancel out.
+        0 for vertices without triangles, and if the two sides of a sheet cancel out.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
     vectors = np.cross(b - a, c - a)

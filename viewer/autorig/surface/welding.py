@@ -144,7 +144,7 @@ def _joined_nearby(positions: Floats, tolerance: float) -> Any:
     """Return a label for each position, the same for those within the tolerance.
 
     Each round merges every position with its nearest neighbour, so the size of clusters at least
-    halves per round; finding all pairs at once would take memory quadratic in a cluster's size.
+    halves per round; finding all pairs in one pass would take memory quadratic in a cluster's size.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     spatial = scipy_part("spatial")

@@ -45,8 +45,8 @@ def transfer_clip(
     Returns
     -------
     Clip or SampledClip
-        Clip with the same type, name and timing. Shape weights of captures are dropped: the target
-        has its own.
+        Clip with the same type, name and timing. Shape weights of captures are dropped, as the
+        target has a different shape.
 
     Raises
     ------

@@ -80,7 +80,7 @@ def _is_singular(linear: Floats) -> Bools:
     """Return the matrices whose smallest singular value is too small: (V,) bool.
 
     As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; singular
-    values are computed only where that bound is inconclusive.
+    values are computed only if that bound is inconclusive.
     """
     squares = np.einsum("vab,vab->v", linear, linear)
     bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)

@@ -104,7 +104,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     shared = (above >= 0) & (unique[place] == wanted) if len(unique) else np.zeros(0, np.bool_)
     product = weights[shared] * weights[place[shared]]
     rows, columns = joints[shared], vertices[shared]
-    # The boundary with a child also marks the end of the root's own region.
+    # The boundary with a child also marks the end of the root's region.
     at_root = parents[above[shared]] < 0
     return JointRegressor(
         count,

@@ -162,5 +162,5 @@ def _iterative(matrix: Any) -> _Solve:
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """Return a / b, 0 where b is not positive: columns already solved are unchanged."""
+    """Return a / b, 0 if b is not positive: columns already solved are unchanged."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

@@ -18,7 +18,7 @@ from viewer.rig.retargeting.joint_names import canonical_names
 __all__ = ["RIGS", "Rig", "humanoid_of", "read_rig"]
 
 RIGS = {
-    "default": "MakeHuman's own, with face, tongue and toes",
+    "default": "MakeHuman's default rig, with face, tongue and toes",
     "mixamo": "the joints of Mixamo",
     "game_engine": "the joints of Unreal's mannequin",
     "cmu_mb": "the joints of the CMU motions",

@@ -7,8 +7,8 @@ r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never pickled objects.
     header = "{" "'descr': '<f8'" "'fortran_order': False" "'shape': (6890, 3)" "}"   in any order
 
 On opening, the zip directory and the headers are read, and all sizes are checked for consistency.
-Values are read on demand, from the file if it is on disk. The header is matched by its grammar;
-numpy's own reader evaluates it as Python code, and warns about files of Python 2.
+Values are read on demand, from the file if it is on disk. The header is parsed by its grammar;
+numpy's reader would evaluate it as Python code, and warns about files of Python 2.
 """
 
 from __future__ import annotations

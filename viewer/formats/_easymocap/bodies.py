@@ -1,6 +1,6 @@
 """Body parameters of EasyMocap's records: layouts by length, and rows collected per person.
 
-The first three values of ``poses`` are the root's own rotation, which EasyMocap writes as 0:
+The first three values of ``poses`` are the rotation of the root, which EasyMocap writes as 0:
 ``Rh`` and ``Th`` move the body about the model's origin. Hand components of SMPL-X and MANO exclude
 the mean hand; those of SMPL+H include it.
 """
@@ -52,7 +52,7 @@ class BodyLayout:
     columns : tuple of (int, int)
         Ranges of ``poses`` for all joints except the root, in the order of ``names``.
     root : int
-        Number of values of the root's own rotation at the beginning: 3 or 0.
+        Number of values at the beginning that rotate the root: 3 or 0.
     hands : tuple of (str, int, int)
         Side, and the range of ``poses`` with its components.
     is_flat : bool

@@ -27,7 +27,7 @@ class Placed:
     prefix : str
         Prefix of the names of its arrays.
     told : dict
-        Its Parsed JSON of the mesh.
+        Parsed JSON of the mesh.
     materials : list of int
         Material of each slot, to which its faces refer.
     placement : (4, 4)

@@ -50,7 +50,7 @@ def _limit_memory() -> None:
 class _Scene:
     """A scene of ufbx.
 
-    Objects of the binding do not keep their parent objects alive, so all objects are held until the
+    Objects of the binding hold no references to their parents, so all objects are held until the
     process ends. Iterating over a list of the binding runs past its end, so lists are indexed.
     """
 

@@ -29,7 +29,7 @@ def filled_normals(
     source : Source
         The file, which records warnings about zero-length normals.
     normals : (V, 3) or None
-        Normals of the file; NaN where there is none.
+        Normals of the file; NaN if there is none.
     positions, triangles : (V, 3), (T, 3)
         The mesh.
     """

@@ -62,7 +62,7 @@ def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
     Parameters
     ----------
     joints : Joints
-        Auxiliary joints are appended where skins disagree.
+        Auxiliary joints are appended if skins disagree.
     skins : dict of NodeSkin
         By index in the file, in order of precedence.
 

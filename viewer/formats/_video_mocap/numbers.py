@@ -185,7 +185,7 @@ def sole(archive: Archive, key: str) -> float:
 
 
 def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
-    """Return K for focal lengths (N,), (N, 2) or one, and image centres (N, 2), pixels."""
+    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
     lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
     centers = np.atleast_2d(center)
     count = max(len(lengths), len(centers))

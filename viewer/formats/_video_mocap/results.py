@@ -117,7 +117,7 @@ class Results:
     cameras_of : callable or None
         Returns the cameras in world space if they depend on a figure's rest joints.
     frame_rate : float or None
-        Frames per second, if the tool always uses the same.
+        Frames per second, if the tool always uses the same rate.
     facts : tuple of (str, str)
         Recognised and ignored contents, for ``viewer info``.
     notes : tuple of Diagnostic

@@ -91,7 +91,7 @@ class BackFaces:
     def regions(
         self, model_view: Floats, projection: Floats, viewport: Region
     ) -> tuple[Region, ...] | None:
-        """Return the regions of the image where back faces can be seen; None for all of it.
+        """Return the regions of the image with visible back faces; None for the whole image.
 
         Parameters
         ----------

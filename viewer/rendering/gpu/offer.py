@@ -1,4 +1,4 @@
-"""OpenGL version offered by a machine that lacks the required one."""
+"""OpenGL version offered by a machine that lacks the required version."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Number of layers; the few dots of the first are enough to reject most crowded places."""
+        """Number of layers; the few dots of the first suffice to reject most crowded positions."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:

@@ -80,7 +80,7 @@ def point_radii(points: Floats) -> Floats:
 
 
 def _gaps(places: Floats) -> Floats:
-    """Return the distance of each point (N, 3) from the nearest other one: (N,)."""
+    """Return the distance of each point (N, 3) from its nearest neighbour: (N,)."""
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     apart[apart == 0.0] = np.inf
     return np.asarray(apart.min(axis=1))

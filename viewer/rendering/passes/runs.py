@@ -66,7 +66,7 @@ def draw_shapes(
     instances: int = 1,
     is_mirrored: bool = False,
 ) -> None:
-    """Draw the shapes of all surfaces, cut out where their materials are.
+    """Draw the shapes of all surfaces, with the cutouts of their materials.
 
     Parameters
     ----------

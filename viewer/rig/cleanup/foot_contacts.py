@@ -1,4 +1,4 @@
-"""Frames in which a joint of a foot stands on the ground, by its height and speed."""
+"""Detection of the frames in which a joint of a foot is on the ground, by its height and speed."""
 
 from __future__ import annotations
 

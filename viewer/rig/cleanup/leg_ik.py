@@ -53,7 +53,7 @@ def bend(
     hips, knees, ankles : (F, 3)
         Positions.
     targets : (F, 3)
-        Targets of the ankle; those out of reach are approached as far as possible.
+        Targets of the ankle; those out of reach are approached as closely as possible.
     axis : (F, 3)
         Normals of the leg's plane for frames in which the leg is straight, thigh x shin.
 

@@ -111,7 +111,7 @@ def lowering(
     up : (3,)
         The up axis.
     extended : float
-        Legs extend up to this fraction of their full length, or as far as they did before.
+        Legs extend up to this fraction of their full length, or up to their previous extension.
 
     Returns
     -------

@@ -24,7 +24,7 @@ def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     first, second : Skin
         Influences of the same V vertices.
     pairs : Pairs
-        Matched joints; weights of unmatched joints count in full.
+        Matched joints; weights of unmatched joints are included in full.
 
     Returns
     -------

@@ -73,7 +73,7 @@ class Surface:
     positions : (V, 3)
         Any unit.
     triangles : (T, 3)
-        Vertex indices. Degenerate triangles count as segments or points.
+        Vertex indices. Degenerate triangles are treated as segments or points.
 
     Raises
     ------
@@ -282,7 +282,7 @@ def _pieces(corners: Floats) -> tuple[Floats, Ints]:
 
 
 def _workers(n_points: int) -> int:
-    """Return the number of threads for a query: one, or -1 for all processors."""
+    """Return the number of threads for a query: 1, or -1 for all processors."""
     return 1 if n_points < _FEW else -1
 
 

@@ -1,7 +1,7 @@
 """Closed surfaces, up to small openings: their inside is hidden.
 
 A ray from outside hits the front of such a surface before its back, unless it enters through an
-opening. It hits the back first only where skinning turns the surface inside out.
+opening. It hits the back first only if skinning turns the surface inside out.
 """
 
 from __future__ import annotations

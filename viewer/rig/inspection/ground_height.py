@@ -39,7 +39,7 @@ class Ground:
         Along the up axis; None if unknown.
     levels : tuple of (float, int)
         Heights at which feet rest with their numbers of frames, the most frequent first; if empty,
-        the height is a guess.
+        the height is only an estimate.
     """
 
     height: float | None
@@ -87,7 +87,7 @@ def ground_of(
 
 
 def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None:
-    """Return a guess of the ground height if feet never rest, as in noisy captures."""
+    """Return an estimate of the ground height if feet never rest, as in noisy captures."""
     if len(lowest) == 0:
         return None
     low, middle = np.quantile(lowest, [0.1, 0.5])

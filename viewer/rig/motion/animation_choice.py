@@ -133,7 +133,7 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
     """Let an actor play one of its figure's animations, or none, in place.
 
     Joints that the animation does not move return to the pose stored in the file. The figure's
-    placement and blend shapes that neither animation moves are kept.
+    placement and blend shapes that neither animation moves are unchanged.
 
     Parameters
     ----------

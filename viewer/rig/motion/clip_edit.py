@@ -132,7 +132,7 @@ def move_keys(
     keys : iterable of int
         Indices, which do not change.
     dt : float
-        Seconds; reduced where a key would otherwise pass an unmoved key.
+        Seconds; reduced if a key would otherwise pass an unmoved key.
     dv : float
         Length or radians.
     gap : float

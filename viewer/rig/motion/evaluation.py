@@ -334,7 +334,7 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:
-    """Return every joint's world matrix in every frame; all frames are computed at once.
+    """Return every joint's world matrix in every frame; all frames are computed together.
 
     Parameters
     ----------
@@ -351,7 +351,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     skeleton = figure.require_skeleton()
     frames, count = _constrained(figure, frames), frames.n_frames
     # The joint axis comes first, as forward_kinematics multiplies a joint's matrices of all frames
-    # at once.
+    # together.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
     linear = quaternion_to_matrix(frames.rotations)

@@ -123,7 +123,8 @@ def pose_frames(
     place, scale = np.zeros((1, 3)), np.ones(1)
     rotated, moved, scales = np.zeros((1, 0, 4)), np.zeros((1, 0, 3)), np.zeros((1, 0, 3))
     if pose is not None:
-        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing weights count as 0
+        # Missing weights are treated as 0.
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         scales = pose.scales[None].copy()

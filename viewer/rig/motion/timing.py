@@ -122,7 +122,7 @@ class Timing:
         Returns
         -------
         before, after : (T,)
-            Rows; both are -1 where there is no data.
+            Rows; both are -1 if there is no data.
         fraction : (T,)
             0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """

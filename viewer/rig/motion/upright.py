@@ -32,7 +32,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     Returns
     -------
     up : "y" or "z"
-        The axis that is mapped to the scene's up axis; the scene's own if that is x.
+        The axis that is mapped to the scene's up axis; the scene's up axis if that is x.
     hangs : bool
         Whether that axis points down.
     """

@@ -58,7 +58,7 @@ def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
     skeleton : Skeleton
         Provides the hierarchy and the DOF table.
     joint : int
-        The joint to move; its own rotations do not move it.
+        The joint to move; its rotations do not move its origin.
     length : int
         Maximum number of joints, not counting joints without a free rotation.
 
@@ -241,7 +241,7 @@ class _Solver:
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (self.damping * self.size) ** 2 * np.eye(3)
         for _ in range(len(start)):
-            # DOFs stopped at a limit move by a known amount; the step is solved for the others.
+            # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs.
             part = jacobian[:, free]
             left = error - jacobian[:, ~free] @ step[~free]
             step[free] = part.T @ np.linalg.solve(part @ part.T + damp, left)

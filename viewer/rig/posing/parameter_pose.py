@@ -28,7 +28,7 @@ def parameter_pose(
     parameters : (P,)
         ``mhr_model_params``: placement, pose and scales.
     identity, expression : (N,), (M,)
-        ``shape_params`` and ``expr_params``; missing trailing ones count as 0.
+        ``shape_params`` and ``expr_params``; missing trailing ones are treated as 0.
 
     Raises
     ------

@@ -119,7 +119,7 @@ def _part(part: str, name: str = "") -> Iterator[None]:
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
-    """Return a complete pose both by DOF names and as the model's own vector.
+    """Return a complete pose both by DOF names and as the model's pose vector.
 
     Parameters
     ----------
@@ -277,7 +277,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's own pose vector, or that of another member of the SMPL family."""
+    """Apply the model's pose vector, or that of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers

@@ -1,4 +1,4 @@
-"""Plan of where and when the feet of a driven figure must stand."""
+"""Plan of the positions and times at which the feet of a driven figure must be planted."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ class FootPlan:
         return moved - (moved @ self.up)[:, None] * self.up
 
     def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
-        """Return the total distance that balls and heels slide while they stand."""
+        """Return the total distance that balls and heels slide while they are in contact."""
         total = 0.0
         for points, contacts in zip(feet, self.contacts, strict=True):
             for contact in contacts:

@@ -41,13 +41,13 @@ def foot_shifts(
 ) -> tuple[list[Floats], Floats]:
     """Return the translations of all feet and of the body.
 
-    A foot is corrected while it stands. The body smoothly follows standing feet on straight legs,
-    so that these need not bend; other feet follow the body.
+    A foot is corrected while it is on the ground. The body smoothly follows planted feet on
+    straight legs, so that these need not bend; other feet follow the body.
 
     Parameters
     ----------
     plan : FootPlan
-        Positions and times at which the feet must stand, with at least one contact.
+        Positions and times at which the feet must be planted, with at least one contact.
     points : list of ((N, 3), (N, 3))
         Paths of the balls and the heels.
     heights : (N, L)

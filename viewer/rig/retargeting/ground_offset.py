@@ -17,7 +17,7 @@ _UPRIGHT = np.cos(np.radians(25.0))
 def ground_offset(
     source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
 ) -> Floats:
-    """Return the offset that puts the target's feet where those of the scaled source are.
+    """Return the offset that moves the target's feet to those of the scaled source.
 
     The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
     have another ratio. Without this offset, a body with high ankles sinks into the ground.

@@ -93,7 +93,7 @@ def posing_partners(figure: Figure) -> Ints:
 
     The result is that of ``joint_partners`` for symmetric skeletons. Pairs of other humanoids are
     found by the bones that their file states and by names (``Ear_L``, ``Ear_R``), and joints in the
-    mirror plane are their own; -1 for joints on one side only, such as a sword.
+    mirror plane are their own counterparts; -1 for joints on one side only, such as a sword.
 
     Raises
     ------
@@ -142,9 +142,9 @@ def _sided(meaning: str) -> tuple[str, str]:
 def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     """Return the mirrored pose, with left and right exchanged.
 
-    World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes that
-    of its counterpart; rest rotations may therefore differ between the sides. Joints without a
-    counterpart keep their local rotation.
+    World rotations relative to the rest pose are reflected, D' = F D F, and each joint gets the
+    rotation of its counterpart; rest rotations may therefore differ between the sides. Joints
+    without a counterpart keep their local rotation.
 
     Parameters
     ----------

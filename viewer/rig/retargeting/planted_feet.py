@@ -1,4 +1,4 @@
-"""Feet of driven figures, planted where those of the source stand (after Kovar et al. 2002).
+"""Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
 
 Retargeting keeps the directions of limbs, so that feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
@@ -45,8 +45,8 @@ class PlantedFeet:
     n_contacts : int
         Number of contacts of all feet.
     source, before, after : float
-        Total distance that feet slide while they stand, in figure units: in the source, scaled to
-        the figure, and in the figure before and after planting.
+        Total distance that feet slide while they are on the ground, in figure units: in the source,
+        scaled to the figure, and in the figure before and after planting.
     gap_before, gap_after : float
         Largest height of a standing sole above or below the ground.
     lowered : float

@@ -1,9 +1,9 @@
 """Contacts of the feet with the ground in a motion that drives a figure.
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
-moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A foot
-stands only if, at some time during the contact, it is the lowest foot (not one held still in the
-air), and if it is below its hip (not beside it, as in a lying person). So the ground need not be
+moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A contact
+is valid only if, at some time during it, the foot is the lowest one (not one held still in the
+air), and if it is below its hip (not next to it, as in a lying person). So the ground need not be
 flat: every contact has its own height, as on stairs.
 """
 
@@ -67,7 +67,7 @@ class Contact:
     start, stop : int
         Half-open range of rows.
     on_toe : (N,)
-        Rows of the range in which the ball stands; in the others, only the heel stands.
+        Rows of the range in which the ball is on the ground; in all others, only the heel is.
     hold : (N,)
         1 in rows in which the foot is slow, less where the contact begins and ends.
     height : float
@@ -155,8 +155,8 @@ def ground_level(
 ) -> tuple[float, bool]:
     """Return the height of feet on the ground, and whether the ground is at height 0.
 
-    This is the height at which feet stand longest, or, if their duration is similar, one at which
-    feet stand on a ground at height 0, as on the lowest step of stairs.
+    This is the height at which feet are on the ground longest or, if the durations are similar, a
+    height that is consistent with a ground at height 0, as on the lowest step of stairs.
 
     Parameters
     ----------

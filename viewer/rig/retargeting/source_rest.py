@@ -70,7 +70,7 @@ def with_source_rest(
     motion : SkeletonMotion
         The same clip, with another rest pose of the skeleton.
     notes : list of Diagnostic
-        The chosen rest pose, unless it is the skeleton's own.
+        The chosen rest pose, unless it is that of the skeleton.
 
     Raises
     ------

@@ -222,7 +222,7 @@ def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
 
 
 def _hits(listed: list[tuple[int, ...]]) -> tuple[tuple[Ints, Ints], ...]:
-    """Return the first collider of all points that have one, then the second ones, and so on."""
+    """Return the first colliders of all points, then the second colliders, and so on."""
     most = max(map(len, listed), default=0)
     pairs = []
     for rank in range(most):

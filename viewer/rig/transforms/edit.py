@@ -74,7 +74,7 @@ def move_transform_keys(
     places : iterable of (row, key)
         Selected keys.
     dt : float
-        Seconds; reduced where a key would otherwise come closer than ``gap`` to an unmoved one.
+        Seconds; reduced if a key would otherwise come closer than ``gap`` to an unmoved key.
     dv : float
         Change of the value of each selected component: radians, length, factor or weight.
     gap : float

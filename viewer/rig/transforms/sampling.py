@@ -141,7 +141,7 @@ def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats
 
 
 def _normalised(quaternions: Floats) -> Floats:
-    """Return unit quaternions; where a spline passes through 0, the rotation is arbitrary."""
+    """Return unit quaternions; if a spline passes through 0, the rotation is arbitrary."""
     lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     still = np.array([0.0, 0.0, 0.0, 1.0])
     return np.where(lengths > 0.0, quaternions / np.where(lengths > 0.0, lengths, 1.0), still)
