@@ -40,7 +40,7 @@ __all__ = ["read"]
 
 _LARGEST_RATIO = 8  # maximum ratio of rotations to numbers in the file
 _SMALL_CLIP = 1 << 24  # number of rotations up to which any ratio is accepted
-_CHUNK = 256  # frames at a time, so that their numbers fit into the processor's cache
+_CHUNK = 256  # frames per batch, so that their numbers fit into the processor's cache
 _THICKNESS = 0.1  # thickness of a joint's box, relative to the length of the bone
 # Limits of the thickness, relative to the length of a typical bone.
 _THINNEST, _THICKEST = 0.05, 0.3
@@ -95,8 +95,8 @@ class _Table:
     names: tuple[str, ...]
     parents: list[int]
     offsets: Floats  # (J, 3)
-    columns: list[list[tuple[int, int]]]  # per joint: code of the channel, column
-    ends: list[tuple[int, list[float]]]  # joint, offset of an End Site
+    columns: list[list[tuple[int, int]]]  # for each joint: code and column of its channels
+    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
     n_channels: int
 
 
@@ -196,7 +196,7 @@ def _boxes(table: _Table, parents: Ints) -> Floats:
 
 
 def _rotations(table: _Table, values: Floats) -> Floats:
-    """Multiply each joint's rotation channels, all joints with the same axes at once: (N, J, 4)."""
+    """Multiply each joint's rotation channels; joints with equal axes together: (N, J, 4)."""
     rotations = np.empty((len(values), len(table.names), 4))
     groups: dict[tuple[int, ...], list[int]] = {}
     turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]

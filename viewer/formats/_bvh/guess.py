@@ -27,7 +27,7 @@ _RATES = (
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
 _LONG = 2.0  # ratio of the z extent to the y extent above which z is up
-_UPRIGHT = 0.8  # smallest cosine of the angle between a standing body and an axis
+_UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
 _LOOKS = 16  # number of frames to examine
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
 _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
