@@ -164,7 +164,8 @@ def _line(result: Result) -> str:
     found["seconds"] = round(result.seconds, 6)
     try:
         return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)
-    except (ValueError, TypeError):  # JSON has no infinite numbers, no NaN, and only texts as keys
+    # JSON has no infinite numbers, no NaN, and only strings as keys.
+    except (ValueError, TypeError):
         found["values"] = plain(result.values)
         return json.dumps(found, default=str, separators=(",", ":"))
 

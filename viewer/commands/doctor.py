@@ -35,7 +35,7 @@ _EXTRAS = {
     "ufbx": "reading .fbx files",
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
-    "isal": "PNG images in less time",
+    "isal": "faster PNG encoding",
     "scipy": "viewer rig, comparing different meshes",
     "pebble": "worker processes of viewer batch",
     "dask": "viewer batch on clusters",

@@ -39,7 +39,7 @@ LIMIT = 1 << 29
 """Bytes of all entries; beyond it, the least recently used ones are removed."""
 
 _OFF = ("off", "0", "no", "none")
-_LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
+_LEAST = 1 << 15  # minimum bytes: parsing shorter text is faster than opening an entry
 _LARGEST = 1 << 25  # maximum bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")

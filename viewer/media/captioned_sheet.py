@@ -111,7 +111,7 @@ def _draw_text(
 
 
 def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
-    """Return a text that fits, with its middle elided if it is too long.
+    """Return text that fits, with its middle elided if it is too long.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
 
 
 def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], float]) -> list[str]:
-    """Return the lines of a text; long words are broken, and text that does not fit is omitted.
+    """Return text as lines; long words are broken, and text that does not fit is omitted.
 
     >>> wrapped("expected 3 numbers", 10, 2, len)
     ['expected 3', 'numbers']
@@ -165,7 +165,7 @@ def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], fl
 
 
 def elided_end(text: str, width: float, length_of: Callable[[str], float]) -> str:
-    """Return a text with an ellipsis at its end, shortened until it fits.
+    """Return text with an ellipsis at its end, shortened until it fits.
 
     >>> elided_end("numbers", 7, len)
     'number…'

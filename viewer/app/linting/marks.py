@@ -142,7 +142,7 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     facing : (3,)
         Mean normal, as in ``Places``.
     around : float
-        Smallest extent to show around their centre, as a fraction of the actor's size.
+        Minimum extent to show around their centre, as a fraction of the actor's size.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding

@@ -138,7 +138,7 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     places : sequence of float
         Start and end of each bar, alternating, in points.
     narrowest : float
-        Smallest width of a bar, unless its neighbours leave less room.
+        Minimum width of a bar, unless its neighbours leave less room.
     end : float
         Right end of the track.
 

@@ -118,7 +118,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return a text that identifies job, options and version: equal texts give equal results."""
+    """Return a string that identifies job, options and version; equal ones give equal results."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
