@@ -162,7 +162,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     Parameters
     ----------
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -204,7 +204,7 @@ def check_summaries(
     files : dict of str
         The file of each option, such as ``--table``; empty for none.
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -234,7 +234,7 @@ def check_summaries(
         found = "an input" if real.of(path) in inputs else owners.get(_identity(here, path))
         if found is not None:
             raise ViewerError(
-                f"{option}: {_shown(path)}: expected a file of its own, found {_shown(found)}"
+                f"{option}: {_shown(path)}: expected a separate file, found {_shown(found)}"
             )
         owners[_identity(here, path)] = f"the file of {option}"
 

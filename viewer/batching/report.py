@@ -100,7 +100,7 @@ class ReportFile:
             raise self._error(problem) from None
 
     def add(self, result: Result) -> None:
-        """Append a line; a killed process loses no earlier line."""
+        """Append a line; earlier lines survive if the process is killed."""
         line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
         try:
             with _locked(self._handle):

@@ -156,7 +156,8 @@ def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
             type=number,
             default=default,
             metavar="0..1",
-            help=f"for materials that do not specify it, with --shading pbr (default: {default:g})",
+            help=f"value for materials that do not specify one, with --shading pbr (default: "
+            f"{default:g})",
         )
     group.add_argument(
         "--matcap",

@@ -83,7 +83,7 @@ def export_figures(
 ) -> list[Diagnostic]:
     """Write figures and cameras to one file; see ``viewer.export.export_figures``.
 
-    Several figures are placed as in their scene; the placement of a single one is omitted.
+    Several figures are placed as in their scene; the placement of a single figure is omitted.
     ``extend``: as for ``export``.
     """
     document = Document(actors[0].figure.name)

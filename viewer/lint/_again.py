@@ -110,7 +110,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _changed(path: Path) -> float:
-    """Return the time of the last change to a file, or to any file in a folder, since the epoch."""
+    """Return the time of the last change to a file, or to any file in a folder, epoch seconds."""
     return max(map(_last_change, _with_contents(path)), default=0.0)
 
 

@@ -58,7 +58,7 @@ class VideoFrames:
     rate : float
         Frames per second, on average.
     n_frames : int
-        Number of frames according to the file; 0 if it does not state it.
+        Number of frames according to the file; 0 if unknown.
 
     Raises
     ------

@@ -120,7 +120,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "nobody is present in frame 23: there is nothing to write"
+    message = "no person is present in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
@@ -128,7 +128,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
 def test_time_at_which_everyone_is_absent_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "nobody is present at that time: there is nothing to write"
+    message = "no person is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 

@@ -149,8 +149,8 @@ def write_motions(
     from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can store, or nobody is present
-      in the frames; nothing is written then.
+    Raises ViewerError if no actor has a motion that the format can store, or no person is present
+    in the frames; in that case, nothing is written.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
@@ -166,7 +166,7 @@ def write_motions(
         parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
-        raise RigError(f"nobody is present in {parts[0].span}: there is nothing to write")
+        raise RigError(f"no person is present in {parts[0].span}: there is nothing to write")
     notes = _write(there, output, key, options, check) + _untracked_notes(there, key)
     for part in parts:
         if not part.present.any():

@@ -211,7 +211,7 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
 
 
 def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tuple[Floats, Bools]:
-    """Return offsets that include constant translations, and which joints still move."""
+    """Return offsets that include constant translations, and whether each joint still moves."""
     low, high = positions.min(axis=0), positions.max(axis=0)
     moves = inner & ((high - low) > noise).any(axis=1)
     shifted = inner & ~moves & (np.abs(low - offsets) > noise).any(axis=1)
