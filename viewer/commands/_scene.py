@@ -341,7 +341,11 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line per warning to the error stream, unless the run is recorded."""
+    """Print one line per warning or note to the error stream, unless the run is recorded.
+
+    Plain texts are warnings, and so are errors in a file that opened nevertheless.
+    """
     for warning in warnings:
         if not note_found(warning):
-            print(f"warning: {warning}", file=sys.stderr)
+            is_note = isinstance(warning, Diagnostic) and warning.severity == "note"
+            print(f"{'note' if is_note else 'warning'}: {warning}", file=sys.stderr)

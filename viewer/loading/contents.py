@@ -186,15 +186,20 @@ def _read(source: Source, settings: MotionSettings) -> Content:
         from viewer.rig.captures.capture_rate import capture_rate
 
         source.used_options |= {"images", "video"}
-        return open_capture(
+        video = _video_rate(settings)
+        rate = capture_rate(settings.frame_rate, None, video)
+        capture = open_capture(
             source,
-            frame_rate=capture_rate(settings.frame_rate, None, _video_rate(settings)),
+            frame_rate=rate,
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
             layout=settings.layout,
             images=settings.images,
         )
+        if capture.n_frames > 1 and not (settings.frame_rate or video):
+            source.warn("F007.capture-no-rate", rate=rate)
+        return capture
     if kind == "video_mocap":
         from viewer.formats.video_mocap import open_results
 

@@ -62,6 +62,7 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         cast.used_options |= {"model", "rig", "lod"}  # no further messages about these options
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
+        _check_footage(contents, settings)
         model, is_bundled, target = _model(contents, cast, named, settings)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled, target)
@@ -71,6 +72,15 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         from viewer.loading.skeleton_motions import agree_on_units
 
         agree_on_units(cast, lone)
+
+
+def _check_footage(contents: Contents, settings: MotionSettings) -> None:
+    """Raise RigError if one video, or one folder of images, is given for several captures."""
+    paths = [path for path, _ in contents.captures]
+    for option, footage in (("--video", settings.video), ("--images", settings.images)):
+        if footage is not None and len(paths) > 1:
+            values = {"option": option, "n": len(paths), "paths": paths}
+            raise RigError(Diagnostic("F001.several-captures", footage, values=values))
 
 
 def _give_skeleton_motions(

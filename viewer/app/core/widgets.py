@@ -145,7 +145,10 @@ def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
     imgui.set_next_window_size(room, imgui.Cond_.appearing)
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    # Docked panels are separated by their tabs; a window on top of them needs an outline.
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, max(1.0, round(letter / 16.0)))
     shown, stays = imgui.begin(title, True, flags | imgui.WindowFlags_.no_collapse)
+    imgui.pop_style_var()
     return shown, bool(stays)
 
 

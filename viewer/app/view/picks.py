@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
@@ -242,9 +241,8 @@ def _vertex_of(state: AppState, found: Pick) -> tuple[int, int, int]:
         corners = figure.reduced.vertices[figure.reduced.triangles[found.triangle]]
         triangle = -1
     positions = _drawn_positions(actor, options, corners)
-    back = np.linalg.inv(actor.placement).astype(np.float64)
-    point = apply_transform(back, found.point)
-    return found.actor, nearest_corner(positions, corners, point), triangle
+    placed = apply_transform(actor.placement, positions)
+    return found.actor, nearest_corner(placed, corners, found.point), triangle
 
 
 def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> Floats:

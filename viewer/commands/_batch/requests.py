@@ -70,6 +70,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
         overview=name_in_shard(getattr(arguments, "overview", ""), arguments.shard),
+        joint_map=getattr(arguments, "save_joint_map", None) or "",
     )
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)
@@ -126,7 +127,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS:
+        if name in _NOT_RESULTS or name == "save_joint_map":  # an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

@@ -22,7 +22,7 @@ def add_joint_map_argument(group: argparse._ArgumentGroup) -> None:
         "--save-joint-map",
         metavar="FILE",
         help="also write which joint of the motion drives each joint of the figure, as a text file "
-        "for --joint-map",
+        "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
     )
 
 

@@ -94,6 +94,8 @@ MESSAGES = {
     "their order in the list",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
+    "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "
+    "sets it)",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
     "sets it)",
 }

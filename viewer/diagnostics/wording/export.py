@@ -27,6 +27,8 @@ MESSAGES = {
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
     "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size} bytes",
+    "X001.gltf-motions": "{n_figures:#figure}: {figures:list}; one animation of {seconds:.4g} s"
+    "{others:+; {}}, {size} bytes",
     "X001.vrm": "VRM {version}: {parts:all}",
     "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, {size} "
     "bytes",
@@ -112,6 +114,7 @@ MESSAGES = {
     "X004.closed": "missing {n:?frame|frames} {gaps:list}: {how}",
     "X004.kept": "{n:?frame|frames} {gaps:list} missing, as in the original motion",
     "X004.of-person": "{person}: {remark}",
+    "X004.of-figure": "{figure:text}: {remark}",
     # Changed data
     "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
