@@ -164,7 +164,7 @@ def _filled(
 
 
 def filled(template: str, item: Item) -> str:
-    """Return a template filled for one item, such as the name of a second output."""
+    """Return a template with its fields replaced for one item, such as the name of a second output."""
     path = item.files[-1]
     pieces = list(Formatter().parse(template))
     return _filled(pieces, item.index, path, item.name, os.path.isdir(path))
@@ -182,7 +182,7 @@ def check_further_outputs(
     template : str
         Template for its name.
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 

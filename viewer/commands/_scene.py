@@ -343,7 +343,7 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
     """Print one line per warning or note to the error stream, unless the run is recorded.
 
-    Plain texts are warnings, and so are errors in a file that opened nevertheless.
+    Plain strings are warnings, as are errors in a file that was opened nevertheless.
     """
     for warning in warnings:
         if not note_found(warning):

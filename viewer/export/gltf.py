@@ -203,7 +203,7 @@ def export_animations(
 ) -> list[Diagnostic]:
     """Write figures to one file, placed as in their scene, with one animation that moves them all.
 
-    Frames of different figures keep their distance in time; the first frame of all is at 0.
+    Frames of different figures keep their relative times; the earliest frame is at 0.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def _motions_written(
 
 
 def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
-    """Return a written file without placements: errors are measured in the space of each figure."""
+    """Return a written file without placements, because errors are measured in figure space."""
     file = parsed([*data.values()])
     for node in placing:
         del file.root["nodes"][node]["matrix"]

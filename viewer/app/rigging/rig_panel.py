@@ -128,7 +128,7 @@ def _template_text(template: Template | None) -> str:
     if template is None:
         return "read on first use"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
-    assert skeleton is not None and mesh is not None  # templates have both
+    assert skeleton is not None and mesh is not None  # templates have a mesh and a skeleton
     pose = "in its current pose" if template.actor is not None else "in its file's pose"
     return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 

@@ -127,7 +127,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS or name == "save_joint_map":  # an output
+        if name in _NOT_RESULTS or name == "save_joint_map":  # this file is an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

@@ -147,8 +147,8 @@ def write_motions(
 ) -> list[Diagnostic]:
     """Write every actor's motion; return notes about what was written and what was lost.
 
-    Formats that hold several figures get one file, also with the figures that do not move. If one
-    pose is requested, or nothing moves, a motion of one frame is written. People absent
+    Formats that hold several figures get one file, which includes the figures that do not move. If
+    one pose is requested, or nothing moves, a motion of one frame is written. People absent
     from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
