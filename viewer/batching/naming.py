@@ -164,7 +164,7 @@ def _filled(
 
 
 def filled(template: str, item: Item) -> str:
-    """Return a template with its fields replaced for one item, such as the name of a second output."""
+    """Return a template with its fields replaced for one item, such as for a second output."""
     path = item.files[-1]
     pieces = list(Formatter().parse(template))
     return _filled(pieces, item.index, path, item.name, os.path.isdir(path))

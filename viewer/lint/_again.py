@@ -132,7 +132,7 @@ def _last_change(path: Path) -> float:
 
 
 def _owners(actor: Actor, index: int, opened: Opened) -> Owners:
-    """Return, for each part of an actor, the actor of the files that has it, preferably by index."""
+    """Return, for each part of an actor, the opened actor that has it, preferably by index."""
     others = list(enumerate(opened.scene.actors))
     others.sort(key=lambda pair: pair[0] != index)
     owners: Owners = {}
