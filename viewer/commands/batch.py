@@ -20,7 +20,7 @@ from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "parser_of", "run"]
 
-_FAILED = 1  # exit code
+_FAILED = 1  # exit code if an item failed or has findings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

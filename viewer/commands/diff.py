@@ -36,7 +36,7 @@ from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
-_DIFFERS = 1  # exit code
+_DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
 
 

@@ -20,7 +20,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 
-_SIZE = (46.0, 33.0)  # in font sizes
+_SIZE = (46.0, 33.0)  # size of the dialog, in font sizes
 _HINTS = {
     "open": "Ctrl+click selects several: a .skel and its .skin",
     "folder": "",

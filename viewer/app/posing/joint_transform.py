@@ -26,7 +26,7 @@ __all__ = [
     "unlocked_joints",
 ]
 
-_LABEL_WIDTH = 4.2  # in font sizes
+_LABEL_WIDTH = 4.2  # width of a label, in font sizes
 _LARGEST = 1e9
 _NOTICEABLE = 1e-4  # relative to the longest bone or a scale of 1; less is rounding
 _animated: Memo[TransformClip, frozenset[int]] = Memo()

@@ -119,7 +119,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return a string that identifies job, options and version; equal ones give equal results."""
+    """Return a string that identifies job, options and version, on which results depend."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 

@@ -12,7 +12,7 @@ from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.scene import Actor, Scene
 
-_SLOWEST, _FASTEST = 0.001, 100_000.0  # frames per second
+_SLOWEST, _FASTEST = 0.001, 100_000.0  # limits of frame rates, frames per second
 _LAST_NUMBER = 1_000_000_000
 
 

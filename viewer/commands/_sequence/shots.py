@@ -19,7 +19,7 @@ from viewer.rig.scene import Scene
 
 _MOST_FRAMES = 1_000_000
 _ROTATION_SECONDS = 6.0  # duration of a turntable of a still scene
-_FULL = 360.0  # degrees
+_FULL = 360.0  # full revolution, degrees
 
 
 @dataclass(frozen=True, slots=True)
