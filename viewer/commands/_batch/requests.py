@@ -45,9 +45,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    memory = (
-        parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
-    )
+    limit = arguments.limit_memory
     paths, notes = _inputs(arguments)
     request = Request(
         paths=paths,
@@ -65,7 +63,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
-        memory=memory,
+        memory=parse_bytes(limit, "--limit-memory") if limit else None,
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
