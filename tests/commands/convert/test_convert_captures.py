@@ -81,7 +81,7 @@ def test_keypoints_at_one_frame_keep_the_frame_number(keypoints, tmp_path, capsy
 @pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
 def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, arguments):
     name, *others = arguments
-    assert convert(keypoints, "-o", tmp_path / name, *others) == 2
+    assert convert(keypoints, "-o", tmp_path / name, "--fps", 30, *others) == 2
     assert capsys.readouterr().err == (
         "viewer: there are only keypoints: a motion of joints cannot be written "
         "(.npz stores points)\n"
@@ -93,7 +93,8 @@ def test_keypoints_omitted_next_to_bodies_are_reported(recording, tmp_path, caps
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+        "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+        "keypoints3d folder"
     )
 
 
