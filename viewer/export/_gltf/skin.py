@@ -79,7 +79,7 @@ def influences_of(skin: Skin) -> Influences:
         int(counts.max(initial=0)),
     )
     if found.n_joints > _MOST_JOINTS:
-        raise RigError(f"glTF numbers at most {_MOST_JOINTS} joints, found {found.n_joints}")
+        raise RigError(f"glTF supports at most {_MOST_JOINTS} joints, found {found.n_joints}")
     return found
 
 
