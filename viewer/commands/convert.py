@@ -166,7 +166,7 @@ def _write_actors(
     shown = pose_or_point_actors(scene)
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("nobody is present at that time: there is nothing to write")
+        raise RigError("no person is present at that time: there is nothing to write")
     if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
         notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
     else:

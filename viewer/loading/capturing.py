@@ -235,7 +235,7 @@ class Builder:
     def _add_clip(
         self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
     ) -> None:
-        """Append a clip to that of a person, or add an actor; ``drive``: motion of its source."""
+        """Append a clip to a person's clip, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
@@ -307,7 +307,7 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def carry_to(self, target: Figure) -> list[Diagnostic]:
-        """Let the bodies, including later ones, move another figure; ``place`` comes first.
+        """Let the bodies, also later ones, move another figure; ``place`` must be called first.
 
         Returns messages about matched joints. Raises RigError if too few match; nothing changes
         then.
@@ -351,7 +351,7 @@ def _grown(first: Drive, second: Drive) -> Drive:
 
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
-    """Return one clip of the rows of two with the same timeline."""
+    """Return one clip with the rows of two clips on the same timeline."""
     return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
 
 
@@ -362,6 +362,6 @@ def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
 
 
 def joined_points(first: PointClip, second: PointClip) -> PointClip:
-    """Return one clip of the concatenated rows of two with the same timeline."""
+    """Return one clip with the concatenated rows of two clips on the same timeline."""
     timing = joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))

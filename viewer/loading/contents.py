@@ -41,7 +41,7 @@ class Contents:
     figures : list of (Path, Figure)
         All figures, including the figures of groups.
     groups : list of FigureGroup
-        Figures of one file, which keep their places relative to each other and to their cameras.
+        Figures of one file, which keep their positions relative to each other and to their cameras.
     called : dict
         Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic

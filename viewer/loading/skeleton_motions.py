@@ -183,7 +183,7 @@ def drive_somebody(
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale separate skeletons to metres if other actors have a different unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have another unit; record the estimates.
 
     A lone skeleton, or one among others in the same unit, keeps the values of its file.
 

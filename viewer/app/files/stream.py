@@ -124,7 +124,7 @@ class Stream:
             builder.is_cut = True
 
     def wait(self) -> None:
-        """Wait until the thread has ended or the queue is full. For tests."""
+        """Wait until the thread has ended or the queue is full; used by tests."""
         while self._thread.is_alive():
             self._thread.join(0.01)
             if self._parts.full():

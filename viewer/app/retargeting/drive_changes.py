@@ -1,4 +1,4 @@
-"""Changes to how a motion drives a figure: it is retargeted immediately, and undo reverts it."""
+"""Changes to the drive of a figure, which retarget its motion immediately and can be undone."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def change_drive(state: AppState, change: Callable[[Drive], Drive]) -> bool:
 
 
 def _is_together(actor: Actor, first: Actor) -> bool:
-    """Return whether an actor is the first one or another person of the same capture."""
+    """Return whether two actors are the same, or people of the same capture."""
     if actor is first:
         return True
     if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):

@@ -18,7 +18,7 @@ from viewer.batching.items import Item, Result
 __all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
 
 IN_FLIGHT = 4
-"""Items handed out per worker, including the one that runs."""
+"""Number of items assigned to each worker, including the one that runs."""
 
 
 class Job(Protocol):

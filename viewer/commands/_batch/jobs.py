@@ -32,7 +32,7 @@ class JobKind:
     ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
     ``writes``: ``always``, ``maybe`` or ``never``.
     ``prints``: whether its text is the result and is therefore printed.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
     """
 

@@ -97,7 +97,7 @@ def _temporary_folder() -> str:
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:
-    """Return JSON data with a substring replaced in all texts."""
+    """Return JSON data with a substring replaced in all strings."""
     if isinstance(value, str):
         return value.replace(old, new)
     if isinstance(value, dict):

@@ -86,7 +86,7 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     """Return the largest distances between joints and vertices of two sides over all poses.
 
     Poses and vertices that cannot have the largest distance are skipped: the result is exact,
-    although only few vertices are skinned in double precision.
+    although only a few vertices are skinned in double precision.
 
     ``first``, ``second``: sides with the same joints and vertices, in the same space.
     ``rows`` (F,): frames of the first side.

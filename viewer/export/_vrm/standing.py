@@ -134,7 +134,7 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
 
     ``figure``: from ``standing``; its mesh follows the skeleton.
     ``bones``: joint of each human bone.
-    Returns also the largest rotation of a joint in radians.
+    Also returns the largest rotation of a joint in radians.
     """
     skeleton = figure.require_skeleton()
     rotations, largest = skeleton.rest_rotations.copy(), 0.0
