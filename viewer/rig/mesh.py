@@ -49,7 +49,7 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
+        Vertex indices; counter-clockwise from outside in most files, on which no code relies.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None

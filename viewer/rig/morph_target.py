@@ -57,7 +57,7 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals follow by the same formula, before skinning. Joints do not move.
+    Normals are computed with the same formula, before skinning. Joints do not move.
 
     Parameters
     ----------

@@ -129,7 +129,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
     ways = joints[below] - joints[above]
-    # Solved instead of multiplied by the transpose, as poses may scale joints.
+    # A linear system is solved, as the transpose is not the inverse if poses scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
     return offsets
 

@@ -66,7 +66,7 @@ class _Header:
 
 
 def open_npz(directory: ZipDirectory) -> Archive:
-    """Open an ``.npz`` file; raises as ``open_archive`` does."""
+    """Open an ``.npz`` file; errors as of ``open_archive``."""
     directory.check(_key)
     members = directory.members
     values = {_key(member): _open_member(directory, member) for member in members}

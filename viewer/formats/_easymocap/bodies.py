@@ -152,7 +152,8 @@ class Rows:
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)  # indices in the files' lists of people
+    # Indices of the records in the files' lists of people.
+    places: list[int] = field(default_factory=list)
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
         """Store the origin of an accepted record."""

@@ -96,7 +96,7 @@ def _plain_channels(
     """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
 
     Files may have tens of thousands of channels, nearly all in the form that is handled here.
-    Handling them takes less time than parsing the JSON.
+    This function takes less time than parsing the JSON.
     """
     try:
         moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}

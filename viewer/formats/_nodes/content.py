@@ -97,7 +97,7 @@ class Primitive:
     colors : (V, 4) or None
         Linear vertex colours with opacity, which multiply the material's base colour.
     joints, weights : (V, K) int32, (V, K) or None
-        Influences of all sets side by side: indices into the skin's joints. Weights are as
+        Influences of all sets in one table: indices into the skin's joints. Weights are as
         stored, unused slots are 0.
     material : int
         Index into ``NodeFile.materials``, -1 for none.

@@ -95,7 +95,7 @@ class Part:
 
 @dataclass(slots=True)
 class PigFiles:
-    """All arrays that were found."""
+    """All arrays of a model that are present."""
 
     parts: dict[str, Part] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()

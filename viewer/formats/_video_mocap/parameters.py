@@ -203,7 +203,7 @@ def _found(
 def _people(
     source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]]
 ) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are the frames of few people.
+    """Return the tracks of people: dicts of single frames are combined into people.
 
     Single frames with different joints or numbers of coefficients are different people.
     """

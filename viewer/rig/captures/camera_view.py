@@ -124,7 +124,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
     Parameters
     ----------
     view : CameraView
-        Fixed or moving camera; a fixed one has the time 0.
+        Fixed or moving camera; a fixed camera has only the time 0.
     most : int
         Maximum number of times, at least 2.
     """

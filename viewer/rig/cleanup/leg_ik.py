@@ -12,7 +12,7 @@ from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaterni
 __all__ = ["Leg", "bend", "reach"]
 
 _STRAIGHT = 0.05  # sine of the knee's angle below which the plane of the leg is undefined
-_REACH = 0.9999  # maximum fraction of the leg's length, as a straight knee has no direction
+_REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,9 +18,10 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["Shell", "shell_of"]
 
-_MOST_TRIANGLES = 500_000  # for larger meshes, the check takes longer than it saves
+# Maximum number of triangles, above which the check takes longer than it saves.
+_MOST_TRIANGLES = 500_000
 _MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
-# Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
+# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
 _CLOSED = 0.25
 _HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 

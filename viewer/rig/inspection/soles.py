@@ -31,9 +31,9 @@ class Soles:
     joints : (N,) int32
         For each of N feet, the joint nearest to the ground: the ball of the foot, or the ankle.
     feet : (P,)
-        The foot that each point belongs to.
+        The foot to which each point belongs.
     movers : (P,) int32
-        The joint that each point moves with.
+        The joint with which each point moves.
     places : (P, 3)
         Positions of the points in that joint's space.
     above : (P,)

@@ -1,4 +1,4 @@
-"""Evaluation of motions: posing a single actor, and many frames of one as arrays."""
+"""Evaluation of motions: posing of a single actor, and many frames of one actor as arrays."""
 
 from __future__ import annotations
 

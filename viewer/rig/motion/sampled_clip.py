@@ -70,7 +70,7 @@ class SampledClip:
 
     @property
     def n_rows(self) -> int:
-        """Number of frames that hold data, N."""
+        """Number of frames with data, N."""
         return len(self.rotations)
 
     @property
@@ -103,7 +103,7 @@ class SampledRows:
 
 
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
-    """Interpolate a clip at given times: rotations along the shorter arc, the rest linearly.
+    """Interpolate a clip at given times: rotations along the shorter arc, other values linearly.
 
     Exactly at a frame, the stored values are returned unchanged.
 

@@ -14,7 +14,7 @@ __all__ = ["Drive"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with other joints, and the retargeting options.
+    """A motion that drives a figure with different joints, and the retargeting options.
 
     Attributes
     ----------

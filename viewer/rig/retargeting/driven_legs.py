@@ -26,7 +26,7 @@ from viewer.rig.shape import shaped
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
 _ALIKE = 1e-4  # lengths this close are equal, relative to the body
-_UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
+_UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
 _FOLDED = 1e-3  # extension at rest below which a leg is folded
 _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 

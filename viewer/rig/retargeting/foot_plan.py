@@ -21,7 +21,7 @@ __all__ = ["FootPlan", "foot_plan"]
 
 # Range of cosines of the angle between sole and ground over which a foot becomes fully held.
 _ON_SOLE = (-0.1, 0.3)
-_SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
+_SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,14 +60,14 @@ class FootPlan:
             yield contact, slice(contact.start, contact.stop), ground
 
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
-        """Return the horizontal displacements of a standing foot from row to row.
+        """Return the horizontal displacements of a planted foot from row to row.
 
         Parameters
         ----------
         points : ((N, 3), (N, 3))
             Paths of the ball and the heel.
         contact : Contact
-            The contact, which selects one of them in each row.
+            The contact, which selects one of the two paths in each row.
         """
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
@@ -97,7 +97,7 @@ class FootPlan:
         return result * falling((_ON_SOLE[1] - facing) / (_ON_SOLE[1] - _ON_SOLE[0]))
 
     def gap(self, heights: Floats, facing: Floats) -> float:
-        """Return the largest distance of a standing sole from the ground.
+        """Return the largest distance of a planted sole from the ground.
 
         ``heights`` are those of the soles, (N, L); ``facing`` is as for ``holds``.
         """

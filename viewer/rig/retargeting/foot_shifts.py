@@ -1,4 +1,4 @@
-"""Translations of the feet and the body of a moving figure that keep standing feet in place."""
+"""Translations of the feet and the body of a moving figure that keep planted feet in place."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["foot_shifts"]
 
 _EASE = 0.3  # seconds over which a correction fades in and out outside contacts
 _SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the default translation relative to that of a standing foot
+_FLIGHT = 0.05  # weight of the default translation relative to that of a planted foot
 _STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
-# Cosines of the angle between sole and ground: a foot that is tilted further may sink.
+# Cosines of the angle between sole and ground; a foot that is tilted further may sink.
 _ON_SIDE = (-0.1, 0.1)
 
 
@@ -55,7 +55,7 @@ def foot_shifts(
     facing : (N, L)
         Cosine of the angle between each sole and the ground.
     straight : (N, L)
-        Length of each leg from hip to ankle, as a fraction of its longest.
+        Length of each leg from hip to ankle, as a fraction of its maximum length.
 
     Returns
     -------
@@ -88,8 +88,8 @@ def _wanted(
 ) -> _Wanted:
     """Return the corrections of a foot.
 
-    ``weights`` are the degrees to which it is held and faces the ground. Where a contact begins and
-    ends, the foot follows that of the source.
+    ``weights`` are the degrees to which it is held and faces the ground. At the beginning and end
+    of a contact, the foot follows that of the source.
     """
     path, (holds, facing) = plan.feet[foot], weights
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
@@ -132,9 +132,9 @@ def _eased(plan: FootPlan, values: Floats, is_held: Bools) -> Floats:
 
 
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
-    """Return the mean translation of the standing feet, (N, 3), smooth over time.
+    """Return the mean translation of the planted feet, (N, 3), smooth over time.
 
-    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without standing feet,
+    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without planted feet,
     (N, 3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)

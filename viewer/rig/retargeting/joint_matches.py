@@ -191,7 +191,7 @@ def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str]
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[Diagnostic]:
-    """Return messages about matched joints and unmatched ones."""
+    """Return messages about matched and unmatched joints."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
         Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])

@@ -48,7 +48,7 @@ class PlantedFeet:
         Total distance that feet slide while they are on the ground, in figure units: in the source,
         scaled to the figure, and in the figure before and after planting.
     gap_before, gap_after : float
-        Largest height of a standing sole above or below the ground.
+        Largest distance of a planted sole above or below the ground.
     lowered : float
         Largest distance by which the body was lowered.
     size : float

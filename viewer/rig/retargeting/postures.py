@@ -34,7 +34,7 @@ class Postures:
     joints : dict of str to int
         Joints by their names in SMPL.
     up : (3,)
-        The up axis of the file; the body's own up axis if it is upside down.
+        The up axis of the file; the up axis of the body if it is upside down.
     """
 
     rows: Ints

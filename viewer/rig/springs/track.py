@@ -56,7 +56,7 @@ class SpringTrack:
     skeleton : Skeleton
         Skeleton with springs.
     start, end : float
-        Range of the motion in seconds; the rotations are constant outside.
+        Range of the motion in seconds; the rotations are constant outside this range.
     """
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:
