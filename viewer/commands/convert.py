@@ -78,7 +78,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force", action="store_true", help="replace existing files")
     add_joint_map_argument(group)
     add_motion_arguments(parser)
-    add_vrm_arguments(parser)
+    add_vrm_arguments(parser, upgrades=True)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)

@@ -89,7 +89,7 @@ def add_body(
         document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
     )
     if record is not None:
-        add_record(document, record, tree.joints)
+        add_record(document, record, tree.joints, figure.name)
     scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
     errors: dict[str, float] = {}
     materials: dict[int, int] = {}
