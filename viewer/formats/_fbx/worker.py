@@ -41,7 +41,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, so that a hostile file cannot exhaust the machine's."""
+    """Limit the memory of this process, so that a hostile file cannot exhaust the machine."""
     limit = int(os.environ.get("VIEWER_FBX_MEMORY", "0"))
     if limit and find_spec("resource") is not None:
         import resource
@@ -52,7 +52,7 @@ def _limit_memory() -> None:
 class _Scene:
     """A scene of ufbx.
 
-    Objects of the binding do not keep their parent objects alive, so all objects are held until the
+    Objects of the binding hold no references to their parents, so all objects are held until the
     process ends. Iterating over a list of the binding runs past its end, so lists are indexed.
     """
 
@@ -70,7 +70,7 @@ class _Scene:
         return value
 
     def get(self, item: Any, *names: str) -> Any:
-        """Return an attribute, which may be nested; all objects on the way are held."""
+        """Return an attribute, which may be nested; all intermediate objects are held."""
         for name in names:
             item = self.keep(getattr(item, name))
         return item
