@@ -65,6 +65,8 @@ class Contact:
         Half-open range of rows.
     on_toe : (N,)
         Rows of the range in which the ball stands; in the others, only the heel stands.
+    is_flat : (N,)
+        Rows of the range in which both stand.
     hold : (N,)
         1 in rows in which the foot is slow, less where the contact begins and ends.
     height : float
@@ -76,6 +78,7 @@ class Contact:
     start: int
     stop: int
     on_toe: Bools
+    is_flat: Bools
     hold: Floats
     height: float
     tilt: float
@@ -119,7 +122,8 @@ def foot_contacts(
                     continue
                 height = float(np.median(lows[number, rows][slow]))
                 tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
-                found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
+                points = toe[a:b], toe[a:b] & heel[a:b]
+                found.append(Contact(rows.start, rows.stop, *points, hold[a:b], height, tilt))
         result.append(found)
     return result
 
