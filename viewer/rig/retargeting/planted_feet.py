@@ -13,6 +13,7 @@ from typing import cast
 
 import numpy as np
 
+from viewer.progress import report
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
 from viewer.rig.cleanup.leg_solving import leg_rotations, lowering
@@ -36,6 +37,7 @@ __all__ = ["PlantedFeet", "plant_feet"]
 
 _EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
 _ROUNDING = 1e-6  # relative to the body
+_STEPS = 5  # reported as progress, from retargeting to the comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +110,7 @@ def plant_feet(
         return found.clip, None
     if has_source_proportions(found, figure, pairs, body.size):
         return found.clip, None
+    report(1, _STEPS, "steps", "planting the feet")
     source = cast("SampledClip", in_frame_order(found.source.clip))
     worlds, timing = body.worlds(clip), clip.timing
     feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
@@ -121,8 +124,11 @@ def plant_feet(
     plan = foot_plan(feet, *how, (body.size, body.clearance), up)
     if not any(plan.contacts):
         return found.clip, PlantedFeet()
+    report(2, _STEPS, "steps")
     level = levelled(clip, body, worlds, plan)
+    report(3, _STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
+    report(4, _STEPS, "steps")
     after = body.worlds(planted)
     gaps = [plan.gap(body.heights(each, up)) for each in (worlds, after)]
     changes = PlantedFeet(
