@@ -101,6 +101,9 @@ def _progress(state: AppState) -> _Progress | None:
     if stream is not None:
         read, total = stream.progress
         names = ", ".join(builder.capture.name for builder in stream.builders)
+        if stream.finishing >= 0.0:
+            title, text = f"Retargeting {printable(names, 60)}", f"{100 * stream.finishing:.0f} %"
+            return _Progress(title, stream.finishing, text, "Cancel", is_aside=True)
         text = f"{read:,} of {total:,} frames"
         title = f"Reading {printable(names, 60)}"
         return _Progress(title, read / max(total, 1), text, "Cancel reading", is_aside=True)

@@ -45,7 +45,6 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    limit = arguments.limit_memory
     paths, notes = _inputs(arguments)
     request = Request(
         paths=paths,
@@ -63,7 +62,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
-        memory=parse_bytes(limit, "--limit-memory") if limit else None,
+        memory=_memory(arguments),
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
@@ -95,6 +94,12 @@ def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
     names = listed([printable(path.name, 60) for path in found.ignored])
     note = f"ignored because they are neither folders nor archives: {names}"
     return [*map(str, found.submissions)], [note] if found.ignored else []
+
+
+def _memory(arguments: argparse.Namespace) -> int | None:
+    """Return the bytes that a worker may use; None for no limit."""
+    given = arguments.limit_memory
+    return parse_bytes(given, "--limit-memory") if given else None
 
 
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
