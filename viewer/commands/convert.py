@@ -33,6 +33,7 @@ from viewer.commands._writing.motion_export import (
     writes_keys,
 )
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
+from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.commands._writing.written_actors import left_out_notes, pose_or_point_actors
 from viewer.diagnostics import Diagnostic
@@ -96,17 +97,24 @@ def run(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
+    notes = convert_streamed(arguments, output, skinning)
+    if notes is None:
+        notes = _converted(arguments, output, skinning)
+    for note in notes:
+        note_found(note)
+    print("\n".join(map(str, notes)), file=summary_stream(output))
+    return 0
+
+
+def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) -> list[Diagnostic]:
+    """Open all files, and write what is requested; return the notes."""
     scene = open_scene(arguments)
     baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
     with saving_joint_map(arguments, scene), shown_progress("converting"):
-        notes = [*write(arguments, scene, output, skinning), *baked]
-    for note in notes:
-        note_found(note)
-    print("\n".join(map(str, notes)), file=summary_stream(output))
-    return 0
+        return [*write(arguments, scene, output, skinning), *baked]
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:

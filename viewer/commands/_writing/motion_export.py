@@ -189,7 +189,7 @@ def _whole_animation(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
 ) -> tuple[SampledAnimation | SampledPoints, str]:
     """Return the requested frames of an actor, and their up axis."""
-    frames, fills = _frames(arguments, actor), bool(arguments.interpolate_gaps)
+    frames, fills = requested_frames(arguments, actor), bool(arguments.interpolate_gaps)
     if not isinstance(actor.clip, PointClip):
         return animation_for(key, options, scene, actor, arguments.fps, frames, fills)
     if options.gaps not in ("", "interpolate"):
@@ -316,7 +316,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
     return suited_exporter(output, actors[0].figure)
 
 
-def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
+def requested_frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
     """Return the requested range, counted from 0: its first frame and one past its last."""
     if arguments.frames is None:
         return None

@@ -75,8 +75,7 @@ def foot_shifts(
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
     """Return the corrections of a foot.
 
-    ``weights`` are the degrees to which it is held and faces the ground. At the beginning and end
-    of a contact, the foot follows that of the source.
+    At the beginning and end of a contact, the foot follows that of the source.
     """
     path = plan.feet[foot]
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
