@@ -18,10 +18,11 @@ estimated, unless the user specifies them, and the motion records how.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._bvh.guess import frame_rate, guess_unit, guess_up
 from viewer.formats._bvh.hierarchy import BvhJoint, called, read_hierarchy

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import choice, explain
 from viewer.app.files.export_formats import N_ROWS, draw_formats
@@ -17,6 +15,7 @@ from viewer.app.files.motion_export import (
     unsuited_formats,
 )
 from viewer.app.files.state import Files
+from viewer.data_classes import dataclass
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.scene import Actor

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.commands._writing.baked_springs import add_spring_argument
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (

@@ -12,12 +12,13 @@ skinned with LBS, with pose correctives from the file's rotations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._bvh.body import Space, rest_matrices
 from viewer.export._losses.skinned import Poses, Side, anchored, figure_side
 from viewer.formats import Source, bvh

@@ -6,11 +6,10 @@ opening. It hits the back first only where skinning turns the surface inside out
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh, area_vectors

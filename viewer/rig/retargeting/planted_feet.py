@@ -8,11 +8,12 @@ reach the ankles, and the body is lowered where legs are too short.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
 from viewer.rig.cleanup.leg_solving import leg_rotations, lowering

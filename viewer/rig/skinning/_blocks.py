@@ -7,10 +7,10 @@ product of two dense matrices per block is several times faster than summing a f
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
