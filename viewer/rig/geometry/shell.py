@@ -78,7 +78,9 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     pairs, is_open = found
     if is_open.sum() > _MOST_OPEN or not _face_outwards(mesh.positions, corners, pairs, is_open):
         return None
-    borders = np.unique(corners.ravel()[is_open]).astype(np.int32)
+    is_border = np.zeros(mesh.n_vertices, dtype=np.bool_)
+    is_border[corners.ravel()[is_open]] = True
+    borders = np.flatnonzero(is_border).astype(np.int32)
     return Shell(borders, copies, originals)
 
 
