@@ -19,7 +19,7 @@ __all__ = ["change_drive", "no_edit"]
 
 
 def no_edit(state: AppState) -> str:
-    """Return why the chosen actor's retargeting cannot be changed; empty if it can."""
+    """Return the reason why the chosen actor's retargeting cannot be changed; empty if it can."""
     why = no_drive(state)
     if not why and state.of(Files).stream is not None:
         why = "wait until the capture has been read"

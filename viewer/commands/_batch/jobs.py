@@ -11,6 +11,7 @@ from pathlib import Path
 
 from viewer.batching.attempts import attempt
 from viewer.batching.items import Item, Result
+from viewer.batching.naming import filled
 from viewer.batching.worker import worker_rank
 from viewer.commands._batch.options import add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
@@ -147,6 +148,9 @@ class CommandJob:
             arguments.gpu = _device()
         if "output" in given:
             arguments.output = item.output or None
+        if given.get("save_joint_map"):
+            arguments.save_joint_map = filled(arguments.save_joint_map, item)
+            Path(arguments.save_joint_map).parent.mkdir(parents=True, exist_ok=True)
         if item.output:
             Path(item.output).parent.mkdir(parents=True, exist_ok=True)
         code: int = import_module(f"viewer.commands.{self.command}").run(arguments)

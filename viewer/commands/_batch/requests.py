@@ -24,7 +24,7 @@ from viewer.version import VERSION
 __all__ = ["request_of"]
 
 _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
-"""Arguments on which the content of the outputs does not depend."""
+"""Arguments that do not affect the content of the outputs."""
 
 
 def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
@@ -45,9 +45,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    memory = (
-        parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
-    )
+    limit = arguments.limit_memory
     paths, notes = _inputs(arguments)
     request = Request(
         paths=paths,
@@ -65,11 +63,12 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
-        memory=memory,
+        memory=parse_bytes(limit, "--limit-memory") if limit else None,
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
         overview=name_in_shard(getattr(arguments, "overview", ""), arguments.shard),
+        joint_map=getattr(arguments, "save_joint_map", None) or "",
     )
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)
@@ -89,12 +88,12 @@ def _fixed(arguments: argparse.Namespace) -> list[str]:
 
 
 def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """Return the paths of the batch, and messages about those that are left out."""
+    """Return the paths of the batch, and messages about omitted paths."""
     if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
         return arguments.files, []
     found = find_submissions(arguments.files)
     names = listed([printable(path.name, 60) for path in found.ignored])
-    note = f"ignored, as they are neither folders nor archives: {names}"
+    note = f"ignored because they are neither folders nor archives: {names}"
     return [*map(str, found.submissions)], [note] if found.ignored else []
 
 
@@ -112,7 +111,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
     names |= parser._defaults.keys()
     command = argparse.Namespace(**{name: getattr(arguments, name) for name in names})
     if getattr(command, "model_path", None) is not None:
-        save_model_folder(command.model_path)  # once, not for each item
+        save_model_folder(command.model_path)  # saved once, not for each item
         command.model_path = None
     return command
 
@@ -126,7 +125,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS:
+        if name in _NOT_RESULTS or name == "save_joint_map":  # an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

@@ -1,4 +1,4 @@
-"""Plan of where and when the feet of a driven figure must stand."""
+"""Plan of the positions and times at which the feet of a driven figure must be planted."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.retargeting.source_contacts import (
 
 __all__ = ["FootPlan", "foot_plan"]
 
-# Cosines of the angle between sole and ground between which a foot goes from free to fully held.
+# Range of cosines of the angle between sole and ground over which a foot becomes fully held.
 _ON_SOLE = (-0.1, 0.3)
 _SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
 
@@ -75,7 +75,7 @@ class FootPlan:
         return moved - (moved @ self.up)[:, None] * self.up
 
     def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
-        """Return the total distance that balls and heels slide while they stand."""
+        """Return the total distance that balls and heels slide while they are in contact."""
         total = 0.0
         for points, contacts in zip(feet, self.contacts, strict=True):
             for contact in contacts:
@@ -99,7 +99,7 @@ class FootPlan:
     def gap(self, heights: Floats, facing: Floats) -> float:
         """Return the largest distance of a standing sole from the ground.
 
-        ``heights``: of the soles, (N, L). ``facing``: as for ``holds``.
+        ``heights`` are those of the soles, (N, L); ``facing`` is as for ``holds``.
         """
         stands, largest = self.holds(facing) >= 1.0, 0.0
         for foot in range(len(self.contacts)):
@@ -111,8 +111,8 @@ class FootPlan:
     def floor(self, foot: int) -> Floats:
         """Return the height below which a foot with contacts must not sink: (N,).
 
-        This is the ground of the previous or next contact, whichever is lower. Where the source's
-        own foot sinks below that, the limit follows it.
+        This is the ground of the previous or next contact, whichever is lower. If the source's foot
+        sinks below that, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))

@@ -13,8 +13,8 @@ __all__ = ["foot_shifts"]
 
 _EASE = 0.3  # seconds over which a correction fades in and out outside contacts
 _SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the default translation, relative to a standing foot
-_STRAIGHT = (0.8, 0.95)  # relative lengths up to which a leg is bent, and from which it is straight
+_FLIGHT = 0.05  # weight of the default translation relative to that of a standing foot
+_STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 # Cosines of the angle between sole and ground: a foot that is tilted further may sink.
 _ON_SIDE = (-0.1, 0.1)
 
@@ -26,8 +26,8 @@ class _Wanted:
     flat: Floats  # (N, 3), horizontal
     is_flat: Bools  # (N,), rows with horizontal corrections
     rise: Floats  # (N,)
-    holds: Floats  # (N,), how far the sole is held on the ground
-    lifts: Floats  # (N,), how far the sole is kept above the floor
+    holds: Floats  # (N,), degree to which the sole is held on the ground, 0 to 1
+    lifts: Floats  # (N,), degree to which the sole is kept above the floor, 0 to 1
     above: Floats  # (N,), height of the sole above the floor
 
 
@@ -40,13 +40,13 @@ def foot_shifts(
 ) -> tuple[list[Floats], Floats]:
     """Return the translations of all feet and of the body.
 
-    A foot is corrected while it stands. The body smoothly follows standing feet on straight legs,
-    so that these need not bend; other feet follow the body.
+    A foot is corrected while it is on the ground. The body smoothly follows planted feet on
+    straight legs, so that these need not bend; other feet follow the body.
 
     Parameters
     ----------
     plan : FootPlan
-        Where the feet must stand, with at least one contact.
+        Positions and times at which the feet must be planted, with at least one contact.
     points : list of ((N, 3), (N, 3))
         Paths of the balls and the heels.
     heights : (N, L)
@@ -85,9 +85,10 @@ def _wanted(
     heights: Floats,
     weights: tuple[Floats, Floats],
 ) -> _Wanted:
-    """Return the corrections of a foot; ``weights``: how far it is held, and faces the ground.
+    """Return the corrections of a foot.
 
-    Where a contact begins and ends, the foot follows that of the source.
+    ``weights`` are the degrees to which it is held and faces the ground. Where a contact begins and
+    ends, the foot follows that of the source.
     """
     path, (holds, facing) = plan.feet[foot], weights
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
@@ -132,8 +133,8 @@ def _eased(plan: FootPlan, values: Floats, is_held: Bools) -> Floats:
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
     """Return the mean translation of the standing feet, (N, 3), smooth over time.
 
-    ``weights``: weights of the feet, (N, L). ``usual``: the translation without standing feet, (N,
-    3).
+    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without standing feet,
+    (N, 3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):
