@@ -17,13 +17,13 @@ import re
 import struct
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.element_types import array_dtype, item_count, shaped

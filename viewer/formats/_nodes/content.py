@@ -7,11 +7,12 @@ Readers guarantee that indices are valid, numbers are finite, and the parents fo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint

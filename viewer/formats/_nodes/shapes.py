@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.motions import Reader

@@ -20,11 +20,12 @@ not drawn. Programs differ in details, see ``_REPLACING``, ``name_here`` and ``i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._obj.image_kinds import is_cut_out, is_normal_map

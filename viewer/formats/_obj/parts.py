@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._obj.faces import FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces

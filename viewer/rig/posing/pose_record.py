@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -68,8 +69,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
         only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; if None, they are coefficients unless there are 45
-        values.
+        Whether hand poses are coefficients; if None, all but those of 45 values are.
     joint_rotations : JointRotations or None
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
