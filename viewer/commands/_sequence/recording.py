@@ -55,7 +55,7 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "--onion",
         type=int,
         metavar="N",
-        help="one image of N poses where they occur, evenly spaced over the motion, with earlier "
+        help="one image of N poses, each at its place, evenly spaced over the motion, with earlier "
         "poses fainter",
     )
     group.add_argument(
