@@ -68,8 +68,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
         only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; if None, they are coefficients unless there are 45
-        values.
+        Whether hand poses are coefficients; None means True unless there are 45 values.
     joint_rotations : JointRotations or None
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
