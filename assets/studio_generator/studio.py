@@ -40,7 +40,7 @@ BOXES = (
     SoftBox(-142.0, 18.0, 0.16, 0.80, (3.4, 3.5, 3.7)),
     SoftBox(138.0, 24.0, 0.20, 0.70, (3.9, 3.8, 3.6)),
 )
-_EXPOSURE = 0.48  # exposure with which the brightest point of a white matte sphere is almost white
+_EXPOSURE = 0.48  # exposure for which the brightest point of a white matte sphere is almost white
 _EDGE = 0.07  # width of a box's soft edge, as a tangent
 
 

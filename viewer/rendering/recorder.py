@@ -260,7 +260,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         while wait([closing], _PATIENCE).not_done:
             yield progress(total)
         closing.result()
-    except BaseException:  # includes Ctrl-C and the closing of the generator
+    except BaseException:  # This includes Ctrl-C and the closing of the generator.
         queue.stop()
         sink.abort()
         raise
@@ -296,7 +296,7 @@ class _Queue:
 
 
 class _Drawer:
-    """Draws the frames of a recording, each while the previous one is passed on."""
+    """Drawer of a recording's frames; each is drawn while the previous one is passed on."""
 
     def __init__(self, recording: Recording, renderer: Renderer) -> None:
         self._recording, self._renderer = recording, renderer
@@ -348,7 +348,7 @@ class _Drawer:
 
 
 class _Cameras:
-    """Camera of each frame; frames must be requested in order."""
+    """Cameras of the frames, which must be requested in order."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording

@@ -1,4 +1,4 @@
-"""Camera matrices shared by all passes, in float64 until they are uploaded."""
+"""Camera matrices that all passes share, in float64 until they are uploaded."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from viewer.rig.mesh import bounding_box
 
 __all__ = ["align_boxes"]
 
-_FLAT = 1e-9  # fraction of the longest side; a thinner box cannot be scaled to another box
+_FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:

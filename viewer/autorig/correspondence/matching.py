@@ -24,7 +24,7 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
-_INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
+_INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
 # Maximum angle between a normal and the centre of its group; see _sides.
 _TOGETHER = math.radians(80.0)

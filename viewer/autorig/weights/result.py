@@ -27,7 +27,7 @@ _FEW = 0.75  # fraction of matched vertices below which too many weights are est
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidIslands:
-    """Connected parts of a target that do not meet the template, and are attached to it rigidly.
+    """Connected parts of a target that do not meet the template and are attached rigidly.
 
     Attributes
     ----------

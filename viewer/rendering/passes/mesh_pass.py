@@ -45,7 +45,7 @@ _COLORMAP_UNIT = 6
 
 
 class MeshPass:
-    """Draws posed meshes with any shading.
+    """Pass that draws posed meshes with any shading.
 
     Parameters
     ----------
