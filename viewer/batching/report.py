@@ -100,7 +100,7 @@ class ReportFile:
             raise self._error(problem) from None
 
     def add(self, result: Result) -> None:
-        """Append a line; a killed process loses no earlier line."""
+        """Append a line; earlier lines survive if the process is killed."""
         line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
         try:
             with _locked(self._handle):
@@ -148,7 +148,7 @@ def _locked(handle: int) -> Iterator[None]:
     is_locked = True
     try:
         lockf(handle, LOCK_EX)
-    except OSError:  # a file system without locks; appended lines are still written as a whole
+    except OSError:  # the file system has no locks; appended lines are still written as a whole
         is_locked = False
     try:
         yield
@@ -164,7 +164,8 @@ def _line(result: Result) -> str:
     found["seconds"] = round(result.seconds, 6)
     try:
         return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)
-    except (ValueError, TypeError):  # JSON has no infinite numbers, no NaN, and only texts as keys
+    # JSON has no infinite numbers, no NaN, and only strings as keys.
+    except (ValueError, TypeError):
         found["values"] = plain(result.values)
         return json.dumps(found, default=str, separators=(",", ":"))
 
@@ -175,7 +176,7 @@ def _data(value: object) -> object:
 
 
 def read_results(path: Path) -> list[Result]:
-    """Read a report; the last result of each item counts.
+    """Read a report; if an item has several results, the last one is used.
 
     Parameters
     ----------

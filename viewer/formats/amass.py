@@ -328,7 +328,8 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
     if is_aist:
         source.warn("F007.motion-aist-rate", rate=_RATE_OF_AIST)
         return _RATE_OF_AIST
-    source.warn("F007.motion-no-rate", rate=_RATE)
+    if not source.options.get("fps"):  # a requested rate replaces the assumed one
+        source.warn("F007.motion-no-rate", rate=_RATE)
     return _RATE
 
 

@@ -167,7 +167,8 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
 
 def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -> Floats:
     """Return the mean of each vertex's distinct normals: (V, 3)."""
-    pairs = np.unique(vertices * len(listed) + indices)
+    # Products of two counts exceed 32 bits in files of some 50,000 vertices.
+    pairs = np.unique(vertices.astype(np.int64) * len(listed) + indices)
     owners, normals = pairs // len(listed), listed[pairs % len(listed)]
     sums = np.stack(
         [np.bincount(owners, normals[:, axis], minlength=n_vertices) for axis in range(3)], axis=1

@@ -32,14 +32,14 @@ class Track:
     rotations : (F, J, 4)
         Local rotations: unit quaternions.
     stepped : (F, J) bool
-        Whether a key without interpolation, of the joint or of an ancestor, lies between the
-        previous row and this one: such jumps are intended.
+        Whether a key without interpolation, of the joint or of an ancestor, is between the previous
+        row and this one: such jumps are intended.
     size : float
         Size of the skeleton at rest, in scene units.
     scale : float
         Scene units per figure unit.
     feet : (N,) int32
-        The joint of each foot nearest to the ground; empty without two feet by name.
+        The joint of each foot nearest to the ground; empty unless joint names identify two feet.
     soles : (F, N)
         Height of each foot's lowest point in the scene.
     """

@@ -16,7 +16,7 @@ from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 __all__ = [
     "Actor",
@@ -301,25 +301,31 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     (N, 3)
         Scene space.
     """
-    from viewer.rig.skinning import deform
-
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        shape = shaped(figure, actor.pose.shape_weights).require_skeleton()
+        shape = shaped_skeleton(figure, actor.pose.shape_weights)
         joints = skeleton_points(shape, actor.pose)
         parts.append(apply_transform(placement_matrix(actor.pose), joints))
         # Joints that coincide have no size to frame.
         shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
     if figure.mesh is not None and shows_mesh:
-        is_bound = show == "binding"
-        points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
+        points = figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.pose)
         if actor.hidden_parts:
             points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
         parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))
+
+
+def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
+    """Return the posed vertices (V, 3) without normals, which would double the work."""
+    from viewer.rig.skinning import deform, deform_frames
+
+    if pose is None or not figure.is_attached:
+        return deform(figure, pose)[0]
+    return deform_frames(figure, [pose])[0]
 
 
 def scene_unit(scene: Scene) -> str:

@@ -28,6 +28,7 @@ __all__ = [
     "rest_joints",
     "rest_positions",
     "shaped",
+    "shaped_skeleton",
     "with_rest_mesh",
 ]
 
@@ -70,6 +71,36 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
         return moved if joints is None else _with_joints(moved, rest_joints(figure), joints)
 
     return _shaped.get(figure, weights.tobytes(), make)
+
+
+def shaped_skeleton(figure: Figure, weights: Floats) -> Skeleton:
+    """Return the skeleton of ``shaped(figure, weights)``, without shaping the mesh if possible.
+
+    Morph targets of glTF and FBX files leave the joints in place, and their sums over large meshes
+    are expensive.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton, with or without blend shapes.
+    weights : (N,)
+        N <= S; missing weights are 0.
+
+    Returns
+    -------
+    Skeleton
+        The figure's own skeleton if its joints do not follow its shape.
+
+    Raises
+    ------
+    RigError
+        If there is no skeleton, or if the joints follow the shape and there are more weights than
+        blend shapes.
+    """
+    shapes = figure.blend_shapes
+    if figure.joint_regressor is None and (shapes is None or shapes.space is None):
+        return figure.require_skeleton()
+    return shaped(figure, weights).require_skeleton()
 
 
 def _with_joints(figure: Figure, joints: Floats, shifts: Floats) -> Figure:

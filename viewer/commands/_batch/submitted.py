@@ -55,7 +55,7 @@ class SubmissionJob:
             entered: list[Submission] = []
 
             def enter(_: Item) -> None:
-                # Whatever an archive or a full disk may cause concerns this item alone.
+                # Errors caused by an archive or a full disk affect this item only.
                 one = opened(path, self.expected, self.alike, Path(self.temporary))
                 entered.append(stack.enter_context(one))
 
@@ -97,7 +97,7 @@ def _temporary_folder() -> str:
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:
-    """Return JSON data with a substring replaced in all texts."""
+    """Return JSON data with a substring replaced in all strings."""
     if isinstance(value, str):
         return value.replace(old, new)
     if isinstance(value, dict):

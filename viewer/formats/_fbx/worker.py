@@ -28,8 +28,10 @@ def main(arguments: list[str]) -> None:
     gc.disable()
     import ufbx
 
+    scene = None  # held until the process exits, since the destructors of the binding crash
     try:
-        arrays, told = _Scene(ufbx, arguments[0]).message(arguments[1:])
+        scene = _Scene(ufbx, arguments[0])
+        arrays, told = scene.message(arguments[1:])
     except ufbx.UfbxError as problem:
         arrays, told = {}, {"error": str(problem)}
     sys.stdout.buffer.write(packed(arrays, told))

@@ -107,6 +107,10 @@ def _check_version(root: Element) -> None:
     if asset is None:
         root.warn("G001.no-asset")
         return
+    stated = asset.values.get("version")
+    # Some files of glTF 0.8 and 1.0 state the version as a number.
+    if type(stated) in (int, float) and stated < 2:
+        raise asset.fault("F002.gltf-version", "version", found=stated)
     version = asset.text("version", "2.0")
     if version.partition(".")[0] != "2":
         raise asset.fault("F002.gltf-version", "version", found=version)

@@ -22,6 +22,7 @@ from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.toon_ramp import modern_ramp
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["MTOON", "Toon", "read_toon"]
@@ -102,8 +103,7 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
     if color is not None:
         color = decode_srgb(color[:3].clip(0.0, 1.0))
     if toony is not None and shift is not None:
-        toony += (1.0 - toony) * (0.5 + 0.5 * shift)
-        shift = -shift - (1.0 - toony)
+        toony, shift = modern_ramp(toony, shift)
     return Toon(_values(color, toony, shift), shade)
 
 

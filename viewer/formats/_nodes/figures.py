@@ -46,7 +46,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     """
     groups = group_nodes(file)
     if not groups:
-        raise source.fault("F002.no-figure")
+        raise source.fault("F002.no-triangles" if file.meshes else "F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     found = [_figure(file, members, readers, source) for members in groups]

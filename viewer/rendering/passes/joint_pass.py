@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints
 from viewer.rig.skinning import deform
 
@@ -85,8 +85,7 @@ class SkeletonBuffers:
         """
         if self.is_current(pose, options):
             return
-        skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # applying a shape keeps the skeleton
+        skeleton = shaped_skeleton(self.figure, pose.shape_weights)
         are_boxes = self.style(options) == "boxes"
         # Bones reach from one joint to another, so they need the matrices of all joints.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)

@@ -18,7 +18,8 @@ from viewer.rig.skin import Skin, owners
 __all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
 
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
-_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot while walking and on tiptoe
+# Tilts of a foot, from walking to lying on its instep.
+_TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 

@@ -12,7 +12,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 __all__ = ["own_up", "upright_actor", "upright_placement"]
 
@@ -87,7 +87,7 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
 
     The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
     """
-    skeleton = shaped(figure, pose.shape_weights).require_skeleton()
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
     upright = pose.copy()
     roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
     within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]

@@ -43,6 +43,7 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         "after": text(changes.after),
         "gap_before": text(changes.gap_before),
         "gap": text(changes.gap_after),
+        "ground": f"{text(changes.ground_speed)}/s" if changes.ground_speed else "",
         "lowered": text(changes.lowered) if changes.lowered > _ROUNDING * changes.size else "",
     }
     return [Diagnostic("F007.feet-planted", values=values)]

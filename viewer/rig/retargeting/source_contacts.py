@@ -66,6 +66,8 @@ class Contact:
         Half-open range of rows.
     on_toe : (N,)
         Rows of the range in which the ball is on the ground; in all others, only the heel is.
+    is_flat : (N,)
+        Rows of the range in which both are on the ground.
     hold : (N,)
         1 in rows in which the foot is slow, less at the beginning and end of the contact.
     height : float
@@ -77,6 +79,7 @@ class Contact:
     start: int
     stop: int
     on_toe: Bools
+    is_flat: Bools
     hold: Floats
     height: float
     tilt: float
@@ -120,7 +123,8 @@ def foot_contacts(
                     continue
                 height = float(np.median(lows[number, rows][slow]))
                 tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
-                found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
+                points = toe[a:b], toe[a:b] & heel[a:b]
+                found.append(Contact(rows.start, rows.stop, *points, hold[a:b], height, tilt))
         result.append(found)
     return result
 

@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matri
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import rest_positions, shaped
+from viewer.rig.shape import rest_positions, shaped, shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rig.skin import Skin
@@ -258,8 +258,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     (J, 4, 4)
         Joint space to figure space.
     """
-    skeleton = shaped(figure, pose.shape_weights).skeleton
-    assert skeleton is not None  # shaping preserves it
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 
