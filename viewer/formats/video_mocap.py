@@ -1,6 +1,6 @@
 """Reader of results of video motion capture: people reconstructed from a video.
 
-Each tool writes a different kind of files: see the modules in ``_video_mocap/``. They are
+Each tool writes different files: see the modules in ``_video_mocap/``. They are
 recognised by their contents. People keep their IDs and the frames in which they are visible.
 """
 

@@ -266,7 +266,7 @@ class _Binary:
         self.data, self.position = source.data, header.end
 
     def begin(self, element: Element) -> Places:
-        """Return the offset of each row; rows of different sizes are followed by their counts."""
+        """Return the offset of each row; if row sizes differ, it is derived from the counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
         left = len(self.data) - self.position
@@ -319,7 +319,7 @@ class _Binary:
         return place - start, counts
 
     def _walked(self, element: Element) -> Places:
-        """Return the starts of rows, followed one by one because their lists differ in length.
+        """Return the starts of rows, found one after another because their lists differ in length.
 
         This takes one iteration per face; files that contain only triangles never need it.
         """
