@@ -62,8 +62,8 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 def normal_matrix(linear: Floats) -> Floats:
     """Return the matrix that transforms normals: the inverse transpose, up to a positive factor.
 
-    A singular matrix, as of a flattened or vanished mesh, has no inverse. Its cofactors, the
-    determinant times the inverse transpose, still transform normals.
+    A singular matrix, which flattens a mesh or shrinks it to a point, has no inverse. Its
+    cofactors, the determinant times the inverse transpose, still transform normals.
 
     Parameters
     ----------

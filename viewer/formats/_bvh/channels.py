@@ -24,7 +24,7 @@ __all__ = [
     "translations_of",
 ]
 
-_CHUNK = 256  # frames at a time, so that their numbers fit into the processor's cache
+_CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +34,8 @@ class Table:
     names: tuple[str, ...]
     parents: list[int]
     offsets: Floats  # (J, 3)
-    columns: list[list[tuple[int, int]]]  # per joint: code of the channel, column
-    ends: list[tuple[int, list[float]]]  # joint, offset of an End Site
+    columns: list[list[tuple[int, int]]]  # code and column of each channel, per joint
+    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
     n_channels: int
 
     @property
