@@ -1,7 +1,7 @@
 """Radiance of the studio: a grey room with soft boxes, as a function of direction.
 
-Directions are unit vectors, +y up, +z towards the camera, +x to its right. Radiance is linear, in
-units in which a white matte surface is as bright as its irradiance divided by pi.
+Directions are unit vectors, +y up, +z towards the camera, +x to its right. Radiance is linear; the
+radiance of a white matte surface is its irradiance divided by pi.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class SoftBox:
     azimuth, inclination : float
         Direction of its centre, degrees: to the right of +z, and above the horizon.
     width, height : float
-        Half its sides, as tangents of the angle seen from the centre of the room.
+        Half the lengths of its sides, as tangents of angles seen from the centre of the room.
     color : (r, g, b)
         Radiance.
     """

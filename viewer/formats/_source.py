@@ -209,7 +209,8 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, or a JSON pointer, if known; that of the first of several errors.
+            Position in the file, or a JSON pointer, if known; of several errors, the first
+            position.
         count : int
             Number of errors.
         part, places : str, (N,)

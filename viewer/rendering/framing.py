@@ -220,8 +220,9 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     scene : Scene
         Scene with any number of actors.
     name : str
-        Name of an actor, for its root joint or the centre of its points; of a joint or captured
-        point; a person's number; or the joint of an actor, such as ``fox/head`` or ``1:pelvis``.
+        Name of an actor, which stands for its root joint or the centre of its points; name of a
+        joint or captured point; a person's number; or a joint of an actor, such as ``fox/head`` or
+        ``1:pelvis``.
     """
     wanted = name.lower()
     called = _called(scene)

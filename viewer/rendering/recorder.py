@@ -122,7 +122,7 @@ class Recording:
     options : DisplayOptions
         Display options.
     box : (2, 3) or None
-        Bounds for the ground grid and the depth range; None for those of the current scene.
+        Bounds for the ground grid and the depth range; None for the current scene's bounds.
     moves : bool
         Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
         pose.

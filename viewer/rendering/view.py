@@ -38,7 +38,7 @@ def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
 
 
 def in_front(view: View) -> View:
-    """Return a view whose depths are all in front of those of the given view."""
+    """Return a view whose depths are all in front of the given view's depths."""
     squeeze = np.eye(4)
     squeeze[2] = 0.0, 0.0, 0.01, -0.98
     return View(view.matrix, squeeze @ view.projection, view.camera)

@@ -37,7 +37,7 @@ def fit_axes(
         Whether the rotation is also refined: a rotation found with a single scale is biased
         towards the stretched target's diagonal.
     own : bool
-        Whether the axes are those of the template.
+        Whether the axes are the template's.
 
     Returns
     -------

@@ -184,7 +184,7 @@ def _closest(template: Template, target: Welded) -> SurfacePoints:
 
 
 def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:
-    """Return the angles between normals (N, 3) and those of the template, 0 if undefined."""
+    """Return the angles between normals (N, 3) and the template's normals, 0 if undefined."""
     there = template.normals_at(points)
     cosines = np.clip(np.einsum("na,na->n", there, normals), -1.0, 1.0)
     return np.where(normals.any(axis=1), np.arccos(cosines), 0.0)

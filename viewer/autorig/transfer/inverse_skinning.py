@@ -111,7 +111,7 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     Returns
     -------
     (V, 3)
-        Rest positions; those of ``inverted`` away from guarded vertices.
+        Rest positions, which equal those in ``inverted`` away from guarded vertices.
     """
     if not inverted.guarded.any():
         return inverted.positions

@@ -56,7 +56,7 @@ class WeightTransfer:
     starts, joints, weights
         As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
     matched : (V,) bool
-        Vertices whose weights are those of the template's surface.
+        Vertices whose weights come from the template's surface.
     inpainted : (V,) bool
         Vertices whose weights were inpainted. Vertices that are neither matched nor inpainted
         belong to a rigid island.

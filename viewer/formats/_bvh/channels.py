@@ -93,7 +93,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
 
 
 def rotations_of(table: Table, values: Floats) -> Floats:
-    """Multiply each joint's rotation channels, all joints with the same axes at once: (N, J, 4)."""
+    """Multiply each joint's rotation channels, joints with the same axes together: (N, J, 4)."""
     rotations = np.empty((len(values), len(table.names), 4))
     groups: dict[tuple[int, ...], list[int]] = {}
     turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]

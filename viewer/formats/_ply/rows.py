@@ -225,7 +225,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn about lines after those of the last element."""
+        """Warn about lines after the last element."""
         left = len(self.firsts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
@@ -368,7 +368,7 @@ class _Binary:
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn about bytes after those of the last element."""
+        """Warn about bytes after the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)

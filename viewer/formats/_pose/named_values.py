@@ -82,7 +82,7 @@ class NamedValues:
         Raises
         ------
         FormatError
-            If a value is of a different kind; the error has the line of the first.
+            If a value is of a different kind; the error has the line of the first such value.
         """
         value = self.values.get(key)
         try:

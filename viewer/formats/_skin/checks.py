@@ -32,7 +32,7 @@ _FAR = 1e6  # multiple of the median distance beyond which a vertex is stray
 
 
 def even_counts(source: Source, sections: Sections) -> None:
-    """Refuse sections whose number of vertices differs from that of the positions.
+    """Refuse sections whose number of vertices differs from the number of positions.
 
     If all other sections agree, the positions are assumed to be wrong.
     """

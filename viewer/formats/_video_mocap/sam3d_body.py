@@ -302,7 +302,7 @@ def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
 
 
 def _camera(cameras: dict[int, Floats]) -> Cameras:
-    """Return the camera of a video; the rig's axes are those of the camera with y and z negated."""
+    """Return the camera of a video; the rig's axes are the camera's with y and z negated."""
     frames = np.array(sorted(cameras), dtype=np.int64)
     intrinsics = np.array([cameras[int(frame)] for frame in frames])
     center = intrinsics[0, :2, 2]

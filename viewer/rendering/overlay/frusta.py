@@ -55,7 +55,7 @@ def camera_centers(cameras: Sequence[CameraView]) -> Floats:
 
 
 def frusta_points(cameras: Sequence[CameraView], box: Floats) -> Floats:
-    """Return the corners and tips of all frusta: (N, 3); ``box`` is that of the scene."""
+    """Return the corners and tips of all frusta: (N, 3); ``box`` is the scene's box."""
     depth = frustum_depth(box)
     corners = [frustum_corners(camera, depth) for camera in cameras]
     return np.concatenate([camera_centers(cameras), *corners])

@@ -172,7 +172,7 @@ class LatePasses:
         return backdrop
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
-        """Bind the textures that shading needs in addition to those of the meshes."""
+        """Bind the textures that shading needs in addition to the meshes' textures."""
         if options.shading == "matcap":
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):

@@ -113,7 +113,8 @@ def frame_rate(motion: Motion | None) -> float:
 def scene_rate(actors: Iterable[Actor]) -> float:
     """Return the frames per second of a scene's timeline.
 
-    The rate is that of its longest capture, or else of its longest motion of keyed transforms.
+    This is the rate of its longest capture or, without captures, of its longest motion of keyed
+    transforms.
     """
     clips = [actor.clip for actor in actors if actor.clip is not None]
     for kinds in ((SampledClip, PointClip), (TransformClip,)):

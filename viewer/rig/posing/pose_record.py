@@ -278,7 +278,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's pose vector, or that of another member of the SMPL family."""
+    """Apply the pose vector of the model, or of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers

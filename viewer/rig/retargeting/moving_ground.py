@@ -18,7 +18,7 @@ __all__ = ["ground_velocity", "on_moving_ground"]
 # Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
 _SAME = 0.08  # tolerance for the speed of standing feet, per second
 _SLOWEST = 0.2  # minimum speed of the ground, per second
-_DRIFT = 0.25  # maximum speed of the body relative to that of the ground
+_DRIFT = 0.25  # maximum speed of the body relative to the speed of the ground
 _USUAL = 0.4  # minimum fraction of the rows in which the lowest foot has the ground's velocity
 # Minimum ratio of the number of these rows to the number of rows with a resting foot.
 _OFTENER = 3.0
