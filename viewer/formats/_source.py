@@ -82,7 +82,7 @@ class Source:
         self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
-        self._counted = (0, 1)  # an offset and its line number, from which others are counted
+        self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
         self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 

@@ -19,13 +19,13 @@ _FEWEST = 3
 _BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9
 # Work per pass, pixel and triangle, in units of about a second on two cores.
 _PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6
-_PATIENCE = 5.0  # time in seconds above which it is stated
+_PATIENCE = 5.0  # drawing time in seconds above which a message states it
 
 
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would take software long, or need over 1 GB of memory.
+    """Lower the quality if it would take long in software, or need over 1 GB of memory.
 
     The work is counted, not timed, so that an image does not depend on the machine or its load.
 

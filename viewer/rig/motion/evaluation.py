@@ -320,7 +320,7 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
 
 
 def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
-    """Return some of the frames; scales or a shape shared by all frames stay a single row."""
+    """Return some of the frames; scales or a shape shared by all frames remain a single row."""
     weights, scales = frames.shape_weights, frames.scales
     return Frames(
         frames.times[rows],
