@@ -109,7 +109,7 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
 
 
 def _values(color: Any, toony: float | None, shift: float | None) -> dict[str, Any]:
-    """Return the fields of a material; invalid values are those of a material without shade."""
+    """Return the fields of a material; invalid values are replaced so that there is no shade."""
     toony = _TOONY if toony is None else min(max(toony, 0.0), 1.0)
     shift = 0.0 if shift is None else shift
     shade = (1.0, 1.0, 1.0) if color is None else tuple(min(max(c, 0.0), 1.0) for c in color)

@@ -174,7 +174,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name with that of its part, and default weight of a morph target."""
+    """Name, name prefixed by its part's name, and default weight of a morph target."""
 
     name: str
     full_name: str

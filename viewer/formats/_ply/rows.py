@@ -226,7 +226,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn about lines after those of the last element."""
+        """Warn about lines after the last element."""
         left = len(self.firsts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
@@ -267,7 +267,7 @@ class _Binary:
         self.data, self.position = source.data, header.end
 
     def begin(self, element: Element) -> Places:
-        """Return the offset of each row; rows of different sizes are followed by their counts."""
+        """Return the offset of each row; if row sizes differ, it is derived from the counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
         left = len(self.data) - self.position
@@ -320,7 +320,7 @@ class _Binary:
         return place - start, counts
 
     def _walked(self, element: Element) -> Places:
-        """Return the starts of rows, followed one by one because their lists differ in length.
+        """Return the starts of rows, found one after another because their lists differ in length.
 
         This takes one iteration per face; files that contain only triangles never need it.
         """
@@ -369,7 +369,7 @@ class _Binary:
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn about bytes after those of the last element."""
+        """Warn about bytes after the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)
