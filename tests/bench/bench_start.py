@@ -1,7 +1,6 @@
-"""Whole commands, from start to exit, against minimal programs that do the same.
-
-Processor time of the processes, which hardly depends on other programs and includes software
-drivers. The cache of parsed numbers is filled by a first round.
+"""Whole commands from start to exit, compared with minimal programs that do the same. Times are
+processor times of the processes, which hardly depend on other programs and include software
+drivers. A first round fills the cache of parsed numbers.
 """
 
 from __future__ import annotations
@@ -84,7 +83,7 @@ def compare(title: str, runs: Mapping[str, list[str]], rounds: int, goal: float 
 
 
 def encoding(picture: str, rounds: int) -> None:
-    """Print the time to write an image as PNG, against Pillow at its fastest level."""
+    """Print the time to write an image as PNG, compared with Pillow at its fastest level."""
     with Image.open(picture) as opened:
         pixels = np.array(opened.convert("RGBA"))
 

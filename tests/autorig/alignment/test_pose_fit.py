@@ -1,4 +1,4 @@
-"""Template joints fitted to the pose of the target."""
+"""Fit of the template's joints to the pose of the target."""
 
 import numpy as np
 import pytest
@@ -65,7 +65,7 @@ def test_longer_limb_is_found():
     longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
     found, gaps = fitted(longer, bent(longer), figure)
     assert np.sqrt(np.mean(gaps**2)) < 2e-3
-    # Overall scale and limb scales are ambiguous: only their product is determined.
+    # Overall scale and limb scales are ambiguous, so only their product is determined.
     along = found.grown[0]
     assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
 
@@ -77,7 +77,7 @@ def test_known_size_is_kept():
     assert np.abs(found.grown).max() < 1e-6
 
 
-def test_too_few_pairs_leave_the_template_as_it_is():
+def test_too_few_pairs_do_not_change_the_template():
     figure = arm()
     far = START.apply(deform(figure)[0]) + 1000.0
     side = Triangles(far, figure.mesh.triangles, 500)
