@@ -353,7 +353,7 @@ def test_held_signal_without_a_poll_is_dropped(ctrl_c):
     gc.collect()
 
 
-def test_hold_lasts_until_the_end_of_the_block(ctrl_c):
+def test_signal_is_held_until_the_end_of_the_block(ctrl_c):
     reached = []
     with pytest.raises(Interrupted), watched():
         with deferred():

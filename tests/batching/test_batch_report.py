@@ -63,7 +63,7 @@ def test_several_writers_append_whole_lines(tmp_path):
     assert len(read_results(path)) == 40 == path.read_bytes().count(b"\n")
 
 
-def test_numbers_that_json_cannot_store_become_text(tmp_path):
+def test_numbers_that_json_cannot_store_are_written_as_text(tmp_path):
     with ReportFile(tmp_path / "r.jsonl") as file:
         file.add(Result(ITEM, "done", values={"worst": [1.5, float("nan")]}))
 

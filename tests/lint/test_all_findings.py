@@ -114,7 +114,7 @@ def test_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B002", bindings + 1), ("B005", bindings + 7)]
 
 
-def test_skin_without_bind_matrices_is_checked_alone(tmp_path: Path) -> None:
+def test_skin_without_bind_matrices_is_checked_without_its_skeleton(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     weights = section(lines, "skinweights")
     lines[weights] = "1 0 0.5"
@@ -122,7 +122,7 @@ def test_skin_without_bind_matrices_is_checked_alone(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B001", weights), ("W001", weights + 1)]
 
 
-def test_unparsable_file_reports_that_nothing_else_was_checked(tmp_path: Path) -> None:
+def test_unparsable_file_is_reported_as_unchecked(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + 3] = "normals 4 {"
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]

@@ -80,7 +80,7 @@ def test_locations_of_vertices_triangles_and_joints_are_their_points() -> None:
     assert points_of(joint, scene).tolist() == [[10, 2, 0]]
 
 
-def test_locations_of_captures_are_points_and_of_nothing_are_empty() -> None:
+def test_locations_in_captures_are_points_and_may_be_empty() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0]

@@ -58,7 +58,7 @@ def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
     found = cost(scene({8: CROWDED, 5: LAST}))
     known = Phrase("cut-cost", **COST, left_out=without(1))
     assert told([found.diagnostic]) == [values_of(2, known)]
-    assert found.vertices.tolist() == [8, 5]  # unknown values come last
+    assert found.vertices.tolist() == [8, 5]  # unknown values are last
     found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
     known = Phrase("cut-cost", **COST, left_out=without(2))
     assert told([found.diagnostic]) == [values_of(3, known)]

@@ -126,7 +126,7 @@ def test_missing_file_is_a_finding(tmp_path: Path) -> None:
     assert scene.actors == []
 
 
-def test_skin_that_does_not_match_is_checked_alone(tmp_path: Path) -> None:
+def test_skin_that_does_not_match_is_checked_without_its_skeleton(tmp_path: Path) -> None:
     texts, *_ = FAULTS["too few bindings"]
     texts = {**texts, "a.skin": texts["a.skin"].replace("2 0 0.25", "2 0 0.5", 1)}
     assert {"B001", "W001"} <= {finding.code for finding in linted(tmp_path, texts)}

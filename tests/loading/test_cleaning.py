@@ -104,7 +104,7 @@ def test_motions_without_people_are_not_merged():
         clean_up(Scene([actor]), CleanUp(merged=((0, 5),)))
 
 
-def test_keypoints_are_cleaned_up_too():
+def test_keypoints_are_cleaned_up():
     figure, clip = keypoints()
     rows = clip.timing.rows.copy()
     rows[5] = -1
@@ -166,7 +166,7 @@ def test_actors_without_feet_do_not_move():
     assert scene.actors[0].clip is clip
 
 
-def test_keyed_clips_are_refused_alone_and_reported_next_to_captures():
+def test_keyed_clips_are_refused_without_captures_and_otherwise_reported():
     keyed = Actor(FIGURE, clip=Clip("keys", (), 0.0, 1.0))
     wanted = CleanUp(smoothing=SavitzkyGolay())
     with pytest.raises(RigError, match="captured motion"):

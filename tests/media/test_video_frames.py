@@ -69,7 +69,7 @@ def test_no_frame_is_before_the_first_or_after_the_last(path):
 
 
 def test_rotated_recordings_are_shown_upright(tmp_path):
-    # The upper half is white; the header then says that the recording is rotated by 90 degrees.
+    # The upper half is white; then the header is changed to a rotation by 90 degrees.
     pixels = np.zeros((SIZE[1], SIZE[0], 4), dtype=np.uint8)
     pixels[: SIZE[1] // 2] = 255
     path = tmp_path / "turned.mp4"

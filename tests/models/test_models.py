@@ -138,7 +138,7 @@ def test_no_model_is_found_without_a_folder(tmp_path):
     assert models.find_model("smpl", tmp_path / "file") is None
 
 
-def test_search_goes_four_folders_deep(folder):
+def test_search_is_limited_to_four_levels_of_folders(folder):
     root = folder("1/2/3/4/SMPL_MALE.npz", "1/2/3/4/5/SMPL_FEMALE.npz")
     assert list(models.known_models(root)) == ["smpl:male"]
 

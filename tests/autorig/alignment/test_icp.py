@@ -36,7 +36,7 @@ def test_iterate_followed_by_slide_finds_the_alignment_exactly():
     assert_allclose(found.shift, [0.02, -0.03, 0.05], atol=1e-9)
 
 
-def test_iterate_alone_converges_monotonically():
+def test_iterate_converges_monotonically_without_slide():
     template, target = sides()
     errors = [
         trimmed_rms(

@@ -51,7 +51,7 @@ def test_bent_joint_is_found():
     assert_allclose(np.degrees(np.linalg.norm(found.rotated[1])), 40.1, atol=3.0)
 
 
-def test_dofs_stay_within_limits_and_quaternions_hold_the_remainder():
+def test_dofs_are_within_limits_and_quaternions_store_the_remainder():
     figure = arm(limit=0.2)
     free = arm()
     found, gaps = fitted(free, bent(free), figure)

@@ -76,7 +76,7 @@ def test_match_accepts_flipped_normals_if_requested():
     np.testing.assert_allclose(either.angles, 0.0, atol=1e-7)
 
 
-def test_match_uses_distance_alone_for_vertices_without_normals():
+def test_match_uses_only_distance_for_vertices_without_normals():
     positions = np.array([[0.0, 0, 0.4], [3, 3, 0.6], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
     found = match(FLAT, weld(positions, np.array([[2, 3, 4]])), 10.0, MatchSettings())
     assert found.matched.tolist() == [True, False, True, True, True]

@@ -59,7 +59,7 @@ def test_rotated_tessellation_has_different_vertices():
     assert (same >= 0).mean() < 0.2  # vertices near the centre of rotation remain
 
 
-def test_points_near_vertices_snap_and_others_stay():
+def test_points_snap_to_near_vertices_only():
     positions, triangles = grid()
     asked = np.array([[0.2, 0.1, 1.0], [3.4, 3.3, 0.0]])
     points = Surface(positions, triangles).closest(asked)

@@ -12,7 +12,7 @@ POSITIONS = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 1], [0, 0, 4], [
 TRIANGLES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
-def test_samples_are_distributed_by_area_and_lie_on_their_triangle():
+def test_samples_are_distributed_by_area_and_are_on_their_triangle():
     found = sample_surface(POSITIONS, TRIANGLES, 800)
     on_first = found.positions[:, 2] == 0.0
     assert on_first.sum() == 200

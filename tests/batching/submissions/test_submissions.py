@@ -132,7 +132,7 @@ def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["/etc/a.skel", "../a.skel", "x/../../a.skel", "C:\\a.skel",
                                   "\\a.skel", "x\\..\\..\\a.skel", "C:a.skel"])  # fmt: skip
-def test_paths_that_lead_outside_are_refused(tmp_path, name) -> None:
+def test_paths_outside_the_archive_are_refused(tmp_path, name) -> None:
     path = zipped(tmp_path / "bob.zip", {name: "x", "b.skin": "x"})
     assert "expected a path inside the archive, found one that leads outside" in refusal(path)
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]

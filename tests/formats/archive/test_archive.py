@@ -40,7 +40,7 @@ def opened(data: bytes, name: str = "x.npz") -> Archive:
 
 
 def refused(action: Any, *arguments: Any) -> Fault:
-    """Return the refusal of a call, which must name the file."""
+    """Return the refusal of a call, which must include the file name."""
     with pytest.raises(FormatError) as caught:
         action(*arguments)
     assert str(caught.value).isprintable() and caught.value.path is not None

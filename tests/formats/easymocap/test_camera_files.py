@@ -11,7 +11,7 @@ from viewer.formats import Source
 from viewer.formats._easymocap.cameras import find_cameras, read_storage
 
 HEAD = "%YAML:1.0\n---\n"
-# Wrapped like OpenCV's own long lists.
+# Lists are wrapped like long lists of OpenCV.
 INTRINSIC = (
     HEAD
     + """names:

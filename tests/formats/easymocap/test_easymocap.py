@@ -304,7 +304,7 @@ def test_layout_of_17_keypoints_can_be_chosen(tmp_path):
     assert opened(tmp_path, layout="h36m")[1][0].points[0][0].title == "h36m"
 
 
-def test_hands_and_face_next_to_the_body_become_points(tmp_path):
+def test_hands_and_face_next_to_the_body_are_read_as_points(tmp_path):
     rows = {key: waves(count, 4, seed=count) for key, count in
             (("handl3d", 21), ("handr3d", 21), ("face3d", 70))}  # fmt: skip
     for values in rows.values():

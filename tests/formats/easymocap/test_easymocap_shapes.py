@@ -13,7 +13,7 @@ ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])
 
 
-def test_missing_rows_repeat_the_last_valid_one():
+def test_missing_rows_repeat_the_last_valid_row():
     expected = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [np.nan, 3.0], [1.0, 2.0]]
     assert_array_equal(hold(ROWS, GIVEN, None), expected)
 
@@ -32,7 +32,7 @@ def test_last_valid_row_is_remembered():
     assert last_given(np.zeros((0, 2)), np.zeros(0, dtype=bool)) is None
 
 
-# In recordings
+# Recordings with missing coefficients
 
 
 def shapes_of(parts, person):
@@ -42,7 +42,7 @@ def shapes_of(parts, person):
     return np.concatenate(rows)[:, 0].tolist()
 
 
-def test_shapes_of_the_first_record_apply_to_all(tmp_path):
+def test_shapes_of_the_first_record_apply_to_all_records(tmp_path):
     bare = [body(0, shapes=None), body(1, shapes=None)]
     first = [body(0, shapes=[[2.0] * 10]), body(1, shapes=[[3.0] * 10])]
     folder = write_frames(tmp_path / "smpl", {0: first, **dict.fromkeys(range(1, 100), bare)})
@@ -104,7 +104,7 @@ def test_untracked_people_do_not_inherit_shapes(tmp_path):
     assert shapes_of(parts, -1) == [5.0, 0.0, waves(10, seed=2)[0]]
 
 
-def test_expression_is_repeated_too(tmp_path):
+def test_expression_is_repeated(tmp_path):
     said = {"expression": [[0.5] * 10]}
     frames = {0: [body(0, 87)], 1: [body(0, 87, **said)], 2: [body(0, 87)]}
     write_frames(tmp_path / "smpl", frames)

@@ -33,7 +33,7 @@ def test_nodes_keep_names_and_parents(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_materials_split_a_mesh_and_quads_become_triangles(strip: NodeFile) -> None:
+def test_mesh_is_split_by_material_and_quads_are_triangulated(strip: NodeFile) -> None:
     (mesh,) = strip.meshes
     assert [primitive.material for primitive in mesh.primitives] == [0, 1]
     assert [len(primitive.triangles) for primitive in mesh.primitives] == [2, 2]
@@ -83,7 +83,7 @@ def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_up_axis_and_unit_of_the_file_are_kept(tmp_path: Path) -> None:
+def test_up_axis_and_unit_of_the_file_are_unchanged(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, up="z", unit=100.0))
     content = node_file(source)
     assert (content.up, content.unit) == ("z", "m")

@@ -22,7 +22,7 @@ def accessors(file: File) -> Accessors:
         ("H", [0, 65535, 13107, 0], [0.0, 1.0, 0.2, 0.0]),
     ],
 )
-def test_normalised_integers_become_fractions(
+def test_normalised_integers_are_read_as_fractions(
     kind: str, values: list[int], fractions: list[float]
 ) -> None:
     file = File()

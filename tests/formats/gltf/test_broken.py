@@ -51,7 +51,7 @@ def test_truncated_files_are_read_or_refused() -> None:
         assert line.startswith("a.gltf") and "\n" not in line
 
 
-def test_changed_documents_become_figures_or_are_refused() -> None:
+def test_changed_documents_are_read_as_figures_or_refused() -> None:
     for data in changed(9, 60):
         for keeps_errors in (False, True):
             source = Source("a.gltf", data, diagnostics=Collector(keeps_errors=keeps_errors))

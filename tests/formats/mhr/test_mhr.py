@@ -85,7 +85,7 @@ def test_shapes_are_identity_and_expressions(figure):
     assert figure.mesh.uv_triangles.tolist() == lod()["texcoord_faces"].tolist()
 
 
-def test_correctives_vanish_at_rest_and_stay_in_single_precision(figure):
+def test_correctives_are_zero_at_rest_and_in_single_precision(figure):
     pose = figure_pose(figure)
     without = deform(figure, pose, viewer.Skinning(correctives=False))[0]
     assert_allclose(deform(figure, pose)[0], without, atol=0.0)

@@ -90,7 +90,7 @@ def test_rigid_mesh_on_a_joint_needs_no_auxiliary_joint():
     assert_array_equal(figure.mesh.triangle_parts, [0, 1, 2, 3])
 
 
-def test_sheared_matrix_becomes_two_joints():
+def test_sheared_matrix_is_represented_by_two_joints():
     sheared = affine(8)
     sheared[:3, 0] *= -1.0
     node = {"name": "bent", "parent": 1, "matrix": sheared, "mesh": 1}

@@ -45,7 +45,7 @@ def test_missing_normals_are_flat_and_coplanar_triangles_share_vertices():
     assert (note.key, note.values["vertices"]) == ("F007.flat-normals", 16)
 
 
-def test_normals_stay_perpendicular_under_a_second_skin_that_shears():
+def test_normals_are_perpendicular_under_a_second_skin_that_shears():
     first = skin([0], 3)
     second = type(first)("", first.joints, first.inverse_bind @ affine(9))
     primitive = triangle(1, 1)

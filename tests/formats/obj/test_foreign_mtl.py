@@ -169,7 +169,7 @@ def test_opacity_of_images_is_a_mask_if_nearly_all_values_are_0_or_1(read, lines
     assert_array_equal(material.image[0, :, 3], alpha)
 
 
-def test_ambient_maps_stand_in_for_missing_diffuse_ones(read):
+def test_ambient_maps_replace_missing_diffuse_maps(read):
     alone, keys = read("newmtl a\nmap_Ka skin.png\n")
     assert (alone.texture, keys) == ("skin.png", [])
     both, _ = read("newmtl a\nmap_Ka my skin.png\nmap_Kd skin.png\n")

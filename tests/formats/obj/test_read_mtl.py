@@ -84,7 +84,7 @@ def test_opacity_is_read_from_d_or_one_minus_tr(materials, lines, opacity):
     assert made.base_color == (None if opacity is None else (1.0, 1.0, 1.0, opacity))
 
 
-def test_maps_of_opacity_become_alpha(materials):
+def test_opacity_maps_are_stored_as_alpha(materials):
     (made, alone), _ = materials(
         "newmtl a\nmap_Kd white.png\nmap_d grey.png\nnewmtl b\nmap_d grey.png\n"
     )

@@ -97,8 +97,8 @@ def test_polygons_are_triangulated_and_counted() -> None:
 
 
 def test_concave_quad_is_split_at_its_reflex_corner() -> None:
-    # The fourth corner is inside the triangle of the other corners, so only its diagonal is inside
-    # the quad.
+    # The fourth corner is inside the triangle of the others, so only its diagonal is inside the
+    # quad.
     text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nf 1 2 4 3\nf 4 3 1 2\nf 2 4 3 1\nf 3 1 2 4\n"
     mesh = silent(text).mesh
     areas = triangle_areas(mesh.positions, mesh.triangles).reshape(4, 2)
@@ -150,7 +150,7 @@ def test_weights_of_vertices_are_ignored_with_a_note() -> None:
 
 
 @pytest.mark.parametrize(("half", "most"), [("0.5", "1"), ("127.5", "255")])
-def test_colours_of_vertices_become_linear(half: str, most: str) -> None:
+def test_vertex_colours_are_converted_to_linear(half: str, most: str) -> None:
     """sRGB 0.5 is 0.2140 in linear light; vertices without a colour are white."""
     mesh = silent(
         f"v 0 0 0 {most} 0 {half}\nv 1 0 0\nv 0 1 0 0 {half} 0 0.25\nf 1 2 3\nf 3 2 1\n"
@@ -207,14 +207,14 @@ def test_materials_apply_to_runs_of_triangles() -> None:
     assert figure.mesh.material_indices.tolist() == [-1, 0, 0, 1, 0]
 
 
-def test_groups_become_materials_if_there_are_none() -> None:
+def test_groups_are_used_as_materials_if_there_are_none() -> None:
     figure = silent(SQUARE + "o body\nf 1 2 3\ng shoe\nf 1 2 3 4\no body\nf 2 3 4")
     assert [material.name for material in figure.mesh.materials] == ["body", "shoe"]
     assert figure.mesh.material_indices.tolist() == [0, 1, 1, 0]
     assert ("parts", "2 groups and objects") in figure.facts
 
 
-def test_single_object_does_not_become_a_material() -> None:
+def test_single_object_is_not_used_as_a_material() -> None:
     figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
     assert figure.mesh.materials == ()
 

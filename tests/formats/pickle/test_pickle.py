@@ -160,7 +160,7 @@ def test_plain_data_are_read(protocol: int) -> None:
         assert archive.get(key) == value, key
 
 
-def test_numpy_scalars_become_python_numbers() -> None:
+def test_numpy_scalars_are_read_as_python_numbers() -> None:
     given = {"f": np.float64(1.5), "i": np.int32(-7), "b": np.True_, "s": np.str_("x"), "e": ""}
     for protocol in (0, 2, 5):
         archive = opened(pickle.dumps(given, protocol))
@@ -180,7 +180,7 @@ def test_sets_and_ordered_dicts_of_python_2_are_read() -> None:
     assert archive.get("d") == {"k": 1}
 
 
-def test_sets_of_protocol_4_become_lists() -> None:
+def test_sets_of_protocol_4_are_read_as_lists() -> None:
     archive = opened(pickle.dumps({"s": {1}, "f": frozenset({2})}, 4))
     assert (archive.get("s"), archive.get("f")) == ([1], [2])
 
@@ -322,7 +322,7 @@ def test_arrays_of_other_types_are_opaque(given: Any, what: Phrase) -> None:
     assert opened(pickle.dumps({"v": given}, 2)).get("v") == Opaque(what)
 
 
-def test_lists_of_arrays_stay_lists() -> None:
+def test_lists_of_arrays_are_read_as_lists() -> None:
     found = opened(saved(v=b"](" + array(ROWS) * 2 + b"e")).get("v")
     assert isinstance(found, list)
     assert [part.shape for part in found] == [(4, 3), (4, 3)]

@@ -295,13 +295,13 @@ def test_repeated_use_of_a_long_string_is_refused() -> None:
         assert cost(lambda data=data: self_contained(data)) < BOUND
 
 
-def test_strings_do_not_become_an_array() -> None:
+def test_strings_are_not_converted_to_an_array() -> None:
     """Numpy would allocate the length of the longest string for every element."""
     data = saved(v=b"](" + payload(b"x" * 1_000_000) + b"e" + b"(" + b"K\x01" * 10_000 + b"e")
     assert cost(lambda: self_contained(data)) < BOUND
 
 
-def test_huge_memo_index_allocates_nothing() -> None:
+def test_huge_memo_index_does_not_allocate_memory() -> None:
     data = saved(v=b"Nr\xff\xff\xff\x7fj\xff\xff\xff\x7f" + b"0")
     assert opened(data).get("v") is None
     assert cost(lambda: opened(data)) < 1 << 20
@@ -317,7 +317,7 @@ def test_endless_opcodes_terminate(step: bytes) -> None:
     )
 
 
-def test_huge_declared_lengths_allocate_nothing() -> None:
+def test_huge_declared_lengths_do_not_allocate_memory() -> None:
     for step in (b"B\xff\xff\xff\x7f", b"\x8e" + b"\xff" * 5 + b"\0" * 3, b"\x96" + b"\xff" * 8):
         assert cost(lambda step=step: refusal(saved(v=step))) < 1 << 20
 

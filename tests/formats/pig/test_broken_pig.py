@@ -192,7 +192,7 @@ def test_large_file_in_the_folder_is_refused_before_it_is_read(folder):
 # Unusual weights that load
 
 
-def test_vertices_without_weights_stay_in_the_rest_pose(folder):
+def test_vertices_without_weights_do_not_move(folder):
     rows = WEIGHTS.replace("1 1 1\n", "").replace("2 3 1\n", "0 3 0\n")
     figure, warnings = read(write(folder, skinning_weights=rows))
     assert warnings == [

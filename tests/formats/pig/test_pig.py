@@ -204,7 +204,7 @@ def test_figure_without_texture_coordinates_is_untextured(folder, gone):
 RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
 
 
-def test_image_in_the_folder_becomes_the_texture(folder):
+def test_image_in_the_folder_is_used_as_texture(folder):
     write(folder)
     save_image(folder / "skin.png", RED)
     scene = viewer.load(folder)
@@ -234,7 +234,7 @@ def test_invalid_image_in_the_folder_leaves_the_figure_untextured(folder):
     assert warning.endswith("; drawn untextured")
 
 
-def test_image_opened_together_with_the_folder_becomes_the_texture(folder, tmp_path):
+def test_image_opened_together_with_the_folder_is_used_as_texture(folder, tmp_path):
     save_image(tmp_path / "red.png", RED)
     figure = viewer.load(tmp_path / "red.png", write(folder)).actors[0].figure
     assert figure.mesh.materials[0].texture == "red.png"

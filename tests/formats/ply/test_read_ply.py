@@ -122,7 +122,7 @@ def test_properties_may_be_in_any_order_and_unknown_elements_are_skipped(order: 
     assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
-def test_colours_of_vertices_become_linear() -> None:
+def test_vertex_colours_are_converted_to_linear() -> None:
     """sRGB 188 is 0.5029 in linear light, and 0.5 is 0.2140; floats are clamped to 0 to 1."""
     triangle = ("face", ["list uchar uchar vertex_indices"], [[[0, 1, 2]]])
     places = ["float x", "float y", "float z"]
@@ -161,7 +161,7 @@ def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
     assert mesh.mesh.positions[:, 2].tolist() == [26] * 3
 
 
-def test_per_corner_texture_coordinates_become_seams() -> None:
+def test_texture_coordinates_per_corner_are_read_as_seams() -> None:
     data = binary(
         "<",
         [
@@ -189,7 +189,7 @@ def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
     assert warnings == [texcoord, unused("face texcoord")]
 
 
-def test_comment_names_the_texture(tmp_path) -> None:
+def test_texture_name_is_read_from_a_comment(tmp_path) -> None:
     pixels = np.full((2, 2, 4), 128, np.uint8)
     (tmp_path / "my skin.png").write_bytes(encode_png(pixels))
     text = GOOD.replace("float z\n", "float z\nproperty float u\nproperty float v\n")
@@ -208,7 +208,7 @@ def test_comment_names_the_texture(tmp_path) -> None:
 def test_header_line_endings_may_vary() -> None:
     assert silent(GOOD.replace("\n", "\r\n")).mesh.n_triangles == 3
     assert silent(GOOD.replace("\n", "\r")).mesh.n_triangles == 3
-    rows = [[10.0, 0, 0]] * 3  # 10.0 as a big-endian float begins with 65, as a byte 10 below
+    rows = [[10.0, 0, 0]] * 3  # the bytes of value 10 must not be read as line ends
     data = binary("<", [("vertex", ["uchar x", "uchar y", "uchar z"], [[10, 1, 2]] * len(rows))])
     head, body = data.split(b"end_header\n")
     figure, _ = read(head + b"end_header\n" + body)

@@ -99,7 +99,7 @@ def test_scale_of_0_is_reported(files):
     )
 
 
-def test_pose_alone_is_refused(files):
+def test_pose_without_a_figure_is_refused(files):
     wanted = "a pose without a figure: open it together with a figure"
     assert refusal(files["kick"]) == f"{files['kick']}: {wanted}"
     skin = files["kick"].with_name("a.skin")
@@ -148,7 +148,7 @@ def test_image_for_figures_without_texture_coordinates_is_refused(files, names):
     )
 
 
-def test_image_alone_is_refused(files):
+def test_image_without_a_figure_is_refused(files):
     assert (
         refusal(files["red"])
         == f"{files['red']}: an image without a figure: open it together with a figure"
@@ -171,7 +171,7 @@ def additions(files, *names):
     return contents
 
 
-def test_pose_is_added_to_an_actor_in_place(files):
+def test_pose_is_applied_to_an_actor_in_place(files):
     actor = viewer.load(files["legs"]).actors[0]
     pose = actor.pose
     again, notes = add_to_actor(additions(files, "kick"), actor)

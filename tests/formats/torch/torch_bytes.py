@@ -101,7 +101,7 @@ def zip_file(
 
 
 def torch_zip(given: Any, order: str = "little") -> bytes:
-    """Return a torch file of a value; its arrays become tensors."""
+    """Return a torch file of a value with its arrays as tensors."""
     tensors = Tensors(order="<" if order == "little" else ">")
     return zip_file(value(given, tensors.array), tensors.stored, order)
 
@@ -116,7 +116,7 @@ def legacy_file(body: bytes, stored: dict[str, tuple[int, bytes]], is_little: bo
 
 
 def torch_legacy(given: Any) -> bytes:
-    """Return a legacy file of a value; its arrays become tensors."""
+    """Return a legacy file of a value with its arrays as tensors."""
     tensors = Tensors()
     body = value(given, tensors.array)
     sizes = [array.size for array in _arrays(given)]

@@ -91,7 +91,7 @@ def test_tram_up_axis_depends_on_the_stored_world(tmp_path: Path) -> None:
     assert open_results(Source.open(path)).up == "-y"
 
 
-def test_tram_person_files_are_read_alone(tmp_path: Path) -> None:
+def test_single_tram_person_files_are_read(tmp_path: Path) -> None:
     path = tram_folder(tmp_path)
     alone = path / "hps" / "hps_track_3.npy"
     capture = open_results(Source.open(alone))

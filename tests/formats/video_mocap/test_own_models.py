@@ -1,4 +1,4 @@
-"""Captures drawn with the user's own SMPL-family model, if the model folder contains it."""
+"""Captures drawn with an SMPL-family model of the user, if the model folder contains it."""
 
 from __future__ import annotations
 

@@ -380,7 +380,7 @@ def test_pose_record_round_trips(family, kind):
     assert pose_key(again) == pose_key(pose)
 
 
-def test_record_holds_labels_and_raw_pose_values(family):
+def test_record_contains_labels_and_raw_pose_values(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[3 * 4] = 0.5  # left knee about x
