@@ -13,6 +13,8 @@ from formats.synthetic_smpl import model
 
 from viewer.export import export
 
+REMARKS = ("warning: ", "note: ")
+"""Beginnings of lines about a command that goes on."""
 FREE = (".mtl", ".png")
 """Suffixes of companion files; those of an ``.obj`` get unused names."""
 

@@ -17,7 +17,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import figure_pose
-from viewer.rig.shape import rest_joints, rest_positions, shaped, with_rest_mesh
+from viewer.rig.shape import rest_joints, rest_positions, shaped, shaped_skeleton, with_rest_mesh
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import deform
 
@@ -276,3 +276,14 @@ def test_failed_results_are_not_cached():
     with pytest.raises(ZeroDivisionError):
         memo.get(owner, 1, lambda: 1 // 0)
     assert memo.get(owner, 1, lambda: 5) == 5
+
+
+def test_skeletons_follow_the_shape_only_with_a_joint_regressor() -> None:
+    figure, weights = arm(), np.array([1.0, 0.5])
+    moved = shaped_skeleton(figure, weights)
+    # The shape moves one of the second joint's two vertices by 2 along x, and all of them along y.
+    assert_allclose(moved.rest_translations, [[0, 0.5, 0], [5, 0, 0]], atol=1e-12)
+    free = arm(joint_regressor=None)
+    assert shaped_skeleton(free, weights) is free.skeleton
+    with pytest.raises(RigError):
+        shaped_skeleton(arm(skeleton=None, skin=None, joint_regressor=None), weights)

@@ -8,7 +8,9 @@ import threading
 import numpy as np
 import pytest
 from app.captured import dots, people, walk
+from export.gltf.two_parts import two_parts
 
+import viewer
 from viewer.app.files import motion_export
 from viewer.app.files.export_formats import FOLDER
 from viewer.app.files.motion_export import (
@@ -20,6 +22,7 @@ from viewer.app.files.motion_export import (
 from viewer.app.files.state import Files
 from viewer.formats import save_bytes
 from viewer.progress import report
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
@@ -150,6 +153,37 @@ def test_every_person_is_written_to_a_file_named_as_by_convert(crowd, tmp_path):
     assert crowd.says("captured points are not exported: face4 0")
 
 
+def test_glb_contains_everyone_and_figures_without_motion(crowd, tmp_path):
+    crowd.state.scene.actors.append(Actor(crowd.state.scene.actors[0].figure, called="post"))
+    save_motion(crowd.state, tmp_path / "walk.glb", everyone=True)
+    assert crowd.state.job.title == "Writing walk.glb"
+    crowd.finish_job()
+    assert crowd.state.error == ""
+    assert [path.name for path in tmp_path.glob("walk*")] == ["walk.glb"]
+    actors = viewer.load(tmp_path / "walk.glb").actors
+    assert [actor.figure.name for actor in actors] == ["tiny 0", "tiny 1", "tiny 2", "post"]
+    assert [actor.clip is not None for actor in actors] == [True, True, True, False]
+    assert {actor.clip.name for actor in actors[:3]} == {"take"}
+
+
+def test_figures_with_their_own_keys_share_a_glb(drive, tmp_path):
+    figure = two_parts()
+    clip = figure.animations[0].clip()
+    actors = [Actor(figure, clip=clip, animation=0), Actor(figure, clip=clip, animation=0)]
+    actors[1].placement = translation_matrix(np.array([0.0, 0.0, 4.0]))
+    hand = drive(scene=Scene(actors), size=(1000, 700), samples=1)
+    save_motion(hand.state, tmp_path / "both.glb", everyone=True)
+    hand.finish_job()
+    assert hand.state.error == ""
+    found = viewer.load(tmp_path / "both.glb").actors
+    assert [[each.name for each in actor.figure.animations] for actor in found] == [
+        ["wave", "jump"],
+        ["wave", "jump"],
+    ]
+    rotations = next(each for each in found[1].clip.channels if each.path == "rotation")
+    assert rotations.times.tolist() == [0.0, 0.5, 2.0]
+
+
 def test_only_the_chosen_actor_is_written_if_requested(crowd, tmp_path):
     crowd.state.choose_actor(1)
     save_motion(crowd.state, tmp_path / "walk.bvh")
@@ -192,7 +226,9 @@ def test_open_files_are_never_replaced_when_exporting_everyone(crowd, tmp_path):
 
 
 def test_file_names_are_derived_from_one_name(crowd, tmp_path):
-    assert motion_files(crowd.state, tmp_path / "a.gltf", True) == [
+    both = [tmp_path / "a.gltf", tmp_path / "a.bin"]
+    assert motion_files(crowd.state, tmp_path / "a.gltf", True) == both
+    assert motion_files(crowd.state, tmp_path / "a-{person}.gltf", True) == [
         *(tmp_path / f"a-{person}.gltf" for person in range(3)),
         *(tmp_path / f"a-{person}.bin" for person in range(3)),
     ]

@@ -21,7 +21,7 @@ def test_pages_open_from_the_menu_and_the_list(drive, rig, texts) -> None:
     texts.clear()
     hand.click("page keys")
     hand.step(2)
-    assert shown(hand) == "keys" and "reset the pose to that of the file" in texts
+    assert shown(hand) == "keys" and "reset the pose to the file's pose" in texts
 
 
 @pytest.mark.parametrize("size", [(900, 640), (300, 200)])

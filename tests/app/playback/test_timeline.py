@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from viewer.app.core.clock import MODES
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.diagnostics import Diagnostic
@@ -302,3 +303,18 @@ def test_camera_follows_an_actor_until_following_is_turned_off(streaming):
     streaming.state.clock.seek(5.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_arrow_keys_choose_from_an_open_list(moving):
+    clock, before = moving.state.clock, moving.state.clock.time
+    modes = list(MODES)
+    assert clock.mode == modes[0]
+    moving.click("Mode")
+    moving.step(2)
+    moving.key("down_arrow")
+    moving.key("down_arrow")
+    moving.key("space")  # ImGui chooses with it; it must not also play
+    moving.step(2)
+    assert clock.mode == modes[2] and clock.time == before and not clock.playing
+    moving.key("right_arrow")  # the list is closed: the key steps again
+    assert clock.mode == modes[2] and clock.time > before

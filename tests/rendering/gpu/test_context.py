@@ -18,9 +18,7 @@ from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen
 
 ROOT = Path(__file__).resolve().parents[3]
-LINUX = pytest.mark.skipif(
-    not sys.platform.startswith("linux"), reason="EGL is used only on Linux"
-)
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is used only on Linux")
 
 TINY_SKEL = """balljoint root {
   boxmin -0.1 0 -0.1

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rig.geometry.shell import shell_of
+from viewer.rig.geometry.shell import _has_long_borders, shell_of
+from viewer.rig.geometry.topology import welded
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import skin_from_lists
 
@@ -88,3 +89,22 @@ def test_seams_with_different_weights_are_open() -> None:
     assert shell_of(mesh, skin_from_lists(pairs, inverse_bind)) is not None
     pairs[0] = [(0, 1.0)]
     assert shell_of(mesh, skin_from_lists(pairs, inverse_bind)) is None
+
+
+def grid(n: int) -> Mesh:
+    """Return a flat grid of n x n cells: its border has 4 n vertices and edges."""
+    x, y = (part.ravel() for part in np.mgrid[: n + 1, : n + 1])
+    corner = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    right, up = corner + n + 1, corner + 1
+    triangles = [np.stack([corner, right, up], 1), np.stack([right, right + 1, up], 1)]
+    return cube(np.concatenate(triangles), np.stack([x, y, 0.0 * x], axis=1))
+
+
+def test_long_borders_are_found_without_comparing_edges() -> None:
+    # At most 256 vertices may lie on openings: grids of 64 and 65 cells have 256 and 260.
+    assert not _has_long_borders(grid(64).triangles.astype(np.int64), 65**2)
+    assert _has_long_borders(grid(65).triangles.astype(np.int64), 66**2)
+    closed = fine_cube()
+    corners = welded(closed.positions, np.arange(closed.n_vertices))[closed.triangles]
+    assert not _has_long_borders(corners, closed.n_vertices)
+    assert shell_of(grid(65), None) is None
