@@ -151,7 +151,7 @@ def part_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-def test_imports_point_one_way() -> None:
+def test_imports_follow_the_allowed_directions() -> None:
     for path in SOURCES:
         allowed = ALLOWED.get(part_of(path))
         if allowed is None:
@@ -165,7 +165,7 @@ def part_of_app(name: str) -> str:
     return name.split(".")[2]
 
 
-def test_window_features_import_one_way() -> None:
+def test_window_features_follow_the_allowed_directions() -> None:
     folders = {path.name for path in (PACKAGE / "app").iterdir() if path.is_dir()}
     assert folders - {"__pycache__"} <= set(ALLOWED_IN_APP)
     for path in (PACKAGE / "app").rglob("*.py"):
@@ -213,7 +213,7 @@ def test_third_party_modules_are_imported_by_one_part_only() -> None:
             assert homes is None or any(inside.startswith(home) for home in homes), (path, name)
 
 
-def test_dataclasses_compile_nothing_at_import() -> None:
+def test_standard_dataclass_decorator_is_not_used() -> None:
     """The decorator of the standard library delays every start by 0.5 ms for each class."""
     for path in SOURCES:
         found = re.search(

@@ -4,8 +4,8 @@ Times are processor times of the processes, which hardly depend on other program
 software drivers. A first round fills the cache of parsed numbers.
 
 Idle threads of OpenBLAS wait actively after numpy is imported; ``viewer`` shortens that time, the
-minimal programs do not. Hence each of them is also measured with the same setting, which shows what
-the rest of the program adds.
+minimal programs do not. So each of them is also measured with the same setting, which shows the
+cost of the rest of the program.
 
 Limits, in ms of processor time of the main thread on two 2.5 GHz cores:
 
@@ -38,7 +38,7 @@ FORBIDDEN = ("imgui_bundle", "glfw", "scipy")
 PIG = ROOT.parent / "shared" / "data" / "pig" / "core_txt_files"
 SKELETON = ROOT / "assets" / "samples" / "fox.skel"
 
-# Runs a script in a process whose idle threads of OpenBLAS sleep.
+# This program runs a script in a process in which idle threads of OpenBLAS sleep.
 ASLEEP = """
 import os, runpy, sys
 os.environ["OPENBLAS_THREAD_TIMEOUT"] = "20"

@@ -70,7 +70,7 @@ def test_up_axis_is_refused_as_the_front(tmp_path, capsys):
 
 
 def test_window_has_the_same_first_view(tmp_path):
-    """The test covers the first view passed to the window, and the reference of its named views."""
+    """The first view and the front of the named views are passed to the window."""
     scene = viewer.load(sided_skel(tmp_path / "turned.skel", "-z"))
     parser = argparse.ArgumentParser()
     add_camera_arguments(parser)
@@ -83,7 +83,7 @@ def test_window_has_the_same_first_view(tmp_path):
     assert (plain.front, plain.azimuth, plain.inclination) == (180.0, -145.0, 15.0)
 
 
-def test_image_with_panels_fits_the_whole_motion_between_them(tmp_path):
+def test_whole_motion_is_visible_between_the_panels_of_an_image(tmp_path):
     """In the image with panels, the figure is not clipped and not smaller than necessary."""
     from app.captured import people
     from app.tiny import write_rig

@@ -216,7 +216,7 @@ def test_scale_is_baked_into_all_lengths(tmp_path):
 
 
 def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkeypatch):
-    # The error is that of a lost scale.
+    # The reported error is that of a missing scale.
     monkeypatch.setattr("viewer.export.rig.scaled", lambda figure, factor: figure)
     actor = seamed_actor()
     actor.pose.figure_scale = 1.5
@@ -250,7 +250,7 @@ def test_error_caused_by_raw_weights_is_reported(tmp_path):
     actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
     actor.pose.figure_translation[:] = 3, 4, 0
     _, notes = there_and_back(actor, tmp_path)
-    # Because of its weights, only half of the 5 m applies to vertex 0.
+    # Because of its weights, vertex 0 moves by only half of the 5 m.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
     lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
     assert [part.key for part in parts_not_held(notes)] == lost

@@ -209,7 +209,7 @@ def test_motions_that_are_retargeted_again_are_cleaned_up_again():
     assert again.timing.n_frames == actor.clip.timing.n_frames == 41
 
 
-def test_keypoints_of_a_person_without_any_get_the_first_number():
+def test_keypoints_of_merged_people_get_the_first_number():
     figure, clip = keypoints()
     scene = Scene([person(3, 0, 60), Actor(figure, clip=clip, person=7)])
     (note,) = clean_up(scene, CleanUp(merged=((3, 7),)))

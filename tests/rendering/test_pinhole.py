@@ -196,7 +196,7 @@ def test_distortion_matches_hand_calculation():
     # p1 = 0.01.
     assert error(0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
     assert error(0.0, 0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
-    # k4 = 1 divides by 1.5: each axis loses a third of its 50 pixels.
+    # k4 = 1 divides by 1.5: the 50 pixels of each axis are reduced by a third.
     assert error(0, 0, 0, 0, 0, 1.0) == pytest.approx(50 / 3 * math.sqrt(2))
 
 

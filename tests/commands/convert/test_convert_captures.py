@@ -127,7 +127,7 @@ def test_glb_of_the_only_person_present_keeps_its_name(recording, tmp_path, caps
 
 
 @pytest.mark.parametrize("kind", ["glb", "bvh"])
-def test_person_in_a_name_is_replaced(recording, tmp_path, kind):
+def test_person_field_in_a_name_is_replaced(recording, tmp_path, kind):
     assert convert(*recording, "-o", tmp_path / f"p{{person}}_take.{kind}") == 0
     names = sorted(path.name for path in tmp_path.glob("p*"))
     assert names == [f"p0_take.{kind}", f"p7_take.{kind}"]

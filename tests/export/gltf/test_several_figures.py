@@ -73,7 +73,7 @@ def test_written_figures_are_read_as_several_actors(tmp_path: Path) -> None:
         assert_allclose(np.ptp(one, axis=0), np.ptp(two, axis=0), atol=SINGLE)
 
 
-def test_animations_of_different_length_stay_separate(tmp_path: Path) -> None:
+def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
     longer = [replace(clip, end=clip.end + 1.0) for clip in clips()]
     actors, path = [Actor(two_parts()), Actor(two_parts())], tmp_path / "both.glb"
     export_figures(actors, path, None, [clips(), longer])
@@ -105,7 +105,7 @@ def test_animations_without_effect_are_reported(tmp_path: Path) -> None:
     )
     figure = two_parts()
     idle = TransformClip("blink", (face,), 0.0, 1.0)
-    # The second blend shape is in no part of the file.
+    # No part of the file contains the second blend shape.
     none = np.zeros(0, dtype=int)
     record = replace(figure.record, part_shapes=(np.array([0]), none), target_names=(("up",), ()))
     figure = replace(figure, record=record)
@@ -130,7 +130,7 @@ def test_different_application_data_is_listed_by_figure(tmp_path: Path) -> None:
         ]
     }
     assert Evaluator(tmp_path / "some.glb").root["extras"] == expected
-    # A file that is read back, alone or with further figures, adds only what is new.
+    # When a file is read back, with or without further figures, only new data is added.
     back = viewer.load(tmp_path / "some.glb").actors
     export_figures(back, tmp_path / "same.glb")
     assert Evaluator(tmp_path / "same.glb").root["extras"] == expected

@@ -76,7 +76,7 @@ def test_moved_vertex_is_reported_by_index() -> None:
     assert vertices.item == "vertex 3"
 
 
-def test_weights_differ_by_the_l1_distance_of_rows_in_any_listing() -> None:
+def test_weights_differ_by_the_l1_distance_of_rows_in_any_order() -> None:
     # Vertex 0: the same weight split into two entries. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
     other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
@@ -220,7 +220,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
     assert replace(found, measures=(broken,)).exceeds(1e9)
 
 
-def test_actors_keep_the_worst_pose_even_if_it_is_their_own() -> None:
+def test_actors_report_the_worst_pose_even_if_it_is_their_own() -> None:
     # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]
