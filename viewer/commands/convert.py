@@ -1,4 +1,4 @@
-"""Converts figures, poses and motions to other formats."""
+"""Conversion of figures, poses and motions to other formats."""
 
 from __future__ import annotations
 
@@ -33,6 +33,7 @@ from viewer.commands._writing.motion_export import (
     writes_keys,
 )
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
+from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.commands._writing.written_actors import left_out_notes, pose_or_point_actors
 from viewer.diagnostics import Diagnostic
@@ -96,17 +97,24 @@ def run(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
+    notes = convert_streamed(arguments, output, skinning)
+    if notes is None:
+        notes = _converted(arguments, output, skinning)
+    for note in notes:
+        note_found(note)
+    print("\n".join(map(str, notes)), file=summary_stream(output))
+    return 0
+
+
+def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) -> list[Diagnostic]:
+    """Open all files, and write what is requested; return the notes."""
     scene = open_scene(arguments)
     baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
     with saving_joint_map(arguments, scene), shown_progress("converting"):
-        notes = [*write(arguments, scene, output, skinning), *baked]
-    for note in notes:
-        note_found(note)
-    print("\n".join(map(str, notes)), file=summary_stream(output))
-    return 0
+        return [*write(arguments, scene, output, skinning), *baked]
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
@@ -129,7 +137,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
-        return  # the files are known only when the motion has been read
+        return  # the files are unknown until the motion has been read
     is_pose = all(kind.writes_pose for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(arguments), arguments.force)
@@ -166,7 +174,7 @@ def _write_actors(
     shown = pose_or_point_actors(scene)
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("nobody is present at that time: there is nothing to write")
+        raise RigError("no person is present at that time: there is nothing to write")
     if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
         notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
     else:
@@ -205,7 +213,7 @@ def _write_apart(
     places: Mapping[Actor, Path],
     clips_of: Callable[[Actor], Sequence[TransformClip] | None],
 ) -> list[Diagnostic]:
-    """Write each actor to a file of its own."""
+    """Write each actor to a separate file."""
     optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
     check_targets(files, inputs_of(arguments, scene), arguments.force)

@@ -2,25 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
 from viewer.export._bvh.reading import BvhFile, read_back
-from viewer.export._bvh.text import bvh_text
+from viewer.export._bvh.text import frame_texts, head_text
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
-from viewer.formats import all_or_none, save_bytes
+from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
@@ -31,10 +32,19 @@ from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export_animation"]
+__all__ = [
+    "Writer",
+    "check_finite",
+    "check_options",
+    "ends_of",
+    "export_animation",
+    "one_root",
+    "remarks",
+    "space_of",
+]
 
 _DEFAULT_UNIT = "cm"
-_SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
+_SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
 
 
@@ -73,20 +83,19 @@ def export_animation(
     OutputError
         If a file cannot be written.
     """
-    _check(options)
+    check_options(options)
     if not animation.frames.present.any():
         raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
     reference = int(animation.frames.present.argmax())
     is_split = options.closing == "split" and not animation.frames.present.all()
     frames = filled(animation.frames, options.closing == "interpolate")
-    figure, rigged = _one_root(animation.figure, frames, reference)
-    space = _space(figure, options)
+    figure, rigged = one_root(animation.figure, frames, reference)
+    space = space_of(figure, options)
     with np.errstate(invalid="ignore", over="ignore"):
         body = body_of(figure, rigged, reference, options.rotation_order, space)
-    if not all(np.isfinite(part).all() for part in (body.angles, body.positions, body.offsets)):
-        raise RigError(f"{animation.name}: expected finite numbers in every frame")
-    writer = _Writer(
-        animation, figure, body, _ends(animation, figure, space, reference), space, options
+    check_finite(animation, body.angles, body.positions, body.offsets)
+    writer = Writer(
+        animation, figure, body, ends_of(animation, figure, space, reference), space, options
     )
     spans = runs(animation.frames.present) if is_split else [(0, frames.n_frames)]
     paths = split_paths(path, len(spans))
@@ -101,10 +110,11 @@ def export_animation(
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
     lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + _remarks(animation, figure, body, reference, options)
+    return notes + lost + remarks(animation, figure, body, reference, options)
 
 
-def _check(options: MotionOptions) -> None:
+def check_options(options: MotionOptions) -> None:
+    """Raise RigError for an option that the format does not have."""
     for what, value, known in (
         ("unit", options.unit, ("", *METRES)),
         ("up axis", options.up, ("", "y", "z")),
@@ -119,7 +129,14 @@ def _check(options: MotionOptions) -> None:
         raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
 
 
-def _space(figure: Figure, options: MotionOptions) -> Space:
+def check_finite(animation: SampledAnimation, *parts: Floats) -> None:
+    """Raise RigError if a number of a file would be infinite or NaN."""
+    if not all(np.isfinite(part).all() for part in parts):
+        raise RigError(f"{animation.name}: expected finite numbers in every frame")
+
+
+def space_of(figure: Figure, options: MotionOptions) -> Space:
+    """Return the transform to the requested unit and up axis."""
     up = options.up or "y"
     factor = 1.0
     if figure.unit in METRES:
@@ -134,7 +151,7 @@ def _up_rotation(start: str, end: str) -> Floats:
     return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
 
 
-def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
+def one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
     """Return a figure with one root: several roots become children of a joint at the origin."""
     skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
@@ -164,7 +181,7 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
     )
 
 
-def _ends(
+def ends_of(
     animation: SampledAnimation, figure: Figure, space: Space, reference: int
 ) -> dict[int, Floats]:
     """Return the End Site of each leaf joint of the written figure, in the file's space."""
@@ -182,7 +199,7 @@ def _ends(
 
 
 @dataclass(frozen=True, slots=True)
-class _Writer:
+class Writer:
     """Writer of all files of one animation."""
 
     animation: SampledAnimation
@@ -210,7 +227,14 @@ class _Writer:
             still = self.body.offsets[None]
             positions = np.concatenate([still, positions])
             angles = np.concatenate([np.zeros_like(still), angles])
-        return bvh_text(
+        head = self.head(len(angles))
+        digits = self.options.digits
+        frames = frame_texts(self.parents, self.body.moves, positions, angles, digits)
+        return b"".join([head, *frames])
+
+    def head(self, n_frames: int) -> bytes:
+        """Return the file contents before the frames."""
+        return head_text(
             self.names,
             self.parents,
             self.body.offsets,
@@ -218,7 +242,7 @@ class _Writer:
             self.body.moves,
             self.options.rotation_order,
             self.animation.frame_rate,
-            (positions, angles),
+            n_frames,
             self.options.digits,
         )
 
@@ -229,7 +253,7 @@ class _Writer:
         animation, how = self.animation, self.options.skinning
         names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
-        file = BvhFile(path, text, names, self.space, reference, ahead)
+        file = BvhFile(bvh.read(Source(path, text)), names, self.space, reference, ahead)
         written = read_back(file, animation.figure, animation.frames, how)
         shape = shape_at(animation.frames, reference)[0]
         return driven_losses(path, animation, written, how, span, shape)
@@ -251,7 +275,7 @@ class _Writer:
         return Diagnostic("X001.bvh", path, values=values)
 
 
-def _remarks(
+def remarks(
     animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
 ) -> list[Diagnostic]:
     """Return notes about changed or omitted data."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes
 from viewer.rig.materials.texture import MINIFICATIONS, WRAPS, Texture, check_choice
@@ -14,7 +13,8 @@ from viewer.rig.materials.toon import Outline, Rim
 __all__ = ["ALPHA_MODES", "MINIFICATIONS", "TEXTURES", "WRAPS", "Material", "Texture"]
 
 ALPHA_MODES = ("opaque", "mask", "blend")
-"""Alpha ignored; cut out below the cutoff; blended with the background."""
+"""Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
+background."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +30,8 @@ class Material:
     base_texture : Texture or None
         Colour and opacity, sRGB.
     base_color : (r, g, b, a) or None
-        Linear, 0 to 1; None for a material without a colour of its own, which is white under a
-        texture and otherwise has the figure's colour.
+        Linear, 0 to 1; None for a material without a colour, which is white under a texture and
+        otherwise has the figure's colour.
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
@@ -57,7 +57,7 @@ class Material:
     unlit : bool
         Whether the base colour is shown without lighting.
     shade_color : (r, g, b) or None
-        Linear colour of the side away from the key light in toon shading; None without it.
+        Linear colour of the side away from the key light in toon shading; None in other shading.
     shade_texture : Texture or None
         Colour that multiplies ``shade_color``, sRGB.
     shade_range : (float, float)

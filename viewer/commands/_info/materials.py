@@ -47,7 +47,7 @@ def _describe_toon(material: Material) -> dict[str, Any]:
 
 
 def surface_words(material: dict[str, Any]) -> list[str]:
-    """Return the properties of ``describe_surface`` other than one texture, in words."""
+    """Return the properties of ``describe_surface`` other than one texture, as text."""
     if "maps" not in material:
         return []
     words, toon = [], material.get("toon")

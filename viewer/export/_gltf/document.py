@@ -28,7 +28,7 @@ _TYPES = {
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _PADDING = 4  # alignment of arrays, bytes: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
-_HEADER = 28  # bytes of a .glb besides JSON and arrays
+_HEADER = 28  # bytes of a .glb in addition to JSON and arrays
 
 
 class Document:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._gltf.body import Body, Built, add_body, body_of
 from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
@@ -44,7 +45,7 @@ class Added:
     clips : sequence of TransformClip or None
         The animations to write; None if only the pose was written.
     kept : dict of TransformClip
-        Those with an effect, by index in the file.
+        Animations with an effect, by index in the file.
     """
 
     figure: Figure
@@ -92,7 +93,7 @@ def place_figures(
     """Place several figures as in their scene; return the nodes that move them.
 
     ``actors``: the figures, each upright in its own space.
-    ``built``: their contents of the file.
+    ``built``: their contents in the file.
     ``to_file`` (4, 4): scene space to the space of the file.
     """
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()
@@ -121,7 +122,7 @@ def figure_losses(
 ) -> list[Diagnostic]:
     """Return notes with the largest errors of a figure, and about data that is not written.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes, Floats, frozen
 
@@ -18,7 +17,7 @@ MINIFICATIONS = (
     *("nearest", "linear", "nearest_mipmap_nearest"),
     *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
 )
-"""Filters of images that are drawn smaller than they are, as OpenGL and glTF name them."""
+"""Filters of minified images, with their names in OpenGL and glTF."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
