@@ -48,7 +48,7 @@ def run(arguments: Sequence[str]) -> int:
     Returns
     -------
     int
-        Exit code: 0, that of the ``ViewerError``, or 128 plus the signal number.
+        Exit code: 0, the code of the ``ViewerError``, or 128 plus the signal number.
     """
     try:
         with watched():

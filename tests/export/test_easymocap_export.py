@@ -275,7 +275,7 @@ def test_other_figures_are_refused(tmp_path):
         written(animation_of_clip(scene.actors[0].figure, clip), tmp_path / "out")
     assert str(caught.value) == (
         "fox cannot be written as an EasyMocap folder: expected the joints of SMPL, SMPL+H, "
-        "SMPL-X or MANO, found others"
+        "SMPL-X or MANO, found different ones"
     )
 
 

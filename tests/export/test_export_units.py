@@ -65,7 +65,7 @@ def test_a_guessed_unit_is_used_for_bvh_and_reported_once(
     assert run(["convert", str(walk), "-o", str(out), *options]) == 0
     assert_allclose(bvh_places(out), factor * np.array(PERSON_TURNED), rtol=0, atol=2e-6)
     text, error = capsys.readouterr()
-    assert error == f"warning: {walk}: {GUESS}\n"
+    assert error == f"note: {walk}: {GUESS}\n"
     lines = text.splitlines()
     assert len(lines) == 1 and f", {word}, y up" in lines[0]
 
@@ -99,7 +99,7 @@ def test_gltf_of_centimetres_is_in_metres(walk, tmp_path, capsys):
     for name, options in (("motion.glb", []), ("pose.gltf", ["--time", "0.1"])):
         assert run(["convert", str(walk), "-o", str(tmp_path / name), *options]) == 0
         text, error = capsys.readouterr()
-        assert error == f"warning: {walk}: {GUESS}\n"
+        assert error == f"note: {walk}: {GUESS}\n"
         assert text.splitlines()[-1] == (
             "lengths are in centimetres: a node above the figure scales them to metres by 0.01"
         )

@@ -28,9 +28,9 @@ _LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
 _LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
 _MOST = 0.5
 """Largest fraction of the window's width that panels may take."""
-_THREE_ROWS = 60.0  # font sizes: a window of lower height has two rows of panels on the right
+_THREE_ROWS = 60.0  # font sizes: a window of less height has two rows of panels on the right
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
-"""Smallest height of bottom panels in font sizes, and its largest fraction of the window."""
+"""Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
 
 class Sizes(NamedTuple):

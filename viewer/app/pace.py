@@ -1,4 +1,4 @@
-"""Choice of what to draw in each frame: more passes of still scenes, less of moving ones."""
+"""Drawing steps of each frame: more passes of still scenes, lower quality of moving ones."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Pace:
         self._key: object = None
         self._changed = self._now = float("-inf")
         self._is_moving = False
-        self._done = 0  # passes of the image that is shown
+        self._done = 0  # completed passes of the image that is shown
         self._strength = 1.0
         self._cost = 0.0  # frame time with shadows, once measured
         self.is_unfinished = False

@@ -75,7 +75,7 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     font = interface_font()
     if font is not None:
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
-    # A click on a number that can be dragged begins to type it.
+    # A click on a draggable number begins text input.
     imgui.get_io().config_drag_click_to_input_text = True
     set_theme(theme)
     style = imgui.get_style()

@@ -63,7 +63,7 @@ class Result:
         Hash of the inputs, the options and the program's version, by which ``--resume``
         recognises finished items.
     time : float
-        When it ended, in seconds since 1970; the last of several results counts.
+        Time at which it ended, in seconds since 1970; the latest of several results is used.
     """
 
     item: Item

@@ -37,9 +37,9 @@ FIELDS = {
 }
 """Fields of templates."""
 
-_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of numbers
-_LEFT = ("frame",)  # fields of the commands, for numbered images and meshes
-_LONGEST = 300  # characters of a name in a message
+_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of ``{index}``
+_LEFT = ("frame",)  # fields that commands replace, for numbered images and meshes
+_LONGEST = 300  # maximum length of a name in a message, characters
 
 
 def template_of(output: str, suffix: str) -> str:
@@ -95,7 +95,7 @@ def _fields(template: str, option: str = "-o") -> list[str]:
         raise ViewerError(f"{option} {printable(template, _LONGEST)}: {problem}") from None
     for name, spec, conversion in found:
         if name not in (*FIELDS, *_LEFT):
-            near = did_you_mean(name, FIELDS) or f"there are {', '.join(FIELDS)}"
+            near = did_you_mean(name, FIELDS) or f"available fields: {', '.join(FIELDS)}"
             raise ViewerError(f"{option}: no field is called {{{printable(name, 40)}}}; {near}")
         if spec and name not in ("index", *_LEFT):
             raise ViewerError(
@@ -249,7 +249,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
 def check_summaries(
     files: Mapping[str, str], items: Sequence[Item], more_inputs: Iterable[str] = ()
 ) -> None:
-    """Check that files about the whole batch are neither inputs, outputs nor each other.
+    """Check that files about the whole batch differ from inputs, outputs and each other.
 
     Parameters
     ----------
@@ -269,7 +269,7 @@ def check_summaries(
     given = {option: path for option, path in files.items() if path}
     if not given:
         return
-    # Resolving a million paths takes seconds, so only those of the same name are.
+    # Resolving a million paths takes seconds, so only paths with the same name are resolved.
     last = {os.path.basename(path).casefold() for path in given.values()}
 
     def is_near(path: str) -> bool:

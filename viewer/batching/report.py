@@ -148,7 +148,7 @@ def _locked(handle: int) -> Iterator[None]:
     is_locked = True
     try:
         lockf(handle, LOCK_EX)
-    except OSError:  # a file system without locks; appended lines are still written as a whole
+    except OSError:  # the file system has no locks; appended lines are still written as a whole
         is_locked = False
     try:
         yield
@@ -175,7 +175,7 @@ def _data(value: object) -> object:
 
 
 def read_results(path: Path) -> list[Result]:
-    """Read a report; the last result of each item counts.
+    """Read a report; if an item has several results, the last one is used.
 
     Parameters
     ----------

@@ -35,7 +35,7 @@ class Settings:
     report : Path or None
         The report to write; None for none.
     existing : str
-        What to do with a report that exists: ``refuse`` it, ``replace`` it, ``append`` to it, or
+        Treatment of an existing report: ``refuse`` it, ``replace`` it, ``append`` to it, or
         ``resume``: append, and skip the items that it or the report of another shard lists as done.
     identity : str
         Job, options and version of the program, which are part of the items' keys.

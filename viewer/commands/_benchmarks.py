@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Measured", "measured"]
 
 _SIZE = 1280, 720
-_STARTS, _FRAMES = 5, 9  # repetitions; the median is used
+_STARTS, _FRAMES = 5, 9  # numbers of repetitions; the median is used
 _INSTANCES, _ROUNDS_OF_MANY = 100, 3
 # A minimal program that draws: it imports numpy and creates an OpenGL context.
 _LEAST = "from viewer.rendering.gpu.context import headless_context; headless_context()"
@@ -32,7 +32,7 @@ _LEAST = "from viewer.rendering.gpu.context import headless_context; headless_co
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A duration, in milliseconds, and what it is compared with, if anything."""
+    """A duration in milliseconds, and the duration that it is compared with, if any."""
 
     subject: str
     milliseconds: float

@@ -16,7 +16,7 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
-_LISTED = 12  # names listed in a message
+_LISTED = 12  # maximum number of names listed in a message
 
 
 def is_named(text: str) -> bool:

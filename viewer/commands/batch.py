@@ -1,4 +1,4 @@
-"""Many files through one command: workers, report, resumption, shards."""
+"""Batches: one command for many files, with workers, a report, resumption and shards."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     add_batch_arguments(parser)
-    add_result_arguments(parser, "diff")  # which has all of them
+    add_result_arguments(parser, "diff")  # diff has all of these options
 
 
 def parser_of(words: Sequence[str]) -> Parser | None:

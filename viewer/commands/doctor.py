@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_line((f"{finding.state:<8}", _STYLES[finding.state]), found)
         if finding.cure:
             print_line(f"{'':<20}-> {printable(finding.cure, 400)}")
-        sys.stdout.flush()  # the next finding may take seconds
+        sys.stdout.flush()  # the next check may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
     if arguments.bench and not code:
@@ -120,7 +120,7 @@ def _examine_packages() -> Iterator[Finding]:
 
 
 def _examine_extras() -> Iterator[Finding]:
-    """Report optional packages, and what each of the missing ones is for."""
+    """Report optional packages, and the uses of each missing one."""
     found, missing = [], {}
     for name, purpose in _EXTRAS.items():
         try:

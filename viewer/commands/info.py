@@ -333,7 +333,7 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
 
 
 def _surface_words(material: dict[str, Any]) -> list[str]:
-    """Return the properties of a material other than one texture, in words."""
+    """Return the properties of a material other than one texture, as text."""
     if "maps" not in material:
         return []
     words = []

@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: what is wrong, where, and how to fix it."""
+"""Checks of rigs and motions: errors, their locations, and remedies."""
 
 from __future__ import annotations
 

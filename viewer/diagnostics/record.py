@@ -17,13 +17,13 @@ __all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", 
 
 @dataclass
 class Record:
-    """Data of a run that its printed text lacks.
+    """Data of a run that is not in its printed text.
 
     Attributes
     ----------
     diagnostics : list of dict
-        Warnings and notes as returned by ``described``; plain texts have only ``severity`` and
-        ``message``.
+        Warnings and notes as returned by ``described``; entries that are only text have just
+        ``severity`` and ``message``.
     values : dict
         Results as JSON data.
     outputs : dict of str

@@ -175,7 +175,7 @@ def export(
     skinning : Skinning, optional
         Skinning method and options.
     optimizes : bool
-        Quantise vertices, which glTF and VRM can.
+        Quantise vertices, which glTF and VRM support.
     meta : VrmMeta, optional
         Name, authors and licence of a VRM character; those of its file if omitted.
 

@@ -13,14 +13,14 @@ from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
 from viewer.export._bvh.reading import BvhFile, read_back
-from viewer.export._bvh.text import bvh_text
+from viewer.export._bvh.text import frame_texts, head_text
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._losses.lines import driven_losses, shape_changes
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import GAPS, ROTATION_ORDERS, MotionOptions
-from viewer.formats import all_or_none, save_bytes
+from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
@@ -34,7 +34,7 @@ from viewer.rig.units import METRES, UNIT_NAMES
 __all__ = ["export_animation"]
 
 _DEFAULT_UNIT = "cm"
-_SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
+_SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
 
 
@@ -210,7 +210,14 @@ class _Writer:
             still = self.body.offsets[None]
             positions = np.concatenate([still, positions])
             angles = np.concatenate([np.zeros_like(still), angles])
-        return bvh_text(
+        head = self.head(len(angles))
+        digits = self.options.digits
+        frames = frame_texts(self.parents, self.body.moves, positions, angles, digits)
+        return b"".join([head, *frames])
+
+    def head(self, n_frames: int) -> bytes:
+        """Return the file contents before the frames."""
+        return head_text(
             self.names,
             self.parents,
             self.body.offsets,
@@ -218,7 +225,7 @@ class _Writer:
             self.body.moves,
             self.options.rotation_order,
             self.animation.frame_rate,
-            (positions, angles),
+            n_frames,
             self.options.digits,
         )
 
@@ -229,7 +236,7 @@ class _Writer:
         animation, how = self.animation, self.options.skinning
         names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
-        file = BvhFile(path, text, names, self.space, reference, ahead)
+        file = BvhFile(bvh.read(Source(path, text)), names, self.space, reference, ahead)
         written = read_back(file, animation.figure, animation.frames, how)
         shape = shape_at(animation.frames, reference)[0]
         return driven_losses(path, animation, written, how, span, shape)

@@ -51,7 +51,7 @@ __all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
-_BLOCK = 256  # frames whose numbers are formatted at once
+_BLOCK = 256  # number of frames formatted together
 _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
@@ -140,7 +140,7 @@ def _of_person(person: int, note: Diagnostic) -> Diagnostic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One written person: original animation, animation with filled gaps, records, read-back."""
+    """One written person: original animation, animation without gaps, records, data read back."""
 
     original: SampledAnimation
     animation: SampledAnimation
@@ -236,7 +236,7 @@ def _used(rows: Floats, count: int) -> Floats:
 @contextlib.contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder next to ``path/smpl``, and move it there if the block succeeds."""
-    hold()  # also protects the temporary folder, which must not be left behind
+    hold()  # signals must not leave the temporary folder behind
     target = path / _FOLDER
     made = None
     try:

@@ -79,7 +79,7 @@ def export_animation(
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:
     vectors = np.zeros((len(body.vectors[part]), len(_MEMBER.names), 3))
     for row, name in enumerate(body.member.names):
-        if name in _MEMBER.names:  # SMPL's hands have no joint of their own in SMPL-X
+        if name in _MEMBER.names:  # SMPL's hand joints do not exist in SMPL-X
             vectors[:, _MEMBER.names.index(name)] = body.vectors[part, row]
     count = len(vectors)
     arrays: dict[str, NDArray[Any]] = {

@@ -135,7 +135,7 @@ def _add_kept(
 
 
 def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
-    """Give materials the toon and unlit extensions of the file, and no others of these."""
+    """Add the file's toon extensions to its materials, and keep only its unlit extensions."""
     for own, written in maps.materials.items():
         given = record.toon.get(own, {})
         item = document.root["materials"][written].setdefault("extensions", {})

@@ -85,8 +85,8 @@ __all__ = [
 
 _ARCHIVE_HEAD = 64
 _ARCHIVES = (".pkl", ".pickle", ".npz", ".npy", ".pt", ".pth")
-_ANY_TEXT = (".txt",)  # does not identify the content
-_HEAD = 1 << 16  # bytes that must identify a file
+_ANY_TEXT = (".txt",)  # suffixes that do not identify the content
+_HEAD = 1 << 16  # number of bytes from which a file must be identified
 
 
 FORMATS = {
@@ -97,8 +97,8 @@ FORMATS = {
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
     "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
-    # This row follows the skin, whose sections have the same names: a .morph is identified by its
-    # suffix.
+    # This row follows that of the skin, whose sections have the same names: a .morph is identified
+    # by its suffix.
     "morph": Format(
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
     ),
@@ -234,7 +234,7 @@ def detect(source: Source) -> str:
                 source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
             return key
     if suffix in _ARCHIVES:
-        # Opening it again raises an error that gives the kind of archive.
+        # Opening the archive again raises an error that states its kind.
         return _detect_archive(source)
     looks = source.looks_like()
     if by_suffix and looks is None:

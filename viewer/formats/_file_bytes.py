@@ -19,8 +19,9 @@ MAX_SIZE = 2 << 30
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
 
-_MOST_FILES = 2000  # files in a folder whose names are compared with that of a missing file
-_ALIKE = 0.8  # similarity; high, because file names share suffixes and often more
+# Maximum number of names in a folder that are compared with that of a missing file.
+_MOST_FILES = 2000
+_ALIKE = 0.8  # minimum similarity; high, because file names share suffixes and often more
 _KINDS = {
     stat.S_IFDIR: FOLDER,
     stat.S_IFIFO: "a pipe",

@@ -34,9 +34,9 @@ _wanted: frozenset[Path] = frozenset()
 
 @contextlib.contextmanager
 def keeping_figures(paths: Collection[Path]) -> Iterator[None]:
-    """Keep the figures of some files for later runs, until a run keeps others.
+    """Cache the figures of some files for later runs, until a run caches others.
 
-    A file that has changed is read again. Only files are kept, not folders.
+    A file that has changed is read again. Only files are cached, not folders.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     folder : Path
         Folder of the referencing file.
     name : str
-        Name as written; backslashes count as slashes. The file need not exist.
+        Name as written; backslashes are treated as slashes. The file need not exist.
     """
     written = name.replace("\\", "/")
     if _is_absolute(written):

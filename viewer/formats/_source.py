@@ -41,7 +41,7 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
-_LOOK = 4096  # bytes that identify a file
+_LOOK = 4096  # number of bytes that identify a file
 
 
 class Source:
@@ -63,7 +63,7 @@ class Source:
         Options that select among the contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of
         detail) for MHR.
     used_options : set of str
-        Those that its reader has used.
+        Options that its reader has used.
     """
 
     def __init__(
@@ -139,7 +139,7 @@ class Source:
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
-        """Yield words and braces as matches; a brace is always a word of its own."""
+        """Yield words and braces as matches; a brace is always a separate word."""
         return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
 
     def next_word(self, start: int) -> re.Match[bytes] | None:
@@ -321,7 +321,7 @@ class Source:
         return b"" if first is None else self.data[first.start() : first.start() + size]
 
     def looks_like(self) -> str | None:
-        """Return the apparent type of a file in no supported text format, e.g. ``"gzip data"``."""
+        """Return the apparent type of a file in an unsupported format, e.g. ``"gzip data"``."""
         head = self.head(_LOOK)
         if not head:
             return "only white space" if self.data else "an empty file"

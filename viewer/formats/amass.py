@@ -70,8 +70,8 @@ _KNOWN = {
 _OF_MOTIONS = (*_RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
-_MOST_SCALED = 1e6  # scale of a body; AIST++ scales by about 100
-_SAME = 1e-5  # radians or metres: precision of float32 for numbers below 100
+_MOST_SCALED = 1e6  # maximum scale of a body; AIST++ scales by about 100
+_SAME = 1e-5  # tolerance in radians or metres: the precision of float32 for numbers below 100
 
 
 def has_frames(archive: Archive) -> bool:

@@ -35,7 +35,7 @@ from viewer.rig.mesh import Mesh
 __all__ = ["read"]
 
 _HEAD = 4096  # number of bytes within which files written by this program state the up axis
-_SHORTEST = 1e-9  # length of a mean of unit normals that cancel each other
+_SHORTEST = 1e-9  # length of the mean below which unit normals cancel each other out
 
 
 def read(source: Source) -> Figure:
@@ -80,7 +80,7 @@ def read(source: Source) -> Figure:
         triangle_materials=of_face[owners],
         parts=names,
         triangle_parts=part_of_face[owners],
-        # Scans have the colours of their texture at the vertices, too.
+        # Scans also have the colours of their texture at the vertices.
         colors=None if any(one.image is not None for one in materials) else parts.colors,
     )
     if mesh.n_triangles == 0:
@@ -167,7 +167,8 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
 
 def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -> Floats:
     """Return the mean of each vertex's distinct normals: (V, 3)."""
-    pairs = np.unique(vertices * len(listed) + indices)
+    # Products of two counts exceed 32 bits in files of some 50,000 vertices.
+    pairs = np.unique(vertices.astype(np.int64) * len(listed) + indices)
     owners, normals = pairs // len(listed), listed[pairs % len(listed)]
     sums = np.stack(
         [np.bincount(owners, normals[:, axis], minlength=n_vertices) for axis in range(3)], axis=1

@@ -25,7 +25,7 @@ __all__ = ["Again", "lint_again"]
 
 _MESH = ("positions", "normals", "triangles")
 _SKIN = ("starts", "joints", "weights", "inverse_bind")
-_NAMED = 3  # files that a note lists individually
+_NAMED = 3  # maximum number of files that a note lists
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +110,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _changed(path: Path) -> float:
-    """Return when a file or any file in a folder was last changed, seconds since the epoch."""
+    """Return the time of the last change to a file, or to any file in a folder, since the epoch."""
     return max(map(_last_change, _with_contents(path)), default=0.0)
 
 

@@ -14,7 +14,7 @@ from viewer.rig.scene import Scene
 
 __all__ = ["Counting", "counting_of"]
 
-_ON_FRAME = 1e-6  # fraction of a frame: times closer than this to a frame count as that frame
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, within which a time counts as that frame's
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class Counting:
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return a scene's frame numbering: that of its longest capture, or from the earliest start.
+    """Return a scene's frame numbering: its longest capture's, or from the earliest start.
 
     Parameters
     ----------

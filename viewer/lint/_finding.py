@@ -30,7 +30,7 @@ MAX_ROTATION = 3400.0
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
 _STRAYS = 0.02  # maximum fraction of stray vertices at each end of an axis
-_FAR = 10.0  # ratio of bounding boxes, with strays to without, above which strays are ignored
+_FAR = 10.0  # strays are ignored if they enlarge the bounding box by more than this factor
 
 Indices = NDArray[np.int64] | Ints | list[int]
 

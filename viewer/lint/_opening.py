@@ -1,4 +1,4 @@
-"""Opens files for checks: files that fail become findings, the rest are assembled."""
+"""Opening of files for checks: failures become findings, and the other files are assembled."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def open_files(
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
     queue = list(reversed(known.values()))
-    for number, path in enumerate(queue):  # grows during iteration: a .rig refers to files
+    for number, path in enumerate(queue):  # the list grows during iteration: a .rig refers to files
         if progress is not None:
             progress(number, len(queue), f"reading {printable(path, 60)}")
         named = _read(opened, path, settings or MotionSettings(), max_size)
@@ -107,7 +107,7 @@ def _resolved(path: Path) -> Path:
     """Return a path that identifies a file; invalid paths are reported by reading them."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a cycle of links, or a NUL character in the name
+    except (OSError, RuntimeError, ValueError):  # a cycle of links, or NUL in the name
         return path
 
 
@@ -200,7 +200,7 @@ def _read_on(
     """Read captures completely; return the error that stopped one of them."""
     for builder in builders:
         while not builder.is_done:
-            if progress is not None:  # an exception from it is not a file error
+            if progress is not None:  # an exception raised by it is not a file error
                 progress(builder.n_read, builder.capture.n_frames, "reading frames")
             try:
                 new, notes = builder.read_some()

@@ -32,8 +32,8 @@ class Track:
     rotations : (F, J, 4)
         Local rotations: unit quaternions.
     stepped : (F, J) bool
-        Whether a key without interpolation, of the joint or of an ancestor, lies between the
-        previous row and this one: such jumps are intended.
+        Whether a key without interpolation, of the joint or of an ancestor, is between the previous
+        row and this one: such jumps are intended.
     size : float
         Size of the skeleton at rest, in scene units.
     scale : float

@@ -56,7 +56,7 @@ class Builder:
     path : Path or None
         Its file or folder, for messages.
     model : Figure
-        The figure with which its bodies are drawn.
+        The figure that shows its bodies.
     called : str
         Base name of all people; the capture's name if empty.
     keeps_shape : bool
@@ -72,14 +72,14 @@ class Builder:
     has_shape, has_expression : bool
         Whether the files have nonzero shapes, and expressions.
     target : Figure or None
-        Figure with other joints that the bodies move instead of the model.
+        Figure with different joints that the bodies move instead of the model.
     swings : bool
         Whether the spring joints of later people are simulated.
     joint_map : JointMap or None
         Joints of the target and the joints of the model that drive them; None to match them by
         name.
     plants_feet : bool
-        Whether the feet of the target are planted, which is still to be done.
+        Whether the feet of the target still have to be planted.
     hangs : bool
         Whether the axis along which people stand points down before placement.
     defers : bool
@@ -103,10 +103,10 @@ class Builder:
     plants_feet: bool = True
     hangs: bool = False
     defers: bool = False
-    _names_shapes: bool = False  # whether any person has shape coefficients, including zeros
+    _names_shapes: bool = False  # whether any person has shape coefficients, even if all are 0
     _has_parameters: bool = False
     _grows: bool = True  # whether the motions of driven figures are computed part by part
-    _is_behind: bool = False  # whether such a motion lacks parts that were read
+    _is_behind: bool = False  # whether such a motion lacks parts that have been read
     _parts: Iterator[CapturePart] | None = None
     _bodies: dict[int, Actor] = field(default_factory=dict)
     _points: dict[int, Actor] = field(default_factory=dict)
@@ -267,7 +267,7 @@ class Builder:
             self._bodies[person] = actor
             new.append(actor)
         else:
-            assert isinstance(actor.clip, SampledClip)  # set when the actor was made
+            assert isinstance(actor.clip, SampledClip)  # set when the actor was created
             actor.clip = _extended(actor.clip, clip)
             if drive is not None and actor.drive is not None:
                 actor.drive = _grown(actor.drive, drive)
@@ -283,7 +283,8 @@ class Builder:
             new.append(actor)
             return []
         known = actor.figure.points
-        assert isinstance(actor.clip, PointClip) and known is not None  # set with the actor
+        # Set when the actor was created.
+        assert isinstance(actor.clip, PointClip) and known is not None
         if len(known.names) != len(layout.names):
             values = {
                 "person": person_label(person),
@@ -336,7 +337,7 @@ class Builder:
         notes: list[Diagnostic] = []
         clips: list[tuple[Actor, SampledClip, Drive]] = []
         for actor in self._bodies.values():
-            assert isinstance(actor.clip, SampledClip)  # set when the actor was made
+            assert isinstance(actor.clip, SampledClip)  # set when the actor was created
             drive = self._drive(actor.clip)
             clip, said = driven_clip(drive, target)
             clips.append((actor, clip, drive))

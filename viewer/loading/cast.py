@@ -63,7 +63,7 @@ class Cast:
         return free_title(self.actors, title)
 
     def add(self, actor: Actor, up: str, placed: bool, group: FigureGroup | None = None) -> None:
-        """Append one actor, and its file if it may hold several figures."""
+        """Append one actor, with its file if that may contain several figures."""
         self.actors.append(actor)
         self.ups.append(up)
         self.placed.append(placed)

@@ -27,7 +27,7 @@ class CleanUp:
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
     locks_feet : bool
-        Whether standing feet are held in place.
+        Whether feet are held in place during ground contact.
     grounds : bool
         Whether people are moved up or down until their feet rest at height 0.
     frames : (int or None, int or None) or None

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "read_files", "read_source"]
 
 
-_PEEK = 16  # bytes that identify an image
+_PEEK = 16  # number of bytes that identify an image
 
 
 @dataclass(slots=True)
@@ -39,7 +39,7 @@ class Contents:
     Attributes
     ----------
     figures : list of (Path, Figure)
-        All figures, those of groups included.
+        All figures, including the figures of groups.
     groups : list of FigureGroup
         Figures of one file, which keep their places relative to each other and to their cameras.
     called : dict
@@ -103,7 +103,7 @@ def read_files(
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
-    for source in sources:  # grows during iteration: a .rig refers to files
+    for source in sources:  # the list grows during iteration: a .rig refers to files
         for path in read_source(source, contents, settings or MotionSettings()):
             if path.resolve() not in known:  # a .rig may refer to another, or to itself
                 known.add(path.resolve())
@@ -157,7 +157,7 @@ _LISTS = {
     "MorphTarget": "morphs",
     "Figure": "figures",
 }
-"""Field for each class name: only readers that create a class import its module."""
+"""Fields by class name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:

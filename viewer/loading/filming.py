@@ -19,8 +19,8 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["filmed"]
 
-_NAME = "video"  # of the camera of captures that have none
-_ALIKE = 0.005  # relative difference of frame rates: 29.97 and 30 are alike
+_NAME = "video"  # name of the camera for captures that have none
+_ALIKE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30
 
 
 def filmed(

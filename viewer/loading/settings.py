@@ -41,18 +41,18 @@ class MotionSettings:
     legacy_expression : bool
         Whether expressions drive SMPL-X columns 10 to 19, as in EasyMocap.
     drives : bool
-        Whether a BVH drives a figure opened with it, instead of being shown beside it.
+        Whether a BVH drives a figure opened with it, instead of being shown next to it.
     images : Path or None
-        Folder with an image folder for each camera of a capture; None for ``images`` beside the
+        Folder with an image folder for each camera of a capture; None for ``images`` next to the
         capture.
     video : Path or None
-        Video of a capture's camera; also gives the frame rate of captures that have none.
+        Video of a capture's camera; also sets the frame rate of captures that have none.
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
     motions : tuple of Path
-        Further files whose motion drives a figure: their first animation, or the one of the name
-        ``animation``.
+        Further files whose motion drives a figure: the animation called ``animation``, or the first
+        one.
     springs : bool
         Whether spring joints, such as those of hair, are simulated while a motion plays.
     find_model : callable or None
@@ -64,10 +64,11 @@ class MotionSettings:
         Whether people of video motion capture keep one shape, the average over time.
     source_rest : int, "zero" or "auto"
         Rest pose of skeletons whose motion drives a figure: the number of a frame, ``"zero"`` for
-        the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
+        the zero pose of the file, ``"auto"`` for the zero pose if it is a standing pose, otherwise
         a frame in a T- or A-pose, otherwise an estimate from the anatomy.
     feet : bool
-        Whether the feet of driven figures stay planted while those of the motion stand.
+        Whether the feet of driven figures are planted while the feet of the motion are on the
+        ground.
     joint_map : JointMap or None
         Joints of driven figures and the joints that drive them; None to match them by name.
     """

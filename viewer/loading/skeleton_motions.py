@@ -157,7 +157,7 @@ def drive_somebody(
     is_driving : bool
         Whether there is such a figure.
     refusal : str or Diagnostic
-        Why the first figure does not match; empty if there is none.
+        Reason why the first figure does not match; empty if there is no figure.
 
     Raises
     ------

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 __all__ = ["CaptionedCell", "captioned_sheet", "elided", "wrapped"]
 
-_WIDTH = 240  # of a cell, pixels
-_HEIGHTS = 120, 320  # of a cell's picture, smallest and largest
-_CAPTION = 24  # height of a caption
-_GAP = 16  # between cells, and around all
+_WIDTH = 240  # width of a cell, pixels
+_HEIGHTS = 120, 320  # minimum and maximum height of a cell's picture
+_CAPTION = 24  # height of a caption, pixels
+_GAP = 16  # margin between cells and around the sheet
 _LETTERS = 13  # height of letters
 _LINE = 18  # height of a line in a cell without a picture
 _PAPER, _INK = (255, 255, 255, 255), (40, 44, 52, 255)

@@ -42,7 +42,7 @@ VIDEOS = {
         ("libx264", "libopenh264", "mpeg4"),
         False,
         True,
-        {"movflags": "+faststart"},  # the index comes first, so that browsers start at once
+        {"movflags": "+faststart"},  # the index comes first, so that browsers can start immediately
     ),
     ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
     ".gif": VideoKind("animated GIF", ("gif",), True, False),

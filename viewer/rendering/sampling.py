@@ -1,4 +1,4 @@
-"""Passes of an image: small offsets that differ between the passes and average out."""
+"""Passes of an image: small offsets that differ between the passes, whose images are averaged."""
 
 from __future__ import annotations
 

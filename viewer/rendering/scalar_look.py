@@ -36,7 +36,7 @@ class ScalarLook:
     is_whole : bool
         Whether each colour represents one integer, from 0.
     dark_zero : bool
-        Whether 0 has a colour of its own, ``NOTHING``.
+        Whether 0 has a separate colour, ``NOTHING``.
     isolines : bool
         Whether lines are drawn at every tenth of the range.
     is_typical : bool

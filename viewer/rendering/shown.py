@@ -140,7 +140,7 @@ def update_skeletons(
         poses = [pose for _, pose in group]
         skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
         assert skeleton is not None  # guaranteed by shows_skeleton
-        posed_worlds(skeleton, poses)  # batched; each pose caches its result
+        posed_worlds(skeleton, poses)  # computed in one batch; each pose caches its result
         for actor, pose in group:
             buffers.skeleton(actor).update(pose, options)
 

@@ -126,6 +126,6 @@ def _direction(light: Light, follows: bool, view: View) -> Floats:
         flat = math.cos(inclination)
         across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
         return np.array([across, math.sin(inclination), towards])
-    # The light comes from where a camera at these angles would be.
+    # The light comes from the position of a camera at these angles.
     camera = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
     return view.matrix[:3, :3] @ camera_axes(camera)[2]

@@ -48,7 +48,7 @@ class Keypoints:
     joints : (N,) int32
         Joint of each keypoint, -1 for a point on the mesh.
     vertices : (N, 3) int32
-        Corners of the triangle; ignored if there is a joint.
+        Corners of the triangle; ignored for keypoints on a joint.
     weights : (N, 3)
         Barycentric coordinates in that triangle.
     """
@@ -68,7 +68,7 @@ class Keypoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedMesh:
-    """A coarser level of detail over a subset of the vertices.
+    """A coarser level of detail that uses a subset of the vertices.
 
     Attributes
     ----------

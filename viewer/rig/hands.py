@@ -49,7 +49,7 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
     hand : Hand
         Provides the components and mean.
     coefficients : (N,)
-        N <= C; missing coefficients count as 0.
+        N <= C; missing coefficients are treated as 0.
     flat : bool
         Whether to omit the mean.
 

@@ -35,7 +35,7 @@ class MorphTarget:
     positions : (N, 3)
         In the mesh's own space and unit.
     normals : (N, 3) or None
-        Normals as stored; None keeps the normals of the mesh.
+        Normals as stored; None if the normals of the mesh are unchanged.
     """
 
     name: str
@@ -57,7 +57,7 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals follow by the same formula, before skinning. Joints stay where they are.
+    Normals follow by the same formula, before skinning. Joints do not move.
 
     Parameters
     ----------

@@ -43,9 +43,9 @@ if TYPE_CHECKING:
     from viewer.rig.retargeting.drive import Drive
 
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
-"""The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
+"""The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
-# The camera frames the box of the other 99.9 % of the points ...
+# The camera frames the box that excludes this fraction of outlying points ...
 _OUTLIER_FRACTION = 0.001
 # ... if the box of all points is this many times larger.
 _OUTLIER_RATIO = 100.0
@@ -55,7 +55,7 @@ class Swinging(Protocol):
     """Simulation of spring joints; see ``viewer.rig.motion.spring_motion``."""
 
     def swing(self, actor: Actor, time: float) -> None:
-        """Rotate the spring joints of an actor that its clip has posed for a time, in place."""
+        """Rotate the spring joints of an actor, already posed by its clip at a time, in place."""
 
 
 @dataclass(slots=True, eq=False)
@@ -81,7 +81,7 @@ class Actor:
     color : (r, g, b) or None
         Linear, 0 to 1; None for the default colour.
     opacity : float
-        Below 1, it is drawn translucently as one layer: nothing inside it is visible.
+        Below 1, the actor is drawn as one translucent layer: nothing inside it is visible.
     points : (K, 4) or None
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
@@ -95,7 +95,7 @@ class Actor:
     hidden_parts : frozenset of int
         Parts of the mesh that are not drawn, by index.
     springs : Swinging or None
-        Simulation of its spring joints while its clip plays; None leaves them to the clip.
+        Simulation of its spring joints while its clip plays; if None, the clip moves them.
     drive : Drive or None
         Motion of another skeleton from which the clip was retargeted; None for other clips.
     """
@@ -187,7 +187,7 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 
 def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the file's own, with its shape weights."""
+    """Return a new pose of a figure with a skeleton: the pose and shape weights of the file."""
     pose = rest_pose(figure.require_skeleton())
     pose.shape_weights = figure.rest_shape_weights.copy()
     return pose
@@ -325,8 +325,8 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
 def scene_unit(scene: Scene) -> str:
     """Return the unit of length of the scene: that of its first figure with a known unit.
 
-    A scale that converts the figure's unit into another, as of a placement, is considered; any
-    other scale of a pose is taken as the user's own.
+    A scale that converts the figure's unit into another one, such as that of a placement, is taken
+    into account; any other scale of a pose is assumed to be the user's choice.
 
     Parameters
     ----------
@@ -349,7 +349,7 @@ def scene_unit(scene: Scene) -> str:
 
 
 def _unit_of(metres: float) -> str:
-    """Return the unit of this length; empty if there is none."""
+    """Return the unit that has this length; empty if there is none."""
     from viewer.rig.units import METRES
 
     known = (unit for unit, size in METRES.items() if math.isclose(size, metres, rel_tol=1e-6))

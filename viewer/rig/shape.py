@@ -31,7 +31,7 @@ __all__ = [
     "with_rest_mesh",
 ]
 
-_shaped: Memo[Figure, Figure] = Memo(kept=32)  # number of shapes in use at a time
+_shaped: Memo[Figure, Figure] = Memo(kept=32)  # maximum number of shapes in use at a time
 
 
 def shaped(figure: Figure, weights: Floats) -> Figure:
@@ -44,7 +44,7 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     figure : Figure
         Figure with or without blend shapes.
     weights : (N,)
-        N <= S; the others count as 0.
+        N <= S; missing weights are 0.
 
     Returns
     -------
@@ -218,7 +218,7 @@ def joint_directions(figure: Figure) -> Floats:
     if regressor is None or shapes is None or mesh is None:
         return directions
 
-    # Only displacements are regressed, so that constants do not count.
+    # Only displacements are regressed, so that constants have no effect.
     linear = replace(regressor, bias=None)
 
     def make() -> Floats:

@@ -29,7 +29,7 @@ __all__ = [
     "weight_sums",
 ]
 
-_NO_SUM = 1e-12  # smaller sums of weights cannot be scaled to 1
+_NO_SUM = 1e-12  # sums of weights smaller than this cannot be scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -155,7 +155,7 @@ def has_influence(skin: Skin) -> Bools:
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
     """Return the joints without influence, in ascending order: (N,) int32.
 
-    Influences of auxiliary joints of the skeleton count as those of the joints shown for them.
+    Influences of auxiliary joints of the skeleton are assigned to the joints shown in their place.
     """
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
     if skeleton is not None and skeleton.n_joints == skin.n_joints:
@@ -173,7 +173,7 @@ def skin_from_entries(
     n_vertices : int
         V.
     vertices, joints : (N,)
-        Row and column of each weight; the order within a vertex is kept.
+        Row and column of each weight; the order within a vertex is preserved.
     weights : (N,)
         As stored.
     inverse_bind : (J, 4, 4)
@@ -273,7 +273,7 @@ def normalized(skin: Skin) -> Skin:
 
 
 def merged(skin: Skin) -> Skin:
-    """Return the skin with duplicate influences of a joint on a vertex summed into one."""
+    """Return the skin with duplicate influences of a joint on a vertex merged."""
     keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     if len(unique) == len(keys):

@@ -24,7 +24,7 @@ class Member:
     title: str
     names: tuple[str, ...]
     parents: tuple[int, ...]
-    hands: tuple[tuple[str, int], ...] = ()  # side, first of fifteen joints
+    hands: tuple[tuple[str, int], ...] = ()  # side, and first of the fifteen joints
     has_expressions: bool = False
 
 

@@ -35,7 +35,7 @@ def test_counted_job_keeps_its_title_if_no_step_is_named() -> None:
     assert job.title == "Checking"
 
 
-def test_cancelled_job_is_done_at_once_and_ends_before_its_next_step() -> None:
+def test_cancelled_job_is_done_immediately_and_ends_before_its_next_step() -> None:
     reached, go, after = threading.Event(), threading.Event(), []
 
     def act(report: Report) -> list[str]:

@@ -1,4 +1,4 @@
-"""The switch for the feet of driven figures in the Actors panel."""
+"""The switch for planted feet of driven figures in the Actors panel."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def walker(drive):
     return hand
 
 
-def test_check_box_leaves_feet_as_retargeted_and_undo_restores_them(walker):
+def test_check_box_turns_planted_feet_off_and_undo_restores_them(walker):
     hand, actor = walker, walker.state.actor
     before = actor.clip
     plain, _ = retarget(actor.drive.motion, actor.figure)

@@ -129,7 +129,8 @@ def _draw_feet(state: AppState, actor: Actor) -> None:
         toggle_feet(state)
     if not why:
         explain(
-            "keep feet in place, with their soles on the ground, while those of the motion stand"
+            "keep feet in place, with their soles on the ground, while the feet of the source "
+            "motion do not move"
         )
 
 

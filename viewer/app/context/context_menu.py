@@ -37,7 +37,7 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["ContextMenu", "answer_right_click", "draw_context_menu"]
 
 _POPUP = "context menu"
-_LONGEST = 40  # characters of a name
+_LONGEST = 40  # maximum length of a name in characters
 
 
 @dataclass(slots=True)

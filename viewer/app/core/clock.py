@@ -102,8 +102,8 @@ class Clock:
     has_frames: bool = False
     interpolate_gaps: bool = False
     has_motion: bool = False
-    _over: float = 0.0  # seconds since the last frame of the range began
-    _is_returning: bool = False  # in the backward half of ping-pong
+    _over: float = 0.0  # seconds elapsed in the last frame of the range
+    _is_returning: bool = False  # whether ping-pong playback runs backwards
     posed_for: PosedFor | None = None
     n_posed: int = 0
     _grid: tuple[object, ...] = ()  # key of the capture that defines the frames
@@ -202,7 +202,7 @@ class Clock:
     def nearest_frame_time(self, time: float) -> float:
         """Return the time of the frame nearest to a time, within the whole range, seconds."""
         low, high = self.frame_range
-        if low > high:  # shorter than a frame
+        if low > high:  # the range is shorter than a frame
             return time
         return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
 

@@ -156,7 +156,7 @@ def drag_int(
 
 
 def in_row(hidden: str, values: Sequence[Number], draw: Callable[[str, Number], None]) -> None:
-    """Draw several fields of equal widths in the room of one; they count as one item.
+    """Draw several fields of equal widths in the space of one; they count as one item.
 
     Parameters
     ----------
@@ -187,7 +187,7 @@ def _typed(
     flags: int,
     is_whole: bool = False,
 ) -> tuple[bool, float]:
-    """Draw the number of a slider as a text field; return whether another was entered, and it."""
+    """Draw a slider's number as a text field; return whether it was changed, and the number."""
     number = number_field(state, label, value, text, is_whole)
     if number is None:
         return False, value

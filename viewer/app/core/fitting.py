@@ -11,7 +11,7 @@ from viewer.rig.scene import scene_points
 
 __all__ = ["fit_again", "fit_points", "fit_shown", "keep_fitting"]
 
-_GAP = 6.0  # points between the tools and the scene
+_GAP = 6.0  # margin between the tools and the scene, points
 _LEAST = 0.6  # minimum fraction of the view's height to fill, even if overlays cover it
 _NARROWEST = 40.0  # points: a smaller view is unusable
 

@@ -29,9 +29,9 @@ class Framing:
     is_fitting: bool = False
     extent: MotionExtent = field(default_factory=MotionExtent)
     points: Floats | None = None
-    _placed: tuple[object, ...] | None = None  # key of the fitted camera
+    _placed: tuple[object, ...] | None = None  # key of the camera's position when it was fitted
     _fitted: tuple[object, ...] | None = None  # size of the view at the last fit
-    _is_stale: bool = True  # more of the motion is known than at the last fit
+    _is_stale: bool = True  # whether more of the motion is known than at the last fit
 
     @property
     def is_settled(self) -> bool:

@@ -68,7 +68,7 @@ class ThreadJob:
         self.title, self.error, self.can_cancel = title, "", False
         self.lines: list[str] = []
         self._act, self._wake = act, wake
-        self._thread = threading.Thread(target=self._run)  # not a daemon: no partial files
+        self._thread = threading.Thread(target=self._run)  # a daemon could leave partial files
         self._thread.start()
 
     def _run(self) -> None:

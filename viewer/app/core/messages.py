@@ -11,7 +11,7 @@ __all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
 KINDS = ("note", "status", "error")
 """Kinds of messages: unsolicited notes, status after a key or button, and errors."""
 
-_MOST = 1000  # number of messages kept
+_MOST = 1000  # maximum number of messages in the log
 _NOTE_SECONDS = 4.0  # how long a short message is shown
 
 

@@ -42,7 +42,7 @@ class AppState:
         The scene, its point of view and its display settings.
     box : (2, 3)
         Bounding box of the scene in its current shape, in its initial pose or over its whole
-        motion. The grid lies at its bottom.
+        motion. The grid is at its bottom.
     paths : tuple of Path
         The files of the scene; empty for the bundled figure.
     opened_at : float

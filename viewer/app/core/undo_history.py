@@ -28,7 +28,7 @@ from viewer.rig.scene import Actor, Motion, Scene
 
 __all__ = ["History", "Undoable"]
 
-_MOST = 500  # number of steps kept
+_MOST = 500  # maximum number of steps
 
 PoseAt = Callable[[float], None]
 """Function that goes to a time and poses the scene for it."""

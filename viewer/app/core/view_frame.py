@@ -30,7 +30,7 @@ class ViewFrame:
     rect : (x, y, width, height)
         Window coordinates.
     scale : float
-        Window coordinates per point, the unit of handles: that of the interface.
+        Window coordinates per point, the unit of handles: the scale of the interface.
     """
 
     matrix: Floats

@@ -96,7 +96,7 @@ def curves_of(actor: Actor) -> tuple[Curve, ...]:
 
 def _transform_curves(actor: Actor) -> tuple[Curve, ...]:
     skeleton, clip, shapes = actor.figure.require_skeleton(), actor.clip, actor.figure.blend_shapes
-    assert isinstance(clip, TransformClip)  # the caller checked
+    assert isinstance(clip, TransformClip)  # checked by the caller
     labels = [printable(label, 60) for label in joint_labels(skeleton)]
     return tuple(
         Curve(labels[row.joint], row.joint, _PREFIXES[row.path] + _AXES[row.component],

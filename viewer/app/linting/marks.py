@@ -21,9 +21,9 @@ from viewer.rig.scene import actor_points
 
 __all__ = ["aim", "marks_of", "show_finding"]
 
-_MOST = 3000  # largest number of marked vertices, and of marked edges of triangles
-_FEW = 200  # up to this many triangles also get a mark at the centre: tiny edges cover no pixel
-_AROUND, _AROUND_JOINTS = 0.06, 0.15  # shown around a finding, relative to the actor's size
+_MOST = 3000  # maximum number of marked vertices, and of marked triangle edges
+_FEW = 200  # up to this number, triangles also have a central mark: tiny edges cover no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # extents shown around a finding, relative to the actor's size
 _ONE_WAY = 0.5  # minimum length of the mean normal of a location with a front side
 _AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
 _STEEPEST = 70.0  # degrees
@@ -131,12 +131,12 @@ def _radius(count: int) -> float:
 
 
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
-    """Aim the camera at some points, from the front if it would see them from behind.
+    """Aim the camera at some points, and move it to the front if it would see them from behind.
 
     Parameters
     ----------
     state : AppState
-        State with the camera, which moves at once.
+        State with the camera, which moves immediately.
     points : (N, 3)
         Scene space.
     facing : (3,)

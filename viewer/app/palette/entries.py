@@ -23,8 +23,8 @@ from viewer.rig.skinning import METHODS
 
 __all__ = ["Entry", "entries"]
 
-_LEFT_OUT = ("Ctrl+P", "Esc")  # keys of the palette itself
-_LONGEST = 60  # characters of a name
+_LEFT_OUT = ("Ctrl+P", "Esc")  # shortcuts that open and close the palette
+_LONGEST = 60  # maximum length of a name in characters
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,7 +15,7 @@ from viewer.app.palette.matching import ranked
 __all__ = ["Palette", "draw_palette", "toggle_palette"]
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
-_TOP = 0.14  # fraction of the window's height
+_TOP = 0.14  # upper edge, as a fraction of the window's height
 _KEY_COLOR = (1.0, 0.78, 0.45, 1.0)
 _K = imgui.Key
 

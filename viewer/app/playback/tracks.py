@@ -25,13 +25,13 @@ _NAME_WIDTH = 9.0  # in font sizes
 _TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler
 _TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
-_PLAIN = (0.44, 0.62, 0.80)  # colour of actors without a colour, sRGB
+_PLAIN = (0.44, 0.62, 0.80)  # sRGB colour of the tracks of actors without their own colour
 _QUIET = 0.6  # opacity of the tracks of unchosen actors
-_CHOSEN_EDGE = 0.85  # opacities
-_NARROWEST = 0.35  # smallest width of a bar, in font sizes: single frames must be visible
-_NARROWEST_GAP = 1.0  # points between two bars of that width
+_CHOSEN_EDGE = 0.85  # opacity of the edge of the chosen actor's track
+_NARROWEST = 0.35  # minimum width of a bar, in font sizes: single frames must be visible
+_NARROWEST_GAP = 1.0  # points between two bars of minimum width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
-_KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # size relative to the height of a track
+_KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # RGBA colour; size relative to the height of a track
 _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 

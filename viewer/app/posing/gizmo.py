@@ -41,8 +41,8 @@ __all__ = [
 DOT_REACH = 14.0
 """Radius around a joint in which a click selects it, points."""
 
-_BESIDE = 22.0  # points around a handle within which a drag does not orbit
-_STILL = 2.0  # window coordinates by which the pointer may move in a click
+_BESIDE = 22.0  # distance in points from a handle within which a drag does not orbit
+_STILL = 2.0  # maximum movement of the pointer during a click, window coordinates
 _LEFT, _RIGHT = imgui.MouseButton_.left, imgui.MouseButton_.right
 
 

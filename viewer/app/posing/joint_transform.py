@@ -28,7 +28,7 @@ __all__ = [
 
 _LABEL_WIDTH = 4.2  # in font sizes
 _LARGEST = 1e9
-_NOTICEABLE = 1e-4  # relative to the longest bone, or to a scale of 1; less is rounding
+_NOTICEABLE = 1e-4  # relative to the longest bone or a scale of 1; less is rounding
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 

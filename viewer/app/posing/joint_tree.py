@@ -10,7 +10,7 @@ from viewer.rig.skeleton import joint_label
 
 __all__ = ["JointTree", "joint_tree", "select_joint"]
 
-_MOST_OPENED = 128  # maximum number of joints of a rig that is initially expanded
+_MOST_OPENED = 128  # rigs with more joints are initially collapsed
 
 
 @dataclass(slots=True)
@@ -72,5 +72,5 @@ def select_joint(state: AppState, joint: int) -> None:
     if tree.filter.lower() not in joint_label(skeleton, joint).lower():
         tree.filter = ""
     while joint >= 0:
-        tree.opened.add(joint)  # so that the rows below it are visible
+        tree.opened.add(joint)  # shows the rows of its DOFs
         joint = int(skeleton.parents[joint])

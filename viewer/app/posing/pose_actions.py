@@ -35,7 +35,7 @@ __all__ = [
     "save_pose",
 ]
 
-_RANDOM = 10  # number of leading coefficients, of largest variance, in a random shape
+_RANDOM = 10  # number of random coefficients: the first have the largest variance
 
 
 def _record(state: AppState) -> PoseRecord | None:

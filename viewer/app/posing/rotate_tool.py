@@ -39,8 +39,8 @@ RADIUS = 78.0
 """Radius of the rings, points."""
 
 SNAP = math.radians(15.0)
-_VIEW_RADIUS = 1.2  # radius of the ring about the line of sight, relative to the others
-_REACH = 7.0  # points around a ring within which it is grabbed
+_VIEW_RADIUS = 1.2  # radius of the ring about the line of sight, relative to the other rings
+_REACH = 7.0  # distance in points within which a ring can be grabbed
 _FLAT = 0.25  # cosine between axis and line of sight below which a ring counts as seen edge-on
 _STEPS = 72
 

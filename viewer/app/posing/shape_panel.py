@@ -34,7 +34,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
-_SEARCHED = 60  # longer lists of shapes have a filter
+_SEARCHED = 60  # lists with more shapes have a filter
 _LABELS = 0.55  # maximum width of the names, relative to the width of the panel
 _HEADINGS = {
     "shape": "Shape",

@@ -111,7 +111,7 @@ class Drag:
 class HeldVector:
     """A joint's rotation vector as edited, which may be longer than pi.
 
-    Beyond pi, a shorter vector gives the same rotation, so the rotation does not determine the
+    Beyond pi, a shorter vector describes the same rotation, so the rotation does not determine the
     vector.
 
     Attributes

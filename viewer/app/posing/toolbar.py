@@ -27,7 +27,7 @@ __all__ = ["draw_toolbar"]
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
-_WIDTH = 14.5  # width of each row, in font sizes: buttons must not move when rows appear
+_WIDTH = 14.5  # fixed width of each row, in font sizes: buttons must not move when rows appear
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:

@@ -17,7 +17,7 @@ KINDS = {
 """Kinds of recordings, with their labels."""
 
 VIDEO_KINDS = (".mp4", ".webm", ".gif")
-"""Those that are one video file, by its suffix."""
+"""Kinds that are a video file, by its suffix."""
 
 LEAST_PIXELS = 16
 """Smallest width and height of a recording."""

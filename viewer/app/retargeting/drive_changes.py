@@ -24,7 +24,7 @@ _SHORT = 1000  # frames of all people that are retargeted within a frame of the 
 
 
 def no_edit(state: AppState) -> str:
-    """Return why the chosen actor's retargeting cannot be changed; empty if it can."""
+    """Return the reason why the chosen actor's retargeting cannot be changed; empty if it can."""
     why = no_drive(state)
     if not why and state.of(Files).stream is not None:
         why = "wait until the capture has been read"

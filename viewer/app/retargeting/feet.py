@@ -1,4 +1,4 @@
-"""Switch for planting the feet of driven figures while those of the motion stand."""
+"""Switch for planting the feet of driven figures while the feet of the motion are in contact."""
 
 from __future__ import annotations
 

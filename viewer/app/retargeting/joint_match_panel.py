@@ -41,9 +41,9 @@ _ORIGINS = {
     "": ("at rest", "no joint of the motion drives this joint"),
 }
 _AT_REST = "(at rest)"
-_WIDE = 44.0  # font sizes; a narrower panel has the skeletons below the table
+_WIDE = 44.0  # font sizes: a narrower panel has the skeletons below the table
 _TABLE = 0.56  # fraction of a wide panel's width
-_MOST_DRIVEN = 3  # names after a joint that is already used
+_MOST_DRIVEN = 3  # maximum number of names listed after a joint that is already used
 
 
 def draw(state: AppState) -> None:

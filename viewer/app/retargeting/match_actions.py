@@ -32,7 +32,7 @@ _SUFFIXES = (".txt",)
 
 
 def is_automatic(state: AppState) -> str:
-    """Return why the match cannot be reset; empty if it can."""
+    """Return the reason why the match cannot be reset; empty if it can."""
     drive = state.actor.drive
     why = no_edit(state)
     return why or ("" if drive is not None and drive.joint_map else "the match is automatic")

@@ -16,7 +16,7 @@ __all__ = ["draw_preview", "hover_pair"]
 
 _MATCHED = (0.45, 0.78, 1.0, 1.0)
 _HOVERED = (1.0, 0.86, 0.35, 1.0)
-_NEAR = 0.7  # font sizes; joints this close to the mouse are hovered
+_NEAR = 0.7  # distance in font sizes within which a joint is hovered
 _DOT = 0.16  # radius of a joint, font sizes
 _DRAG = 0.01  # radians per pixel
 

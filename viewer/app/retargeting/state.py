@@ -52,7 +52,7 @@ class Shown:
     Attributes
     ----------
     drive, figure : Drive, Figure
-        What was matched.
+        The drive and the figure that were matched.
     target, source : Side
         The figure and the motion.
     partners : (J,)

@@ -89,7 +89,7 @@ def advance_flight(state: AppState, seconds: float) -> None:
         flight.ends = None
         _put(state, flight, end)
         if state.framing.is_fitting:
-            fit_again(state)  # the view or the scene may have changed meanwhile
+            fit_again(state)  # the view or the scene may have changed during the animation
     else:
         _put(state, flight, _between(start, end, share * share * (3.0 - 2.0 * share)))
 

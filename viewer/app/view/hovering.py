@@ -20,7 +20,7 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked
-_MOST = 16  # maximum number of actors for this: with more, picking is slow in software
+_MOST = 16  # maximum number of actors for picking, which is slow on software drivers
 _AWAY = 14.0  # points between the pointer and the name
 
 

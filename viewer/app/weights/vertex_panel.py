@@ -27,12 +27,12 @@ __all__ = ["draw", "fitting", "matrix_text"]
 
 _DIGITS = 4
 _COPIED_DIGITS = 6
-_LONGEST = 40  # characters of a name
+_LONGEST = 40  # maximum length of a name in characters
 _NUMBER, _LABEL = 3.8, 4.7  # widths of columns, in font sizes
 _DIGIT = 0.56  # width of a digit, in font sizes
 _SMALLEST, _FEWEST = 0.75, 3  # smallest font scale and number of decimals, for a narrow panel
-_PADDING = 2.0  # points next to each number
-_SPARE = 6.0  # points: font sizes are rounded to whole pixels
+_PADDING = 2.0  # points at each side of a number
+_SPARE = 6.0  # reserve in points, because font sizes are rounded to whole pixels
 
 
 def draw(state: AppState) -> None:

@@ -76,7 +76,8 @@ def limbs_of(figure: Figure) -> Limbs:
     try:
         partners = joint_partners(figure)
     except RigError:
-        partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: no symmetry to preserve
+        # The figure is not symmetric, so there is no symmetry to preserve.
+        partners = np.arange(len(parents), dtype=np.int32)
     return Limbs(weights, fractions, unit(ways), partners)
 
 

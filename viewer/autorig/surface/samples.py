@@ -45,7 +45,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     """Return evenly distributed points of a surface, deterministically.
 
     Positions along the cumulative area are evenly spaced, so every triangle gets points in
-    proportion to its area, rounded up or down. Within a triangle the point is a (1 - sqrt u) + b
+    proportion to its area, rounded up or down. Within a triangle, the point is a (1 - sqrt u) + b
     sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
     plastic number's powers).
 

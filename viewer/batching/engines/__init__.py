@@ -24,7 +24,7 @@ IN_FLIGHT = 4
 class Job(Protocol):
     """The job that is applied to each item: a callable that can be pickled.
 
-    It returns a result for any item, even for bad input; see ``attempts.attempt``.
+    It returns a result for any item, even for invalid input; see ``attempts.attempt``.
     """
 
     def __call__(self, item: Item) -> Result:
@@ -45,7 +45,7 @@ class Limits:
     workers : int
         Number of worker processes; engines that run in this process ignore it.
     retries : int
-        How often an item is retried after its worker crashed, hung or ran out of memory.
+        Number of times an item is retried after its worker crashed, hung or ran out of memory.
     timeout : float or None
         Seconds after which the worker of an attempt is terminated; None for no limit.
     memory : int or None

@@ -22,7 +22,7 @@ __all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
 ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
 
-_SETTLE = 0.5  # seconds for sending the last event of a worker that ends itself
+_SETTLE = 0.5  # seconds in which a worker that ends itself can send its last event
 _FAILED = 70  # exit code of such a worker
 
 # A worker runs one item at a time even if it has several threads: output is captured, and

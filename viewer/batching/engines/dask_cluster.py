@@ -30,7 +30,7 @@ __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _PER_WORKER = 3  # items handed out per worker: one runs while the next ones are transferred
-_COUNT_EVERY = 1.0  # seconds; workers join and leave
+_COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leave
 _ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 
@@ -86,7 +86,7 @@ class _Flight:
 
         self.client, self.limits = client, limits
         self.flying: dict[Future, _Attempt] = {}
-        self._job = cloudpickle.dumps(job)  # also pickles functions of notebooks
+        self._job = cloudpickle.dumps(job)  # unlike pickle, supports functions of notebooks
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._batch = f"viewer-{uuid4().hex[:8]}-"
         self._numbers = itertools.count()

@@ -36,8 +36,8 @@ __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit
-_PATIENCE = 120.0  # seconds until a pool in which no item runs is replaced; doubled each time
-_MOST_BREAKS = 3  # pools that may end without a result before the batch fails
+_PATIENCE = 120.0  # seconds until a pool without a running item is replaced; doubled each time
+_MOST_BREAKS = 3  # maximum number of pools that end without a result before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -84,7 +84,7 @@ def _check_pickles(job: Job) -> None:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item and how often it has been started before."""
+    """An item, and the number of times it has been started before."""
 
     item: Item
     earlier: int = 0
@@ -97,7 +97,7 @@ class _Worker(SpawnProcess):
 
     def start(self) -> None:
         """Start the process; raise OSError if the pool is closing, which ends the pool's thread."""
-        owner, self.owner = self.owner, None  # it is sent to the new process
+        owner, self.owner = self.owner, None  # the object is sent to the new process
         if owner is None:
             super().start()
             return
@@ -146,7 +146,7 @@ class _Workers:
         self.flying: dict[ProcessFuture[Result], _Attempt] = {}
         self._done: SimpleQueue[ProcessFuture[Result]] = SimpleQueue()
         self._context = _Context()
-        with signals_blocked():  # starts a process that tracks semaphores
+        with signals_blocked():  # creates a process that tracks semaphores
             self._is_stopping = self._context.Event()
         self._n_breaks = 0
         self._patience, self._moved = _PATIENCE, time.monotonic()
@@ -181,7 +181,7 @@ class _Workers:
         attempt = self.flying.pop(future)
         result = self._result(future, attempt)
         if result.status == "cancelled" and not result.message:
-            return  # it was never started
+            return  # the item was never started
         if result.status in _RETRIED and attempt.earlier < self.limits.retries and not self.stops():
             self.schedule(_Attempt(attempt.item, attempt.earlier + 1))
             return
@@ -264,10 +264,11 @@ class _Workers:
         pool = ProcessPool(
             self.limits.workers, initializer=_prepare, initargs=given, context=self._context
         )
-        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides what to
-        # end. Workers inherit the signal mask, as do the threads that start further workers.
+        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides which
+        # processes to end. Workers inherit the signal mask, as do the threads that start further
+        # workers.
         with signals_blocked():
-            _ = pool.active  # starts it
+            _ = pool.active  # starts the pool
         return pool
 
 
@@ -280,7 +281,7 @@ def _end_of(code: int | None) -> str:
     return f"exited with {code}"
 
 
-# The rest runs in the workers.
+# The following functions run in the workers.
 
 _job: Job | None = None
 _stopping: Event | None = None

@@ -9,7 +9,7 @@ from viewer.phrases import printable
 
 __all__ = ["bar", "document", "row", "table", "tag", "text_of"]
 
-_LONGEST = 1000  # maximum characters of a text
+_LONGEST = 1000  # maximum length of a text in characters
 
 _STYLE = """
 :root { color-scheme: light dark; --back: #fff; --text: #1d2026; --soft: #626a77; --line: #dfe3e9;

@@ -19,7 +19,7 @@ from viewer.phrases import counted, printable
 __all__ = ["save_page"]
 
 _MOST_ROWS = 5_000
-_MOST_MESSAGES = 20  # per item
+_MOST_MESSAGES = 20  # maximum number of messages per item
 _MOST_THUMBNAILS = 400
 _THUMBNAIL = (160, 120)  # pixels
 _SEVERITIES = ("error", "warning", "note")

@@ -28,7 +28,7 @@ MOST_BYTES = 2 << 30
 MOST_FILES = 5_000
 """Files that are unpacked from one archive."""
 
-_ENCRYPTED = 0x41  # flag bits 0 and 6
+_ENCRYPTED = 0x41  # bits 0 and 6 of the flags
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 _DAMAGE = (*DAMAGE, NotImplementedError)
 
@@ -147,7 +147,7 @@ def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
 
 
 def _is_full(problem: Exception) -> bool:
-    """Return whether the disk is to blame, and not the archive."""
+    """Return whether the disk caused an error, and not the archive."""
     return isinstance(problem, OSError) and problem.errno in _FULL
 
 

@@ -28,7 +28,7 @@ def identity_of(function: Callable[..., Any]) -> str:
 
 def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
     yield VERSION.encode()
-    if id(value) in seen:  # a recursive function
+    if id(value) in seen:  # the function is recursive
         return
     seen.add(id(value))
     if isinstance(value, partial):
@@ -36,7 +36,7 @@ def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
             yield from _parts(one, seen)
         return
     inner = getattr(value, "__func__", value)
-    if inner is not value:  # a method
+    if inner is not value:  # the value is a method
         yield from _parts(value.__self__, seen)
     code = getattr(inner, "__code__", None)
     if not isinstance(code, CodeType):

@@ -29,13 +29,13 @@ from viewer.phrases import counted, listed, printable
 
 __all__ = ["Plan", "Request", "plan_of"]
 
-_SMALL = 50e6  # bytes of all inputs; above this, even a few inputs are run by workers
-_LISTED = 10  # names in a message
+_SMALL = 50e6  # total bytes of inputs above which workers run even a few inputs
+_LISTED = 10  # maximum number of names in a message
 
 
 @dataclass(frozen=True)
 class Request:
-    """The user's request; the options of the same names describe it.
+    """The user's request; see the options of the same names.
 
     ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
@@ -123,7 +123,7 @@ def _joint_maps(request: Request, items: Sequence[Item]) -> list[Item]:
 
 
 def _overview_names(request: Request, count: int) -> dict[str, str]:
-    """Return the files of the overview; raise OutputError if a further sheet exists."""
+    """Return the files of the overview; raise OutputError if one of its sheets exists."""
     if not request.overview:
         return {}
     first, *others = overview_files(request.overview, count)
@@ -172,7 +172,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     Few small inputs are run in this process, because starting workers takes about a second.
     """
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
-    if timeout is not None and not timeout >= 0.0:  # NaN too
+    if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
     for name, value in (("workers", request.workers), ("retries", request.retries)):
         if value is not None and value < 0:

@@ -24,7 +24,7 @@ from viewer.version import VERSION
 __all__ = ["request_of"]
 
 _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
-"""Arguments on which the content of the outputs does not depend."""
+"""Arguments that do not affect the content of the outputs."""
 
 
 def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
@@ -87,12 +87,12 @@ def _fixed(arguments: argparse.Namespace) -> list[str]:
 
 
 def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """Return the paths of the batch, and messages about those that are left out."""
+    """Return the paths of the batch, and messages about omitted paths."""
     if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
         return arguments.files, []
     found = find_submissions(arguments.files)
     names = listed([printable(path.name, 60) for path in found.ignored])
-    note = f"ignored, as they are neither folders nor archives: {names}"
+    note = f"ignored because they are neither folders nor archives: {names}"
     return [*map(str, found.submissions)], [note] if found.ignored else []
 
 
@@ -116,7 +116,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
     names |= parser._defaults.keys()
     command = argparse.Namespace(**{name: getattr(arguments, name) for name in names})
     if getattr(command, "model_path", None) is not None:
-        save_model_folder(command.model_path)  # once, not for each item
+        save_model_folder(command.model_path)  # saved once, not for each item
         command.model_path = None
     return command
 

@@ -55,7 +55,7 @@ class SubmissionJob:
             entered: list[Submission] = []
 
             def enter(_: Item) -> None:
-                # Whatever an archive or a full disk may cause concerns this item alone.
+                # Errors caused by an archive or a full disk affect this item only.
                 one = opened(path, self.expected, self.alike, Path(self.temporary))
                 entered.append(stack.enter_context(one))
 

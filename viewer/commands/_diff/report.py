@@ -24,7 +24,7 @@ class Compared:
     differences : tuple of (str, Difference)
         One per actor, with the actor's name in the reference.
     mismatches : tuple of Diagnostic
-        Actors without a counterpart, and the side they are on.
+        Actors without a counterpart, and the scene that contains them.
     error : str
         Reason why the input could not be opened; empty if it was.
     diagnostics : tuple of Diagnostic

@@ -77,8 +77,8 @@ class Numbering:
     def checked_time(self, time: float) -> float:
         """Return a time, checked to lie within the motions.
 
-        A capture's last frame is extended by half a frame's duration, since nobody enters its exact
-        time.
+        A capture's last frame is extended by half a frame's duration, because users rarely enter
+        its exact time.
 
         Raises ViewerError if the time lies outside the captures.
         """
@@ -160,7 +160,7 @@ def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None
 
 
 def parse_range(text: str, option: str = "--frames", *, steps: bool = True) -> Range:
-    """Parse ``A:B`` or, where there are steps, ``A:B:STEP``; A and B may be omitted.
+    """Parse ``A:B`` or, if steps are allowed, ``A:B:STEP``; A and B may be omitted.
 
     ``option`` is for messages.
 

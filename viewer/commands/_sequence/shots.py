@@ -129,7 +129,7 @@ def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> S
         places, more = _places(request, arguments, numbering, rates)
         notes += [*more, *_overridden(arguments, scene)]
     else:
-        assert request.turntable is not None  # otherwise nothing would move
+        assert request.turntable is not None  # something moves: figures or the camera
         places = np.zeros(_count((request.turntable.seconds or _ROTATION_SECONDS) * rates.drawn))
     seconds = len(places) / rates.drawn
     if request.kind == "sheet":

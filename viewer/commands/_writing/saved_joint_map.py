@@ -54,7 +54,7 @@ def saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[No
     check_targets(files, inputs_of(arguments, scene), arguments.force)
     output = Path(arguments.output)
     if output.suffix and "{frame" not in output.name:
-        check_targets([*files, output], (), force=True)  # they must be different files
+        check_targets([*files, output], (), force=True)  # the files must be different
     with all_or_none(files):
         for file, text in zip(files, texts, strict=True):
             save_text(file, text)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 
 _WHOLE = 2.0 * np.pi  # radians in a revolution
+_BLOCK = 256  # frames
 _LOCKED = 1e-9  # cosine of the middle angle below which the outer axes coincide (gimbal lock)
 
 
@@ -47,36 +48,81 @@ def unrolled(angles: Floats, order: str) -> Floats:
     ``order``: order of the axes.
     Returns (N, ..., 3): radians, not limited to one revolution.
     """
-    if len(angles) < 2:
-        return angles.copy()
-    if angles.ndim > 2:
-        # One joint at a time, so that the arrays of many frames fit into the processor's cache.
-        joints = np.empty_like(angles)
-        for joint in range(angles.shape[1]):
-            joints[:, joint] = unrolled(angles[:, joint], order)
-        return joints
-    angles = _unlocked(angles, order)
-    stay = np.abs(_wrapped(angles[1:] - angles[:-1])).sum(axis=-1)
-    # The distance to the other form is at least 2 pi - stay.
-    if not (stay < np.pi).all():
-        angles = _nearest_form(angles, stay)
-    turns = np.zeros_like(angles)
-    np.cumsum(_revolutions(angles[1:] - angles[:-1]), axis=0, out=turns[1:])
-    return angles - _WHOLE * turns
+    result, unroller = np.empty_like(angles), Unroller(order)
+    # Some frames at a time, so that their arrays fit into the processor's cache.
+    for start in range(0, len(angles), _BLOCK):
+        rows = slice(start, start + _BLOCK)
+        result[rows] = unroller.following(angles[rows])
+    return result
 
 
-def _nearest_form(angles: Floats, stay: Floats) -> Floats:
-    """Switch to the other form of a rotation where it is nearer to the previous frame.
+class Unroller:
+    """Unwrapping of angles over time, some frames after others; see ``unrolled``.
 
-    ``stay`` (N - 1, ...): distance from the previous frame in the given form.
+    ``order``: order of the axes.
     """
-    other = angles * [1.0, -1.0, 1.0] + np.pi
-    # Switching costs the same from either form, so the number of switches accumulates.
-    change = np.abs(_wrapped(other[1:] - angles[:-1])).sum(axis=-1)
-    changed = np.logical_xor.accumulate(change < stay - 1e-9, axis=0)
-    chosen = angles.copy()
-    chosen[1:] = np.where(changed[..., None], other[1:], angles[1:])
-    return chosen
+
+    def __init__(self, order: str) -> None:
+        self._sign = _sign(order)
+        self._first: Floats | None = None  # first angle of the last frame without gimbal lock
+        self._last = self._chosen = np.zeros(0)  # last frame: as given, and in the chosen form
+        self._is_other: Bools = np.zeros(0, dtype=np.bool_)  # whether that is the other form
+        self._turns = np.zeros(0)  # revolutions so far
+
+    def following(self, angles: Floats) -> Floats:
+        """Return the angles (N, ..., 3) of the next frames, unwrapped."""
+        if len(angles) == 0:
+            return angles.copy()
+        if self._first is None:
+            self._first = angles[0, ..., 0].copy()
+            self._last = self._chosen = angles[0]
+            self._is_other = np.zeros(angles.shape[1:-1], dtype=np.bool_)
+            self._turns = np.zeros(angles.shape[1:])
+        angles = self._unlocked(angles)
+        chosen = self._nearest_form(angles)
+        before = np.concatenate([self._chosen[None], chosen[:-1]])
+        turns = np.cumsum(_revolutions(chosen - before), axis=0)
+        turns += self._turns
+        self._chosen, self._turns = chosen[-1], turns[-1]
+        return chosen - _WHOLE * turns
+
+    def _nearest_form(self, angles: Floats) -> Floats:
+        """Switch to the other form of a rotation where it is nearer to the previous frame."""
+        before = np.concatenate([self._last[None], angles[:-1]])
+        self._last = angles[-1]
+        stay = np.abs(_wrapped(angles - before)).sum(axis=-1)
+        # The distance to the other form is at least 2 pi - stay.
+        if (stay < np.pi).all() and not self._is_other.any():
+            return angles
+        other = angles * [1.0, -1.0, 1.0] + np.pi
+        # Switching costs the same from either form, so the number of switches accumulates.
+        switches = np.abs(_wrapped(other - before)).sum(axis=-1) < stay - 1e-9
+        switches[0] ^= self._is_other
+        changed = np.logical_xor.accumulate(switches, axis=0)
+        self._is_other = changed[-1]
+        return np.where(changed[..., None], other, angles)
+
+    def _unlocked(self, angles: Floats) -> Floats:
+        """Set the first angle of frames in gimbal lock to that of the previous frame.
+
+        R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined, and the
+        third angle compensates.
+        """
+        assert self._first is not None  # set by the caller
+        locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
+        if not locked.any():
+            self._first = angles[-1, ..., 0]
+            return angles
+        frames = np.arange(1, len(angles) + 1).reshape(-1, *[1] * (locked.ndim - 1))
+        before = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
+        known = np.concatenate([self._first[None], angles[..., 0]])
+        first = np.take_along_axis(known, before, axis=0)
+        self._first = first[-1]
+        result = angles.copy()
+        result[..., 0] = np.where(locked, first, angles[..., 0])
+        sign = self._sign * np.sign(angles[..., 1])
+        result[..., 2] += np.where(locked, sign * (angles[..., 0] - first), 0.0)
+        return result
 
 
 def _revolutions(angles: Floats) -> Floats:
@@ -86,25 +132,6 @@ def _revolutions(angles: Floats) -> Floats:
 
 def _wrapped(angles: Floats) -> Floats:
     return angles - _WHOLE * _revolutions(angles)
-
-
-def _unlocked(angles: Floats, order: str) -> Floats:
-    """Set the first angle of frames in gimbal lock to that of the previous frame.
-
-    R_j(+-90 degrees) maps axis k to +-i (or -+i), so only a + c or a - c is defined, and the third
-    angle compensates.
-    """
-    locked = np.cos(angles[..., 1]) < 2.0 * _LOCKED
-    if not locked.any():
-        return angles
-    frames = np.arange(len(angles)).reshape(-1, *[1] * (locked.ndim - 1))
-    before = np.maximum.accumulate(np.where(locked, 0, frames), axis=0)
-    first = np.take_along_axis(angles[..., 0], before, axis=0)
-    result = angles.copy()
-    result[..., 0] = np.where(locked, first, angles[..., 0])
-    sign = _sign(order) * np.sign(angles[..., 1])
-    result[..., 2] += np.where(locked, sign * (angles[..., 0] - first), 0.0)
-    return result
 
 
 def _sign(order: str) -> float:

@@ -26,7 +26,7 @@ from viewer.rig.motion.evaluation import Frames, frames_between, rest_translatio
 from viewer.rig.pose import rest_pose
 from viewer.rig.skeleton import Skeleton
 
-_BLOCK = 128  # frames at a time, so that their matrices fit into the processor's cache
+BLOCK = 128  # frames per block, whose matrices fit into the processor's cache
 _NOISE = 1e-9  # fraction of the skeleton's size: smaller motions are ignored
 
 
@@ -87,33 +87,71 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
     ``reference``: frame that defines the shape and scale of all bones; root positions follow every
     frame. ``order``: order of the rotation channels. ``space``: transform to the file's space.
     """
-    skeleton = figure.require_skeleton()
-    parents, count = skeleton.parents, frames.n_frames
-    weights = shape_at(frames, reference)
-    scale = float(frames.figure_scales[reference])
-    rest = rest_matrices(figure, rest_translations_of(figure, weights)[0])
-    points = scale * space.factor * rest[:, :3, 3] @ space.rest.T
-    inner = parents >= 0
-    offsets = points - np.where(inner[:, None], points[parents], 0.0)
-    shape = (count, skeleton.n_joints, 3)
-    angles, positions, farthest = np.empty(shape), np.empty(shape), 0.0
-    is_plain = _is_plain(figure, frames, scale)
-    for start in range(0, count, _BLOCK):
+    conversion, count = Conversion(figure, frames, reference, order, space), frames.n_frames
+    shape = (count, figure.require_skeleton().n_joints, 3)
+    angles, positions = np.empty(shape), np.empty(shape)
+    for start in range(0, count, BLOCK):
         report(start, count, "frames", "converting")
-        block = slice(start, min(start + _BLOCK, count))
-        part = frames_between(frames, block)
-        rotations = _rotations(figure, part, space)
-        angles[block] = euler_angles(rotations, order)
-        if is_plain:
-            positions[block] = _still_positions(figure, part, weights, scale, space)
-        else:
-            positions[block] = _positions(figure, part, weights, scale, space, rotations)
-        roots = positions[block][:, ~inner]
-        farthest = max(farthest, float(np.abs(roots).max(initial=0.0)))
-    size = float(np.ptp(points, axis=0).max())
-    noise = _NOISE * (size + 1e-3 * farthest)
-    offsets, moves = _fixed(offsets, positions, inner, noise)
+        block = slice(start, min(start + BLOCK, count))
+        angles[block], positions[block] = conversion.channels(frames_between(frames, block))
+    offsets, moves = conversion.bones()
     return Body(offsets, angles, positions, moves)
+
+
+class Conversion:
+    """Conversion of a figure's frames to channels, some frames after others.
+
+    Parameters
+    ----------
+    figure, reference, order, space
+        As for ``body_of``.
+    frames : Frames
+        All frames; or some, if these have the scales and shapes of all.
+    """
+
+    def __init__(
+        self, figure: Figure, frames: Frames, reference: int, order: str, space: Space
+    ) -> None:
+        self._figure, self._order, self._space = figure, order, space
+        skeleton = figure.require_skeleton()
+        self._weights = shape_at(frames, reference)
+        self._scale = float(frames.figure_scales[reference])
+        rest = rest_matrices(figure, rest_translations_of(figure, self._weights)[0])
+        points = self._scale * space.factor * rest[:, :3, 3] @ space.rest.T
+        self._inner = skeleton.parents >= 0
+        self._offsets = points - np.where(self._inner[:, None], points[skeleton.parents], 0.0)
+        self._size = float(np.ptp(points, axis=0).max())
+        self._is_plain = _is_plain(figure, frames, self._scale)
+        self._farthest = 0.0
+        self._low, self._high = np.full_like(points, np.inf), np.full_like(points, -np.inf)
+
+    def channels(self, frames: Frames) -> tuple[Floats, Floats]:
+        """Return angles and positions of frames, see ``Body``: (F, J, 3), (F, J, 3)."""
+        figure, space = self._figure, self._space
+        rotations = _rotations(figure, frames, space)
+        angles = euler_angles(rotations, self._order)
+        if self._is_plain:
+            positions = _still_positions(figure, frames, self._weights, self._scale, space)
+        else:
+            positions = _positions(figure, frames, self._weights, self._scale, space, rotations)
+        if len(positions):
+            self._low = np.minimum(self._low, positions.min(axis=0))
+            self._high = np.maximum(self._high, positions.max(axis=0))
+        roots = positions[:, ~self._inner]
+        self._farthest = max(self._farthest, float(np.abs(roots).max(initial=0.0)))
+        return angles, positions
+
+    def bones(self) -> tuple[Floats, Bools]:
+        """Return offsets with constant translations, and which joints move: (J, 3), (J,).
+
+        Both follow from all frames whose channels have been computed.
+        """
+        noise = _NOISE * (self._size + 1e-3 * self._farthest)
+        is_moved = ((self._high - self._low) > noise).any(axis=1)
+        moves = self._inner & is_moved
+        is_off = (np.abs(self._low - self._offsets) > noise).any(axis=1)
+        shifted = self._inner & ~moves & is_off
+        return np.where(shifted[:, None], self._low, self._offsets), moves
 
 
 def _is_plain(figure: Figure, frames: Frames, scale: float) -> bool:
@@ -208,11 +246,3 @@ def _rotations(figure: Figure, frames: Frames, space: Space) -> Floats:
     if not (before == np.eye(3)).all():
         rotations = before @ rotations
     return rotations if (after == np.eye(3)).all() else rotations @ after
-
-
-def _fixed(offsets: Floats, positions: Floats, inner: Bools, noise: float) -> tuple[Floats, Bools]:
-    """Return offsets that include constant translations, and which joints still move."""
-    low, high = positions.min(axis=0), positions.max(axis=0)
-    moves = inner & ((high - low) > noise).any(axis=1)
-    shifted = inner & ~moves & (np.abs(low - offsets) > noise).any(axis=1)
-    return np.where(shifted[:, None], low, offsets), moves

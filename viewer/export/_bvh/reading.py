@@ -13,14 +13,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export._bvh.body import Space, rest_matrices
 from viewer.export._losses.skinned import Poses, Side, anchored, figure_side
-from viewer.formats import Source, bvh
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import (
@@ -30,6 +28,7 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
     world_frames,
 )
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skinning import Skinning
 
@@ -42,10 +41,8 @@ class BvhFile:
 
     Attributes
     ----------
-    path : Path
-        File name in messages of the reader.
-    text : bytes
-        Contents.
+    motion : SkeletonMotion
+        Contents, or some of the frames.
     names : sequence of J str
         Names of the figure's joints in the file.
     space : Space
@@ -53,11 +50,10 @@ class BvhFile:
     reference : int
         Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index of the animation's first frame in the file; negative if the file begins later.
+        Index of the animation's first frame in this motion; negative if that begins later.
     """
 
-    path: Path
-    text: bytes
+    motion: SkeletonMotion
     names: Sequence[str]
     space: Space
     reference: int
@@ -74,7 +70,7 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     ``how``: skinning; its correctives are applied if enabled.
     """
     space = file.space
-    motion = bvh.read(Source(file.path, file.text))
+    motion = file.motion
     skeleton, clip = motion.figure.require_skeleton(), motion.clip
     numbers = {name: joint for joint, name in enumerate(skeleton.names)}
     order = [numbers[name] for name in file.names]

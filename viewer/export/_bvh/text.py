@@ -17,11 +17,11 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
 _DEEPEST = 32  # maximum indentation in tabs
-_BLOCK = 256  # frames that are formatted at once
+_BLOCK = 256  # number of frames formatted together
 _SECONDS_DIGITS = 9  # minimum decimals of the frame time, for a relative error below 1e-8
 
 
-def bvh_text(
+def head_text(
     names: Sequence[str],
     parents: Ints,
     offsets: Floats,
@@ -29,10 +29,10 @@ def bvh_text(
     moves: Bools,
     rotation_order: str,
     rate: float,
-    rows: tuple[Floats, Floats],
+    n_frames: int,
     digits: int,
 ) -> bytes:
-    """Return the text of a whole file.
+    """Return the text of a file before its frames.
 
     ``names``: unique names of letters, digits and underscores.
     ``parents`` (J,): parent indices; the first joint is the only root.
@@ -41,30 +41,36 @@ def bvh_text(
     ``moves`` (J,) bool: which joints have position channels.
     ``rotation_order``: ``"zyx"`` for Zrotation Yrotation Xrotation.
     ``rate``: frames per second.
-    ``rows`` (F, J, 3), (F, J, 3): positions, and angles in radians in the rotation order.
+    ``n_frames``: number of frames.
     ``digits``: number of decimals.
     """
     order = depth_first(parents)
     lines = _hierarchy(names, parents, order, offsets, ends, moves, rotation_order, digits)
     seconds = 1.0 / rate
     decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
-    lines += ["MOTION", f"Frames: {len(rows[0])}", f"Frame Time: {seconds:.{decimals}f}"]
-    head = "\n".join(lines) + "\n"
-    return b"".join([head.encode("ascii"), *_frames(order, moves, rows, digits)])
+    lines += ["MOTION", f"Frames: {n_frames}", f"Frame Time: {seconds:.{decimals}f}"]
+    return ("\n".join(lines) + "\n").encode("ascii")
 
 
-def _frames(order: Ints, moves: Bools, rows: tuple[Floats, Floats], digits: int) -> Iterator[bytes]:
-    """Yield the lines of frames, joints in the order of the file."""
-    count = len(rows[0])
+def frame_texts(
+    parents: Ints, moves: Bools, positions: Floats, angles: Floats, digits: int
+) -> Iterator[bytes]:
+    """Yield the lines of frames, with joints in the order of the file.
+
+    ``parents`` (J,), ``moves`` (J,) bool, ``digits``: see ``head_text``.
+    ``positions`` (F, J, 3), ``angles`` (F, J, 3): angles are in radians in the rotation order.
+    """
+    order = depth_first(parents)
+    count = len(angles)
     for start in range(0, count, _BLOCK):
         report(start, count, "frames", "formatting")
-        positions, angles = (part[start : start + _BLOCK] for part in rows)
-        angles = np.degrees(angles)
+        rows = slice(start, start + _BLOCK)
+        degrees = np.degrees(angles[rows])
         columns = []
         for joint in order:
             if joint == order[0] or moves[joint]:
-                columns.append(positions[:, joint])
-            columns.append(angles[:, joint])
+                columns.append(positions[rows, joint])
+            columns.append(degrees[:, joint])
         yield from row_texts(np.concatenate(columns, axis=1), lambda part: fixed(part, digits))
 
 

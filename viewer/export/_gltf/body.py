@@ -47,9 +47,9 @@ class Built:
     tree: Tree
     meshes: list[Placed]
     counts: list[Phrase]
-    errors: dict[str, float]  # of quantised attributes
-    roots: list[int]  # nodes of the scene
-    materials: dict[int, int]  # written material of each material of the mesh
+    errors: dict[str, float]  # largest rounding errors of quantised attributes
+    roots: list[int]  # root nodes of the scene
+    materials: dict[int, int]  # indices of written materials by material of the mesh
 
 
 def body_of(figure: Figure, shape: Shape, skinning: Skinning) -> Body:

@@ -117,7 +117,7 @@ def sides(
 def _split(side: Side, sources: Ints) -> Side:
     """Return a posed figure with its vertices duplicated as in the file."""
     whole = side.exact
-    assert side.body is not None  # the caller checked for a mesh
+    assert side.body is not None  # the caller has checked that there is a mesh
     body = body_rows(side.body, sources)
     return replace(
         side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
@@ -189,7 +189,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
     """Return a note that lists the parts of a figure that the file does not contain.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())

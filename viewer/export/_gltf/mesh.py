@@ -21,8 +21,8 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
-_LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
-_NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow or overflow
+_LONG = 65535  # maximum number of vertices with 16-bit indices, the last of which is reserved
+_NOT_UNIT = 1e-3  # tolerance for unit length; squares of normals may underflow or overflow
 
 
 def add_mesh(

@@ -12,7 +12,8 @@ from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # maximum number: each takes 12 bytes per vertex, and programs support few
+# Maximum number of targets: each takes 12 bytes per vertex, and programs support few.
+_MOST_TARGETS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -21,13 +21,13 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-_BLOCK = 128  # poses at a time, so that their matrices fit into the processor's cache
+_BLOCK = 128  # poses per block, whose matrices fit into the processor's cache
 _CHUNK = 128  # poses per single-precision estimate
 _LIKELY = 4  # poses per chunk whose farthest vertex is measured first
 _SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning
-_MOST = 512  # poses compared one by one with nonlinear skinning
-_ROUNDING = 2e-6  # fraction of the size: single precision through a chain of joints
-_EPSILON = 2.0**-22  # relative to a coordinate: two steps of single precision
+_MOST = 512  # maximum number of poses compared one by one, with nonlinear skinning
+_ROUNDING = 2e-6  # fraction of the size: rounding in single precision along a chain of joints
+_EPSILON = 2.0**-22  # two steps of single precision, relative to a coordinate
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
 _FAR = 5.0  # maximum factor on the tolerance far from the origin
 _NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
@@ -196,7 +196,7 @@ def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least
 def _vertices(side: Side, row: int) -> Floats:
     if side.exact is not None:
         return side.exact(row)
-    assert side.body is not None  # only sides with meshes are compared this way
+    assert side.body is not None  # only bodies with meshes are compared this way
     poses = side.poses(np.array([row]))
     return vertices(side.body, poses)[0]
 

@@ -66,7 +66,7 @@ def between_losses(
 
     ``path``: the written file.
     ``animation``: contents of the file.
-    ``found``: function from seconds (T,) to the poses that the file gives.
+    ``found``: function from seconds (T,) to the poses in the file.
     ``how``: skinning of the mesh.
     ``also`` (T,): additional times at which captures are compared, seconds.
     """

@@ -161,7 +161,7 @@ def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
     if shapes is not None and len(columns):
         directions = shapes.direction_values()[columns]
     correctives = None
-    # Correctives with a feature of their own are not measured, as neither side has them.
+    # Correctives with a special feature are not measured, because neither body has them.
     given = figure.correctives if how.correctives and figure.is_attached else None
     if given is not None and given.feature is None:
         correctives = given.values()

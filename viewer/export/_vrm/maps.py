@@ -24,7 +24,7 @@ class Maps:
     Attributes
     ----------
     lost : Counter
-        Number of lost references by what they are.
+        Number of lost references, by kind.
     """
 
     def __init__(self, record: VrmRecord, document: Document, built: Built) -> None:

@@ -25,7 +25,7 @@ __all__ = ["in_t_pose", "standing", "unit_rotation", "vrm_axes"]
 
 _PAIRS = ("UpperLeg", "UpperArm")
 _SMALL = 1e-6  # radians
-_NEAR = 0.02  # fraction of the height; a figure this close to the ground stays where it is
+_NEAR = 0.02  # fraction of the height within which a figure counts as standing on the ground
 _TARGETS = {"Arm": (1.0, 0.0, 0.0), "Leg": (0.0, -1.0, 0.0)}
 _BELOW = {"UpperArm": "LowerArm", "LowerArm": "Hand", "UpperLeg": "LowerLeg", "LowerLeg": "Foot"}
 
@@ -102,10 +102,10 @@ def _axes(figure: Figure, places: Floats, bones: Mapping[str, int]) -> Floats:
 
 
 def _lift(figure: Figure, joints: Floats, up: Floats) -> float:
-    """Return the height by which a figure is raised to stand on the ground; 0 if it nearly does.
+    """Return the height by which a figure is raised onto the ground; 0 if it is nearly there.
 
     ``joints`` (J, 3): their positions.
-    ``up`` (3,): multiplied by positions, gives heights.
+    ``up`` (3,): vector whose dot product with a position is its height.
     """
     points = joints if figure.mesh is None else np.concatenate([joints, figure.mesh.positions])
     heights = points @ up

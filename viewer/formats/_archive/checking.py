@@ -70,7 +70,7 @@ def finite(
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
     numbers = values if is_ready else values.astype(np.float64)
-    # Two reductions need no memory, and NaN passes through both.
+    # Two reductions need no temporary array, and both propagate NaN.
     low, high = numbers.min(initial=0.0), numbers.max(initial=0.0)
     if low >= -LARGEST and high <= LARGEST:
         return numbers

@@ -1,4 +1,4 @@
-"""Bytes of a large file, read in pages where they are needed and not before."""
+"""Bytes of a large file, read in pages when they are first needed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class FileWindow:
     Parameters
     ----------
     storage : StoredFile
-        The file; an error says so if it changes between two reads.
+        The file; a change between two reads is reported as an error.
     """
 
     def __init__(self, storage: StoredFile) -> None:

@@ -16,7 +16,7 @@ from viewer.phrases import printable
 __all__ = ["LONGEST_DIRECTORY", "StoredFile"]
 
 LONGEST_DIRECTORY = 2 << 20
-"""Bytes read at once, and so of a zip directory: about 30,000 members, as each takes memory."""
+"""Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
 
 _CHUNK = 1 << 20
 

@@ -16,7 +16,7 @@ from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
-__all__ = ["frame_rate", "guess_unit", "guess_up"]
+__all__ = ["examined_frames", "frame_rate", "guess_unit", "guess_up"]
 
 Facts = tuple[tuple[str, str], ...]
 
@@ -27,7 +27,7 @@ _RATES = (
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
 _LONG = 2.0  # ratio of the z extent to the y extent above which z is up
-_UPRIGHT = 0.8  # smallest cosine of the angle between a standing body and an axis
+_UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
 _LOOKS = 16  # number of frames to examine
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
 _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
@@ -77,7 +77,7 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     size = float(np.ptp(points, axis=0).max())
     metres = size * METRES["in"]
     is_near = _INCHES[0] < size < _INCHES[1]
-    inches = f"; inches would be {metres:.3g} m" if is_near else ""
+    inches = f"; if in inches, {metres:.3g} m" if is_near else ""
     values = {"size": size, "metres": metres if is_near else 0.0}
     for unit, (low, high) in SIZES.items():
         if low <= size <= high:
@@ -130,14 +130,17 @@ def guess_up(
         notes.append(Phrase("up-of-head", up="z"))
     elif rest not in ("+y", ""):
         notes.append(Phrase("up-against-rest", up="y", axis=rest))
-    every = (
-        np.linspace(0, clip.n_rows - 1, min(_LOOKS, clip.n_rows)).round() / clip.timing.frame_rate
-    )
+    every = examined_frames(clip.timing.n_frames) / clip.timing.frame_rate
     posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
     stands = _axis((posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)).mean(axis=0))
     if stands in ("+y", "+z") and stands[1] != up:
         notes.append(Phrase("up-against-frames", up=up, axis=stands))
     return up, (("up", f"{up}, from the rest skeleton"),), tuple(notes)
+
+
+def examined_frames(count: int) -> Floats:
+    """Return the frames that ``guess_up`` examines, ascending whole numbers, of ``count``."""
+    return np.linspace(0, count - 1, min(_LOOKS, count)).round()
 
 
 def _axis(direction: Floats) -> str:

@@ -16,7 +16,7 @@ from viewer.formats._text.numbers import parse_numbers, to_number
 from viewer.formats._text.words import Words, number_key, read_words, refuse_words
 from viewer.rig.arrays import Floats
 
-__all__ = ["Motion", "read_motion"]
+__all__ = ["Motion", "read_head", "read_motion"]
 
 Places = NDArray[np.int64]
 
@@ -66,6 +66,17 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     if start < 0:
         source.warn("F007.bvh-no-motion", source.end)
         return _rest(n_channels, None)
+    declared, time, start = read_head(source, start)
+    if declared is None:
+        source.warn("F007.bvh-no-count", start)
+    if n_channels == 0:
+        source.warn("F007.bvh-no-channels", start)
+        return _rest(0, time)
+    return Motion(_rows(source, start, n_channels, declared), time)
+
+
+def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int]:
+    """Return the declared number of frames and frame time, if any, and the offset after them."""
     declared: int | None = None
     time: bytes | None = None
     is_header = True
@@ -75,12 +86,7 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
             declared, start, is_header = _count(source, match), match.end(), True
         if time is None and (match := _TIME.match(source.data, start)):
             time, start, is_header = _seconds(source, match), match.end(), True
-    if declared is None:
-        source.warn("F007.bvh-no-count", start)
-    if n_channels == 0:
-        source.warn("F007.bvh-no-channels", start)
-        return _rest(0, time)
-    return Motion(_rows(source, start, n_channels, declared), time)
+    return declared, time, start
 
 
 def _rest(n_channels: int, time: bytes | None) -> Motion:

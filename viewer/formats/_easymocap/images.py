@@ -19,7 +19,7 @@ __all__ = ["ImageFolders", "find_images"]
 _FOLDER = "images"
 _SUFFIXES = (".jpg", ".jpeg", ".png", ".bmp", ".tif", ".tiff", ".webp")
 _PLAIN, _ENDING = re.compile(r"[0-9]+"), re.compile(r"([0-9]{1,9})$")
-_MOST_NAMED = 5  # missing frames in a message
+_MOST_NAMED = 5  # maximum number of missing frames listed in a message
 
 
 class ImageFolders:

@@ -104,7 +104,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
         raise _fault("F002.json-twice", path, line, found=str(problem)) from None
-    except ValueError:  # the only other error that decoding can raise
+    except ValueError:  # decoding can raise no other error
         line = _line(text, long_number_place(text))
         raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:

@@ -26,7 +26,7 @@ __all__ = ["KEY", "PointRows", "point_layout"]
 
 KEY = "keypoints3d"
 _BESIDE = ("handl3d", "handr3d", "face3d")
-_MOST = 1 << 16  # keypoints of one person
+_MOST = 1 << 16  # maximum number of keypoints of one person
 _FOUR, _THREE = {4}, {3}
 
 Parts = tuple[tuple[str, int], ...]

@@ -140,7 +140,7 @@ def _channels(
     """Bake one animation stack in another child process."""
     arrays, keys = run_worker(source, str(stack))
     channels: list[NodeChannel] = []
-    weights: dict[int, dict[int, Floats]] = {}  # by mesh, then by row of its shapes
+    weights: dict[int, dict[int, Floats]] = {}  # weights by mesh, then by row of its shapes
     for each in keys["keys"]:
         table = arrays[each["keys"]]
         if each["path"] == "weight":

@@ -27,7 +27,7 @@ class Placed:
     prefix : str
         Prefix of the names of its arrays.
     told : dict
-        Its JSON.
+        Parsed JSON of the mesh.
     materials : list of int
         Material of each slot, to which its faces refer.
     placement : (4, 4)
@@ -50,7 +50,7 @@ def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     if not len(listed):
         return NodeMesh(placed.told["name"], ())
     picks, owners = triangulate(get("vertices"), corners[listed].astype(np.int64), counts)
-    wanted = listed[picks]  # the file's corner at each corner of each triangle
+    wanted = listed[picks]  # corner in the file for each corner of each triangle
     slots = _slots(arrays, placed)[shown[owners]]
     linear = placed.placement[:3, :3]
     if np.linalg.det(linear) < 0.0:

@@ -13,7 +13,7 @@ __all__ = ["VideoImages", "video_rate"]
 
 
 class VideoImages:
-    """Frames of a video behind one camera; the last one shown is cached.
+    """Frames of a video as the images of one camera; the last one shown is cached.
 
     Parameters
     ----------

@@ -196,7 +196,7 @@ class Accessors:
         """Return the components of an accessor as stored, not normalised: (N, C).
 
         None if the data is elsewhere: compressed with Draco, for instance. As the caller does not
-        keep them, they do not count as decoded data, although they must fit within the limit.
+        store them, they are not counted as decoded data, although they must fit within the limit.
 
         Raises
         ------

@@ -79,7 +79,8 @@ class Attributes:
     def stored(self, name: str, *kinds: str) -> NDArray[Any] | None:
         """Return the finite numbers of all vertices as in the file, without copying them.
 
-        None if the attribute is missing, or its data must be decoded or corrected; see ``floats``.
+        None if the attribute is missing, or if its data must be decoded or corrected; see
+        ``floats``.
         """
         index = self.accessor(name)
         if index < 0 or name in self.decoded:

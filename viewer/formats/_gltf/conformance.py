@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["check_conformance"]
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
-_UNIT = 1e-3  # deviation of a quaternion's length from 1
+_UNIT = 1e-3  # tolerance of the deviation of a quaternion's length from 1
 # Normalised integers that stand for 1, by component type.
 _ONES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 
@@ -27,7 +27,7 @@ def check_conformance(
     Parameters
     ----------
     document : Document
-        The file, whose elements were read; invalid ones were reported then and are not repeated.
+        The file, whose elements have been read; errors that were reported then are not repeated.
     tree, meshes, skins : NodeTree, tuple of NodeMesh, tuple of NodeSkin
         Its contents.
     """

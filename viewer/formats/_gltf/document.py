@@ -16,8 +16,8 @@ __all__ = ["Document", "open_document"]
 
 Content = TypeVar("Content")
 
-_FREE_BYTES = 256 << 20  # decoded bytes that any file is allowed
-_MOST_GROWTH = 64  # decoded bytes per byte of file; 20 is usual for compressed data
+_FREE_BYTES = 256 << 20  # number of decoded bytes that is allowed for every file
+_MOST_GROWTH = 64  # maximum decoded bytes per byte of the file; 20 is usual for compressed data
 
 
 class Document:
@@ -57,7 +57,7 @@ class Document:
         return self._tables[name]
 
     def spend(self, n_bytes: int, pointer: str) -> None:
-        """Count bytes that are about to be decoded; negative numbers are no longer in memory.
+        """Count bytes that are about to be decoded; negative numbers are bytes that were released.
 
         Raises
         ------

@@ -39,7 +39,7 @@ class DecodedPrimitive:
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
     """Return a compressed primitive; None if the uncompressed form is to be read.
 
-    Where a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
+    If a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Parser of a glTF file's JSON, which may be hostile or deviate from the standard."""
+"""Parser for the JSON of a glTF file, which may be hostile or deviate from the standard."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ __all__ = ["parsed"]
 
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_MOST_BYTES = 512 << 20  # parsing takes three times as much memory
-_THOROUGH = 1 << 20  # shorter texts are always searched for repeated keys
+_MOST_BYTES = 512 << 20  # maximum size of the text; parsing takes three times as much memory
+_THOROUGH = 1 << 20  # bytes; shorter texts are always searched for repeated keys
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 

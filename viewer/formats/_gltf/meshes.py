@@ -39,7 +39,7 @@ class _Reading:
     n_undrawn: int = 0
     """Number of primitives of points and lines."""
     undrawn: str = ""
-    """JSON pointer to the first of them."""
+    """JSON pointer to the first of these primitives."""
 
 
 def read_meshes(document: Document) -> tuple[NodeMesh, ...]:

@@ -4,7 +4,7 @@ KHR_materials_pbrSpecularGlossiness describes a surface by its diffuse and its s
 metallic surface with the reflectance D = 0.04 of dielectrics has, for a base colour B and a
 metallic value m, the diffuse colour (1 - m) B and the specular colour D + m (B - D). With the
 brightness d of the diffuse colour and s of the specular colour, where the diffuse colour is
-scaled by 1 - max(specular) as the extension does, m is the root of
+scaled by 1 - max(specular) as the extension does, m is the solution of
 
     D m² + (d (1 - max) / (1 - D) + s - 2 D) m + D - s = 0
 

@@ -75,7 +75,7 @@ def _encoded(document: Document, index: int) -> EncodedImage | None:
     try:
         image = document.buffers.image(index)
     except FormatError as problem:
-        # An error without a JSON pointer is about the image's own file, which it names.
+        # An error without a JSON pointer concerns the file of the image, which the message names.
         has_pointer = bool(problem.diagnostic.pointer)
         said = problem.diagnostic.message if has_pointer else _named(document, problem)
         document.source.warn("F005.gltf-image", f"/images/{index}", problem=said)

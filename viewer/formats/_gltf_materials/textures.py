@@ -23,7 +23,7 @@ _NEAREST, _LINEAR = 9728, 9729
 _MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
 _READABLE = "EXT_texture_webp"
 _UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
-_LARGEST = 1e6  # with larger offsets and scales, single precision cannot resolve texels
+_LARGEST = 1e6  # maximum offset and scale; with larger ones, single precision cannot resolve texels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Toon materials of VRM characters: the colour of their lit side, and that of the side in shade.
+"""Toon materials of VRM characters: the colours of the lit side and of the side in shade.
 
 ::
 
@@ -89,7 +89,7 @@ def _toon(document: Document, element: Element) -> Toon:
 
 
 def _old_toon(document: Document, told: Any, element: Element) -> Toon:
-    """Return the toon shading of version 0.x, whose thresholds are those of the other version."""
+    """Return the toon shading of version 0.x, whose thresholds are converted to version 1.0."""
     color = rows_of(_member(_member(told, "vectorProperties"), "_ShadeColor"), _OLD_COLOR)
     numbers = _member(told, "floatProperties")
     toony = value_of(_member(numbers, "_ShadeToony"), _TOONY)

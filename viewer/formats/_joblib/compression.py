@@ -16,7 +16,7 @@ from viewer.phrases import printable
 
 __all__ = ["is_compressed", "unpacked"]
 
-_SHORTEST = 12  # bytes; no compressed pickle is shorter
+_SHORTEST = 12  # bytes; minimum size of a compressed pickle
 _PIECE = 1 << 20  # bytes unpacked at a time
 _PICKLE = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
 # The header of zlib may be letters, but a text has no control characters after them.
@@ -43,7 +43,7 @@ class _Unpacker(Protocol):
 
 
 class _Zlib:
-    """zlib's decompressor with the interface of the others."""
+    """The decompressor of zlib with the interface of those of bz2 and lzma."""
 
     def __init__(self, window: int) -> None:
         self._inner = zlib.decompressobj(window)
@@ -94,7 +94,7 @@ def unpacked(source: Source) -> bytes:
     Raises
     ------
     FormatError
-        If the data are damaged, no pickle, packed by an unsupported method, or too large.
+        If the data are damaged, not a pickle, packed by an unsupported method, or too large.
     """
     head = source.peek(64)
     for name, kind in _UNSUPPORTED.items():

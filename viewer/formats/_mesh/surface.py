@@ -15,7 +15,7 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
 _SIZES = {3: "triangle", 4: "quad"}
 
 
@@ -29,7 +29,7 @@ def filled_normals(
     source : Source
         The file, which records warnings about zero-length normals.
     normals : (V, 3) or None
-        Normals of the file; NaN where there is none.
+        Normals of the file; NaN if there is none.
     positions, triangles : (V, 3), (T, 3)
         The mesh.
     """

@@ -9,7 +9,7 @@
     tail    first element, version 1: a mode for every 4 bytes of an element
 
 The position of a group depends on the contents of the groups before it. Group sizes are therefore
-computed for all positions at once, so that finding each group takes one look-up; then all groups
+computed for all positions in advance, so that finding each group takes one look-up; then all groups
 with the same number of bits are decoded together. Specification: Khronos Group,
 KHR_meshopt_compression, appendix A.
 """
@@ -42,9 +42,9 @@ class _Groups:
     """Groups with the same number of bits per delta, above 0."""
 
     starts: list[int] = field(default_factory=list)
-    """Their positions in the stream."""
+    """Positions of the groups in the stream."""
     places: list[int] = field(default_factory=list)
-    """Their positions in the result, in groups."""
+    """Positions of the groups in the result, in units of groups."""
 
 
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:
@@ -112,7 +112,7 @@ def _scan(
     found: dict[int, _Groups],
     literals: list[tuple[int, int, int]],
 ) -> int:
-    """Find all groups and return where they end; raises IndexError past the end of the stream."""
+    """Find all groups and return their end; raise IndexError past the end of the stream."""
     count, stride, version, block = layout
     sizes = _sizes(data)
     stream = data.tobytes()
@@ -145,7 +145,7 @@ def _find_groups(
     n_groups: int,
     table: list[tuple[bytes, _Groups | None]],
 ) -> int:
-    """Find the groups of one byte position in a block's elements, and return where they end."""
+    """Find the groups of one byte position in a block's elements, and return their end."""
     n_headers = -(-n_groups // 4)
     headers = stream[place : place + n_headers]
     place += n_headers

@@ -18,7 +18,7 @@ _TABLE = 16  # bytes of the table at the end of triangles
 _TAIL = 4  # bytes at the end of indices
 _WRAP = 0xFFFFFFFF
 _MOST_BYTES = 5  # maximum length of a number with 7 bits per byte
-_KEPT = 1 << 16  # entries of a queue before its oldest ones are dropped; 16 are in use
+_KEPT = 1 << 16  # maximum length of a queue; then its oldest entries are dropped, as 16 are in use
 
 
 class _Numbers:
@@ -164,7 +164,7 @@ def decoded_indices(data: Bytes, count: int, stride: int) -> Bytes | None:
 
 
 def _varints(data: Bytes, count: int) -> NDArray[np.int64] | None:
-    """Return numbers stored as 7 bits per byte; all bytes but the last have the eighth bit set."""
+    """Return numbers stored as 7 bits per byte; the eighth bit is set in all but the last byte."""
     ends = np.nonzero(data < 128)[0]
     if len(ends) != count or (count and ends[-1] != len(data) - 1) or (not count and len(data)):
         return None

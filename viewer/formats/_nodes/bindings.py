@@ -57,12 +57,12 @@ class Bindings:
 
 
 def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
-    """Bind the skins of a figure; the first determines where the binding space is in the scene.
+    """Bind the skins of a figure; the first one determines the binding space.
 
     Parameters
     ----------
     joints : Joints
-        Auxiliary joints are appended where skins disagree.
+        Auxiliary joints are appended if skins disagree.
     skins : dict of NodeSkin
         By index in the file, in order of precedence.
 
@@ -100,7 +100,7 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
     ]
     if not pairs:
         return _baked_at_rest(bindings, inverse_bind, slots)
-    # A few candidates are enough: skins differ by one matrix, or in a few joints only.
+    # A few candidates are enough: skins differ by one matrix, or only in a few joints.
     some = pairs[:: max(1, len(pairs) // _MOST_CANDIDATES)]
     candidates = [quotient for pair in some if (quotient := _quotient(*pair)) is not None]
     candidates = [np.eye(4), *(each for each in candidates if _is_regular(each))]
@@ -116,8 +116,8 @@ def _rest_space(rests: Floats) -> Floats:
     ----------
     rests : (M, 4, 4)
         Skinning matrices in the rest pose, of parents before those of their children. They are
-        all the same if the rest pose is the bind pose; otherwise the first that another one is
-        equal to is returned, as helpers above the hips may have any matrix.
+        all the same if the rest pose is the bind pose; otherwise the first that is equal to another
+        one is returned, as helpers above the hips may have any matrix.
     """
     regular = rests[_is_regular(rests)]
     if not len(regular):
@@ -174,7 +174,7 @@ def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
 def _rigid_matrix(bindings: Bindings, joint: int, above: int) -> Floats | None:
     """Return A of a mesh on a joint, and bind the joint; None if a matrix is singular.
 
-    In the rest pose the mesh is where its nearest bound ancestor puts it.
+    In the rest pose, the mesh is placed by its nearest bound ancestor.
     """
     known = bindings.matrices.get(joint)
     if known is not None:

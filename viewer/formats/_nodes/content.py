@@ -48,7 +48,7 @@ class NodeTree:
         Local transform T R S; unit quaternions (x, y, z, w).
     matrices : dict of (4, 4)
         Local matrices of nodes that shear and therefore cannot be expressed as T R S. Their rows in
-        the three arrays above hold the identity.
+        the three arrays above contain the identity.
     meshes, skins, cameras : (N,) int32
         Indices of each node's mesh, skin and camera, -1 for none.
     shape_weights : dict of (S,)

@@ -8,7 +8,7 @@ from viewer.formats._nodes.surfaces import Piece
 __all__ = ["facts_of"]
 
 _ASSET = ("version", "generator", "copyright")
-_LONGEST = 200  # characters
+_LONGEST = 200  # maximum number of characters of a fact
 
 
 def facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]:

@@ -242,7 +242,7 @@ class _Grouping:
         return nodes[first:]
 
     def _name(self, figures: list[Members]) -> None:
-        """Name each of several figures after its topmost node that no other figure has."""
+        """Name each of several figures after its topmost node that is not in another figure."""
         if len(figures) < 2:
             return
         counts: dict[int, int] = {}

@@ -205,7 +205,7 @@ def skeleton_of(
 
 
 def _springs_of(springs: Springs, own: Mapping[int, int]) -> Springs | None:
-    """Return the spring joints of one figure, whose joints are not nodes; None without any."""
+    """Return the spring joints of one figure, with joints instead of nodes; None if it has none."""
     rows = [row for row, node in enumerate(springs.joints.tolist()) if node in own]
     if not rows:
         return None

@@ -174,7 +174,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name including its part's, and default weight of a morph target."""
+    """Name, name with that of its part, and default weight of a morph target."""
 
     name: str
     full_name: str

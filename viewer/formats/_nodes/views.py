@@ -15,8 +15,8 @@ from viewer.rig.geometry.rotation import nearest_rotations
 
 __all__ = ["views_of"]
 
-_HEIGHT = 1080  # pixels
-_ASPECT = 16.0 / 9.0  # of cameras that use the window's aspect ratio
+_HEIGHT = 1080  # height of a view, pixels
+_ASPECT = 16.0 / 9.0  # aspect ratio of cameras that use the window's
 # Converts x right, y up, z backwards to x right, y down, z forward.
 _TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 

@@ -97,7 +97,7 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
 
 
 def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
-    """Return the three numbers of every corner as written, 0 where there is none: (C, 3).
+    """Return the three numbers of every corner as written, 0 for missing numbers: (C, 3).
 
     None if a corner is invalid.
     """
@@ -107,7 +107,7 @@ def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
-        # The second most common kind of file has only vertices.
+        # In the second most common kind of file, corners have only a vertex.
         return _spread(values, np.ones(len(begins), np.int64), None)
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     if not fits.all():
@@ -155,7 +155,7 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
 
 def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Corners | None:
     """Arrange the numbers of corners in rows of three; with a gap, the second becomes the third."""
-    # Larger numbers are out of range; they are read again by the function for invalid faces.
+    # Larger numbers are out of range; the function for invalid faces reads them again.
     whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
     if (whole != values).any():
         return None

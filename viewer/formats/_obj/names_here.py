@@ -51,5 +51,5 @@ def _in_any_case(folder: Path, name: str) -> str | None:
 def _is_file(path: Path) -> bool:
     try:
         return path.is_file()
-    except OSError:  # a name that is too long for any file
+    except OSError:  # the name is too long for a file
         return False

@@ -286,7 +286,7 @@ class _Binary:
         if element.count == 0:
             return False
         counts = self._list_sizes(element, self.position)[1]
-        # Longer lists than the file are refused with the element.
+        # Lists longer than the file are refused with the element.
         if sum(counts) > len(self.data) or any(count < 0 for count in counts):
             return False
         found = even_binary(element, self.data, self.position, self.order, counts)
@@ -341,7 +341,7 @@ class _Binary:
         size = int(kind[1])
         if len(cursor) == 0:
             return np.zeros(0, dtype=kind), cursor
-        # There is a window of the size of a number at every byte, as rows need not be aligned.
+        # A window with the size of a number starts at every byte, as rows need not be aligned.
         windows = np.ndarray(
             len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
         )

@@ -26,7 +26,7 @@ from viewer.rig.arrays import Deferred, Floats
 
 __all__ = ["NamedValues", "described", "parse_json"]
 
-_DEEPEST = 500  # nesting level at which a text that is nested too deeply for Python is reported
+_DEEPEST = 500  # nesting level that is reported for a text nested too deeply for Python
 _MOST_DIGITS = 18  # integers with more digits may not fit into 64 bits and are read as floats
 
 
@@ -87,7 +87,7 @@ class NamedValues:
         value = self.values.get(key)
         try:
             array = np.asarray(value)
-        except ValueError:  # ragged lists, or more nested than an array can be
+        except ValueError:  # ragged lists, or lists nested more deeply than an array can be
             array = np.zeros(0, dtype=object)
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array

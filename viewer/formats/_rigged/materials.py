@@ -31,7 +31,7 @@ _RECORDS = "material_records"
 
 
 def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that describe a mesh's materials; none if it has no material."""
+    """Return the arrays that describe a mesh's materials; an empty dict if it has no material."""
     if not mesh.materials:
         return {}
     arrays: dict[str, NDArray[Any]] = {

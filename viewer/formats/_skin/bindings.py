@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
 
-_NEUTRAL: Floats = np.eye(4, 3).ravel()  # four rows of three, as in the file
+_NEUTRAL: Floats = np.eye(4, 3).ravel()  # identity as four rows of three, as in the file
 
 Word = re.Match[bytes]
 

@@ -25,8 +25,8 @@ __all__ = [
 ]
 
 WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums farther from 1 cause a warning
-_SINGULAR = 1e-12  # determinant relative to the product of the column lengths
-_NEARLY_SINGULAR = 1e6  # condition number
+_SINGULAR = 1e-12  # minimum determinant relative to the product of the column lengths
+_NEARLY_SINGULAR = 1e6  # maximum condition number
 _FAR = 1e6  # a vertex this many times the median distance away is stray
 
 

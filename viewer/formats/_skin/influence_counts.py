@@ -12,7 +12,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["find_heads"]
 
 _LEAP = 16  # vertices that each step of the Python loop skips
-_SMALL = 1 << 29  # up to this many numbers, three times their count fits an int32
+_SMALL = 1 << 29  # up to this count of numbers, three times the count fits an int32
 
 
 def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:

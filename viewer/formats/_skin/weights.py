@@ -1,8 +1,7 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
 It has a count for each vertex, followed by that many pairs of joint and weight. Valid numbers are
-parsed at once; otherwise every word is examined, and an unreadable vertex gets no
-influence.
+parsed together; otherwise every word is examined, and an unreadable vertex gets no influence.
 """
 
 from __future__ import annotations

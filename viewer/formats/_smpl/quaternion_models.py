@@ -12,7 +12,7 @@ from viewer.rig.bodies.quaternion_feature import QuaternionFeature
 
 __all__ = ["coordinate_regressor", "quaternion_correctives"]
 
-_STAR_SHAPE = 1  # the coefficient that drives correctives of STAR: the second one
+_STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STAR
 
 
 def coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> JointRegressor:

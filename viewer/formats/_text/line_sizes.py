@@ -11,7 +11,7 @@ from viewer.formats._text.numbers import word_begins
 
 __all__ = ["line_sizes"]
 
-_PIECE = 1 << 18  # bytes; temporary arrays stay in the processor's cache
+_PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
 _LINE_END = re.compile(rb"[\r\n]")
 
 

@@ -23,7 +23,7 @@ Number = TypeVar("Number", bound=np.generic)
 _U = np.uint64
 _EIGHT = _U(10**8)
 _PAD = 32  # bytes before the text for the leading zeros of the first number
-_AT_ONCE = 1 << 13  # numbers; their temporary arrays stay in the processor's cache
+_AT_ONCE = 1 << 13  # numbers per batch, whose temporary arrays stay in the processor's cache
 _TENS = [_U(10**k) for k in range(1, 20)]
 
 

@@ -55,7 +55,8 @@ def times_power(
 @cache
 def _tables() -> tuple[Floats, Floats, Floats, Floats]:
     """Return the powers of ten: nearest float, its error, and its upper and lower half."""
-    from fractions import Fraction  # most files have no number that needs these tables
+    # Imported late, as most files have no number that needs these tables.
+    from fractions import Fraction
 
     exact = [Fraction(10) ** exponent for exponent in range(-FARTHEST, FARTHEST + 1)]
     power = np.array([float(value) for value in exact])

@@ -33,7 +33,7 @@ Indices = NDArray[np.intp]
 
 _U = np.uint64
 ZEROS = _U(0x3030303030303030)
-"""Eight times the character 0."""
+"""The character 0, eight times."""
 
 _LOW7 = _U(0x7F7F7F7F7F7F7F7F)
 _HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
@@ -90,7 +90,7 @@ def letters_after(bits: Words) -> Indices:
 
 
 def close_gap(words: Words, bits: Words) -> Words:
-    """Remove a marked character: those before it move by one position towards it.
+    """Remove a marked character: the characters before it move by one position towards it.
 
     The first character becomes a null byte.
     """

@@ -34,9 +34,10 @@ __all__ = [
 
 Frames = np.ndarray[Any, np.dtype[np.int64]]
 
-_MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
+# Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
+_MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")
-_SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
+_SMALLEST = 1e-3  # minimum determinant; that of a rotation is 1, of a missing one 0
 
 
 class RowBudget:
@@ -51,7 +52,7 @@ class RowBudget:
         Raises
         ------
         FormatError
-            If there are more than any plausible recording has.
+            If there are more than in any plausible recording.
         """
         self._left -= max(count, 1)
         if self._left < 0:
@@ -64,7 +65,7 @@ def has(archive: Archive | None, *keys: str) -> bool:
 
 
 def person_number(key: str) -> int | None:
-    """Return the number of a person from a key, or None if the key is no number.
+    """Return the number of a person from a key, or None if the key is not a number.
 
     >>> person_number("-1"), person_number("camera")
     (-1, None)
@@ -73,7 +74,7 @@ def person_number(key: str) -> int | None:
 
 
 def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
-    """Return the shape of an array of numbers; empty if the value is none or does not exist."""
+    """Return the shape of an array of numbers; empty if there is no such array."""
     value = archive.get(key) if archive.has(key) else None
     is_array = isinstance(value, Deferred) and value.dtype.kind in "biuf"
     return value.shape if is_array and isinstance(value, Deferred) else ()
@@ -184,7 +185,7 @@ def sole(archive: Archive, key: str) -> float:
 
 
 def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
-    """Return K for focal lengths (N,), (N, 2) or one, and image centres (N, 2), pixels."""
+    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
     lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
     centers = np.atleast_2d(center)
     count = max(len(lengths), len(centers))

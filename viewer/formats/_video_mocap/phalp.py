@@ -36,10 +36,11 @@ from viewer.rig.smpl_family import FAMILY
 
 __all__ = ["read", "recognises"]
 
-_FOCAL, _IMAGE = 5000.0, 256.0  # pixels of the network, whose image is scaled to the longer side
+# Focal length and image size of the network, pixels; the image is scaled to the longer side.
+_FOCAL, _IMAGE = 5000.0, 256.0
 _SIZES = {"global_orient": 9, "body_pose": 207, "betas": 10}
 _N_JOINTS = 24
-_LARGEST = 1 << 20  # pixels along a side
+_LARGEST = 1 << 20  # maximum size of an image, pixels
 
 
 def recognises(archive: Archive) -> bool:

@@ -1,4 +1,4 @@
-"""Rotations of a body in any of the usual forms, told apart by the shapes of their arrays.
+"""Rotations of a body in any of the usual forms, distinguished by the shapes of their arrays.
 
 ::
 

@@ -51,7 +51,7 @@ def read(source: Source, archive: Archive) -> Results:
         if has(person, *names, "frame_ids")
     ]
     budget = RowBudget(archive)
-    for _, _, person, names in found:  # before any array is read
+    for _, _, person, names in found:  # checked before any array is read
         budget.spend(sum(shape_of(person, names[0])[:1]))
     people: dict[str, dict[int, Track]] = {}
     for number, space, person, names in found:

@@ -13,7 +13,7 @@ __all__ = ["Accumulation"]
 
 
 class Accumulation:
-    """Adds images and draws their average.
+    """Accumulator that adds images and draws their average.
 
     Colours are premultiplied by alpha, so averaging pixels averages their coverage.
 
@@ -59,7 +59,7 @@ class Accumulation:
         self.count += 1
 
     def show(self, target: Target) -> None:
-        """Replace the image of a target by the average; its depths are kept."""
+        """Replace the image of a target by the average; its depths are preserved."""
         target.framebuffer.use()
         self.context.viewport = (0, 0, *self.size)
         self.context.enable_only(moderngl.NOTHING)

@@ -21,7 +21,7 @@ from viewer.rig.figure import Figure
 
 __all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
 
-_CURVE_BITS = 10  # per axis
+_CURVE_BITS = 10  # bits per axis
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class IndexSet:
 
     @property
     def spans(self) -> tuple[tuple[int, int], ...]:
-        """First index and number of indices of all runs; adjacent runs together."""
+        """First index and number of indices of all runs; adjacent runs are merged."""
         spans: list[tuple[int, int]] = []
         for run in self.runs:
             if spans and sum(spans[-1]) == run.first:

@@ -21,7 +21,7 @@ __all__ = ["add_mipmaps", "halved_pictures"]
 
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
-_STEPS = 1 << 14  # steps of linear light; the sum of four values still fits into 16 bits
+_STEPS = 1 << 14  # number of steps of linear light; the sum of four values still fits into 16 bits
 
 
 def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = False) -> None:

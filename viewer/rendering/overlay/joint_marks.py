@@ -35,12 +35,13 @@ HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Colour of the selected joint, sRGB and opacity."""
 
 _AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
-_AXIS_FRACTION = 0.4  # fraction of the distance to the nearest connected joint
-_AXIS_LIMITS = 0.005, 0.05  # fraction of the skeleton's size
-_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for an image of standard height
+_AXIS_FRACTION = 0.4  # length of axes, as a fraction of the distance to the nearest connected joint
+# Minimum and maximum length of axes, as fractions of the skeleton's size.
+_AXIS_LIMITS = 0.005, 0.05
+_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # diameter and widths in an image of standard height, pixels
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
-_DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
+_DOT_REACH, _BONE_REACH = 8.0, 4.0  # maximum distances from the pointer, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)

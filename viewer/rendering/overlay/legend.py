@@ -193,7 +193,7 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _counts(title: str, shown: Sequence[Shown]) -> Legend:
-    """Return the legend of a count: one block per number, starting at the lowest present."""
+    """Return the legend of a count: one block per number, starting at the lowest number present."""
     first = min(int(one.numbers.min()) for one in shown)
     colors = shown[0].look.colors[first:]
     step = -(-len(colors) // _MOST_COUNTS)

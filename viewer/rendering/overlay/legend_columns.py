@@ -43,7 +43,7 @@ def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendCo
     rows : int
         Maximum number of lines per column, 1 or more.
     width : float
-        Maximum total width of all columns, in the same unit. The first column is kept even if it is
+        Maximum total width of all columns, in the same unit. The first column is used even if it is
         wider.
 
     Returns

@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["HIDDEN", "SegmentPass", "SegmentStyle", "Segments", "dots", "joined"]
 
 HIDDEN = 0.4
-"""Default opacity of parts behind a surface."""
+"""Default opacity of segments behind a surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class SegmentStyle:
     Attributes
     ----------
     on_top : bool
-        Whether they are drawn over everything drawn before.
+        Whether segments are drawn over everything drawn before.
     hidden : float
         Opacity of hidden parts, 0 to 1.
     lift : float

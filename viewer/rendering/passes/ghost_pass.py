@@ -23,7 +23,7 @@ __all__ = ["GHOST_COLOR", "STYLES", "Ghost", "GhostPass"]
 GHOST_COLOR = (0.10, 0.42, 0.85)
 """Default colour of ghosts, linear."""
 
-_NEARER = (-2.0, -4.0)  # polygon offset: factor and units
+_NEARER = (-2.0, -4.0)  # factor and units of the polygon offset
 
 STYLES = ("solid", "translucent", "wireframe")
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # fraction of the skeleton's size, for a skeleton without boxes
+_CUBE_SIZE = 0.015  # size of the cubes of a skeleton without boxes, as a fraction of its size
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 
@@ -49,7 +49,7 @@ class SkeletonBuffers:
         self._key: tuple[NumberKey, bool] | None = None
 
     def style(self, options: DisplayOptions) -> str:
-        """Return the style of the drawn skeleton, as ``bone_style``."""
+        """Return the style of the drawn skeleton; see ``bone_style``."""
         from viewer.rendering.passes.bone_style import bone_style
 
         return bone_style(self.figure.require_skeleton(), options)

@@ -20,8 +20,8 @@ class MappedFeature:
     Attributes
     ----------
     targets : tuple of J int
-        Joint of the other model that each joint drives; 0, its root, drives nothing. Of several
-        joints with the same target, the last one counts.
+        Joint of the other model that each joint drives; 0, its root, drives nothing. If several
+        joints have the same target, the last one drives it.
     n_targets : int
         Number of joints of the other model.
     """

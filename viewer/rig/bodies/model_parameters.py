@@ -20,14 +20,14 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["PER_JOINT", "ModelParameters", "driven_dofs"]
 
 PER_JOINT = 7
-"""Parameters of a joint."""
+"""Number of parameters of a joint."""
 
-_SCALE = 6  # index of the scale among them
+_SCALE = 6  # index of the scale among the parameters of a joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelParameters:
-    """The parameters that pose and scale a figure.
+    """Parameters that pose and scale a figure.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class ModelParameters:
         return len(self.names)
 
     def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
-        """Set DOFs, translations and scales of a pose, in place.
+        """Set the DOFs, translations and scales of a pose in place.
 
         Parameters
         ----------
@@ -76,7 +76,7 @@ class ModelParameters:
 
 
 def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
-    """Return joint and kind of each joint parameter, except scales, that can be nonzero.
+    """Return the joint and kind of each joint parameter that can be nonzero, except scales.
 
     Parameters
     ----------

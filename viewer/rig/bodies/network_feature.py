@@ -21,7 +21,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["NetworkFeature"]
 
-_FIRST = 2  # joints before this one place the whole body
+_FIRST = 2  # joints before this index position the whole body
 _WIDTH = 6
 
 

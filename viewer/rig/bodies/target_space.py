@@ -73,7 +73,7 @@ class TargetSpace:
     regressor : JointRegressor
         Joints as means of vertices of the base mesh.
     matrix : (3, 3)
-        From the base mesh to the figure.
+        Transform from the base mesh to the figure.
     """
 
     targets: TargetRows

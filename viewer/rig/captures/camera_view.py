@@ -84,10 +84,10 @@ class CameraView:
 
 
 def view_at(view: CameraView, seconds: float) -> CameraView:
-    """Return a camera as it stands at a time; itself if it does not move.
+    """Return a camera at a given time; the camera itself if it does not move.
 
-    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Across gaps
-    it is interpolated too, and outside its motion the end frames hold.
+    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Gaps are
+    interpolated too; outside the motion, the first or last frame is used.
 
     Parameters
     ----------

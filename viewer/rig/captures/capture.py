@@ -16,7 +16,7 @@ from viewer.rig.motion.parameter_clip import ParameterMotion
 __all__ = ["Capture", "CapturePart", "RestRoots"]
 
 RestRoots = Callable[[Floats | None], Floats]
-"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or without any."""
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,17 +61,17 @@ class Capture:
         Returns an iterator over the parts in time order; the first is short so that something
         can be shown early. Every call reads the files again.
     up : "y", "z", "-y", "-z" or ""
-        The axis that points up in the world; empty to guess from the first bodies.
+        The axis that points up in the world; empty to detect it from the first bodies.
     views : tuple of CameraView
         Calibrated cameras.
     images : CameraImages or None
         Images of the cameras, if available.
     views_of : callable or None
-        Returns further cameras, whose places depend on the figure that shows the bodies.
+        Returns further cameras, whose positions depend on the figure that shows the bodies.
     facts : tuple of (str, str)
         Recognised contents of the file, for ``viewer info``.
     space : "world", "camera" or ""
-        The space of its bodies, of those that the file contains; empty if it has only one.
+        The space of its bodies if the file has several; empty if it has only one.
     in_space : callable or None
         Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str

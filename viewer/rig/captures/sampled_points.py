@@ -58,7 +58,7 @@ def sample_upright_points(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
-    """Sample an actor's points, rotated upright if their own world is upside down.
+    """Sample an actor's points, rotated upright if their world is upside down.
 
     Parameters
     ----------

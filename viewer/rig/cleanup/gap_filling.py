@@ -43,7 +43,7 @@ def inner_gaps(clip: SampledClip | PointClip) -> list[Span]:
 
 
 def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captured, Gaps]:
-    """Return a clip without its short gaps, rotations interpolated along the shorter arc.
+    """Interpolate the short gaps of a clip, rotations along the shorter arc.
 
     Everything else is interpolated linearly. Frames before the first and after the last one stay
     missing.

@@ -15,7 +15,7 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["resampled"]
 
-_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
+_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame are treated as that frame
 _MOST_FRAMES = 1_000_000  # 9 hours at 30 frames per second
 
 
@@ -65,7 +65,7 @@ def resampled(clip: Captured, rate: float) -> Captured:
 
 
 def _present(timing: Timing, times: Floats) -> Bools:
-    """Return at which times the frames on both sides, or the frame itself, exist: (T,)."""
+    """Return whether the frames on both sides of each time, or the frame at it, exist: (T,)."""
     if not timing.n_frames:
         return np.zeros(0, dtype=np.bool_)
     place = (times - timing.start) * timing.frame_rate

@@ -21,7 +21,7 @@ def continuous(quaternions: Floats) -> Floats:
 def relative_vectors(base: Floats, quaternions: Floats) -> Floats:
     """Return the rotation vectors v with q = b exp(v), for rotations by less than 2 pi.
 
-    The sign of a quaternion counts: with a negative real part, the rotation is the one beyond pi.
+    The sign of a quaternion matters: a negative real part means a rotation by more than pi.
 
     Parameters
     ----------

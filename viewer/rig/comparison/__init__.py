@@ -24,7 +24,7 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
-# A closest-point search takes about a second, so it runs in at most this many steps.
+# A closest-point search takes about a second, so at most this many steps run it.
 _MOST_SEARCHES = 32
 
 

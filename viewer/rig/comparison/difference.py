@@ -21,7 +21,7 @@ class Measure:
     name : str
         ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
     kind : "length", "angle" or "weight"
-        Lengths are in the first figure's unit, angles in radians, weights dimensionless.
+        Lengths are in the first figure's unit, angles in radians; weights are dimensionless.
     maximum, mean : float
         Maximum and mean over all compared items and steps.
     step, item : str
@@ -114,7 +114,7 @@ class Tally:
         self.worst, self.step, self._item = -1.0, "", -1
 
     def add(self, step: str, values: Floats) -> None:
-        """Add the values of one step, NaN where nothing can be compared."""
+        """Add the values of one step, NaN for items that cannot be compared."""
         known = ~np.isnan(values)
         if not known.any():
             return

@@ -135,7 +135,7 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
 def rotation_distance(first: Floats, second: Floats) -> Floats:
     """Return the angle between rotations: 2 asin(|A - B| / sqrt(8)), Frobenius norm.
 
-    It stays accurate for small angles, where the arc cosine of the trace does not.
+    It stays accurate for small angles, unlike the arc cosine of the trace.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Closed surfaces, up to small openings: their inside is hidden.
 
 A ray from outside hits the front of such a surface before its back, unless it enters through an
-opening. It hits the back first only where skinning turns the surface inside out.
+opening. It hits the back first only if skinning turns the surface inside out.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from viewer.rig.skin import Skin, skin_rows
 __all__ = ["Shell", "shell_of"]
 
 _MOST_TRIANGLES = 500_000  # for larger meshes, the check takes longer than it saves
-_MOST_OPEN = 256  # edges of openings, which are projected in every image
+_MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
 # Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
 _CLOSED = 0.25
-_HOLLOW = 1e-6  # volume relative to area^1.5 that counts as 0, as of two coincident sheets
+_HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,8 +59,8 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     Returns
     -------
     Shell or None
-        None if edges belong to more than two triangles, if neighbours face opposite sides, if a
-        connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
+        None if edges belong to more than two triangles, if neighbours have opposite orientations,
+        if a connected part is clockwise or open, or if the mesh has more than 500,000 triangles.
     """
     if not 0 < mesh.n_triangles <= _MOST_TRIANGLES:
         return None

@@ -16,8 +16,8 @@ __all__ = ["DENSITY", "Measures", "measure"]
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 
-# Part of the surface that may be missing, as at the eyes or the mouth of a body, without making
-# the volume meaningless.
+# Maximum fraction of the surface that may be missing, as at the eyes or the mouth of a body, for a
+# meaningful volume.
 _HOLE = 0.01
 
 
@@ -34,7 +34,7 @@ class Measures:
     mass : float or None
         Volume times ``DENSITY``, kilograms; None without a volume, or unless the unit is metres.
     n_open_edges : int
-        Number of edges of one triangle only; vertices at the same position are one.
+        Number of edges that belong to a single triangle, with coincident vertices merged.
     """
 
     height: float
@@ -64,7 +64,7 @@ def measure(figure: Figure) -> Measures:
     positions, triangles = figure.mesh.positions, figure.mesh.triangles
     edges = _open_edges(positions, triangles)
     lengths = np.linalg.norm(positions[edges[:, 1]] - positions[edges[:, 0]], axis=1)
-    # No boundary of a given length encloses more than a circle.
+    # Of all boundaries of a given length, a circle encloses the largest area.
     hole = lengths.sum() ** 2 / (4.0 * np.pi)
     if not len(triangles) or hole > _HOLE * triangle_areas(positions, triangles).sum():
         return Measures(height, None, None, len(edges))
@@ -74,7 +74,7 @@ def measure(figure: Figure) -> Measures:
 
 
 def _open_edges(positions: Floats, triangles: Ints) -> Ints:
-    """Return the edges that belong to one triangle only, (E, 2) vertices."""
+    """Return the edges that belong to a single triangle, as vertices (E, 2)."""
     corners: Ints = triangles
     for merges in (False, True):
         if merges:

@@ -15,7 +15,7 @@ from viewer.rig.shape import shaped
 
 __all__ = ["RestingHeight", "resting_height"]
 
-_MOST = 4000  # frames that are evaluated
+_MOST = 4000  # maximum number of evaluated frames
 _LOW = 0.02  # quantile of the heights, for feet that never rest
 
 
@@ -28,7 +28,7 @@ class RestingHeight:
     height : float
         Along the scene's up axis, scene units.
     is_clear : bool
-        Whether feet rest at this height; otherwise it is that of the lowest positions.
+        Whether feet rest at this height; otherwise it is the height of the lowest positions.
     """
 
     height: float

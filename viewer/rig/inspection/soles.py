@@ -17,8 +17,8 @@ from viewer.rig.skin import Skin, owners
 
 __all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
 
-_STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
-_TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
+_STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
+_TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])  # of feet, up to lying on their insteps
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 
@@ -90,7 +90,7 @@ def _axis(figure: Figure) -> int:
 
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
-    """Return the soles of a skeleton with two feet by name, or None.
+    """Return the soles of a skeleton whose joint names identify two feet, or None.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
 
 
 def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool) -> Soles:
-    """Return the soles of given feet of a figure with a skeleton.
+    """Return the soles of the given feet of a figure with a skeleton.
 
     Parameters
     ----------
@@ -140,7 +140,7 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
 
 
 def _whole_foot(skeleton: Skeleton, found: Sequence[int]) -> Bools:
-    """Return the joints of a foot: the ankle, or the ball, and all joints below it. (J,)."""
+    """Return the joints of a foot: the ankle, or the ball, and all joints below it: (J,)."""
     result = np.zeros(skeleton.n_joints, dtype=np.bool_)
     result[list(found)] = True
     for joint, parent in enumerate(skeleton.parents.tolist()):
@@ -165,7 +165,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return the downward direction, and directions tilted from it to all sides: (D, 3)."""
+    """Return the downward direction, and directions tilted from it all around: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

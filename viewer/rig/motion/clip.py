@@ -33,7 +33,8 @@ EXTRAPOLATIONS: tuple[Extrapolation, ...] = get_args(Extrapolation)
 """Behaviour of a curve before its first and after its last key."""
 
 SHORTEST = 1e-9
-"""Keys at most this many seconds apart count as simultaneous: no slope is computed between them."""
+"""Keys at most this many seconds apart are treated as simultaneous: no slope is computed between
+them."""
 
 TangentRule = Literal["flat", "linear", "smooth"]
 TANGENT_RULES: tuple[TangentRule, ...] = get_args(TangentRule)
@@ -186,7 +187,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
 
 
 def _first_misfit(skeleton: Skeleton) -> Phrase:
-    """Return a description of the first joint whose DOFs are not those of a ``.skel``-style rig."""
+    """Describe the first joint whose DOFs differ from those of a ``.skel``-style rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):

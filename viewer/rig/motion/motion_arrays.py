@@ -35,7 +35,7 @@ class MotionArrays:
     frame_rate : float
         Frames per second.
     frames : (F,) int32
-        Numbers of the frames: those of the video or of the files, where they have numbers.
+        Numbers of the frames in the video or the files, if they are numbered there.
     present : (F,) bool
         Whether the person is present; the other arrays are held or undefined elsewhere.
     rotations : (F, J, 4)

@@ -25,7 +25,7 @@ def has_own_animations(actor: Actor) -> bool:
 
 
 def keeps_keys(scene: Scene, actor: Actor) -> bool:
-    """Return whether an actor's animations can be written as they are, also if it is upright."""
+    """Return whether an actor's animations can be written unchanged, even if it is made upright."""
     return has_own_animations(actor) and not own_up(scene, actor)[1]
 
 

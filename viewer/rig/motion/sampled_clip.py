@@ -34,10 +34,11 @@ class SampledClip:
     figure_scales : (N,) or None
         Scales of the whole figure.
     shape_weights : (N, S) or (1, S) or None
-        Blend shape weights; a single row applies to all frames. None keeps those of the pose.
+        Blend shape weights; a single row applies to all frames. If None, those of the pose are
+        used.
     scales : (N, J, 3) or (1, J, 3) or None
-        Local scale factors of the joints; a single row applies to all frames. None keeps those of
-        the pose.
+        Local scale factors of the joints; a single row applies to all frames. If None, those of the
+        pose are used.
     """
 
     name: str
@@ -148,7 +149,7 @@ def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> 
 
 
 def _taken(rows: Floats, places: Ints) -> Floats:
-    """Return the rows at some places; the array itself if these are all rows."""
+    """Return the rows at some indices; the array itself if these are all rows."""
     if len(places) == len(rows) and (places == np.arange(len(rows))).all():
         return rows
     return rows[places]

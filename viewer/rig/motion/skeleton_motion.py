@@ -24,7 +24,7 @@ class SkeletonMotion:
     clip : SampledClip
         Motion of the figure.
     unit_note : Phrase or None
-        Explains how the figure's unit was estimated; None if it was not.
+        Explains how the figure's unit was estimated; None if it was not estimated.
     up_notes : tuple of Phrase
         Explain how the up axis was estimated, and give any contrary evidence.
     expressions : mapping of str to (N,)

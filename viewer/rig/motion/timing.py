@@ -25,13 +25,13 @@ SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
 
 DEFAULT_RATE = 30.0
-"""Frames per second of motions without a frame rate of their own."""
+"""Frames per second of motions that have no frame rate."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
-"""The limits as text, for messages."""
+"""Limits of the frame rate as text for messages."""
 
-_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
-# The same for the ends of motions, which files store in seconds of single precision.
+_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame are treated as that frame
+# The same tolerance for the ends of motions, which files store as single-precision seconds.
 _AT_FRAME = 1e-3
 
 
@@ -122,7 +122,7 @@ class Timing:
         Returns
         -------
         before, after : (T,)
-            Rows; both are -1 where there is no data.
+            Rows; both are -1 if there is no data.
         fraction : (T,)
             0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """

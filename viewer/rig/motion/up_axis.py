@@ -28,8 +28,8 @@ def guess_up(actors: Iterable[Actor]) -> str:
     Parameters
     ----------
     actors : iterable of Actor
-        Bodies with sampled clips, and captured keypoints, as far as they have been read; other
-        actors and all placements are ignored.
+        Bodies with sampled clips, and captured keypoints; only frames read so far are used, and
+        other actors and all placements are ignored.
 
     Returns
     -------

@@ -32,7 +32,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
     Returns
     -------
     up : "y" or "z"
-        The axis that is mapped to the scene's up axis; the scene's own if that is x.
+        The axis that is mapped to the scene's up axis; the scene's up axis if that is x.
     hangs : bool
         Whether that axis points down.
     """
@@ -60,7 +60,8 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
     Returns
     -------
     Actor
-        Actor with the same placement, which no longer applies; the actor itself if nothing changes.
+        Actor with the same placement, which no longer applies to it; the given actor if nothing
+        changes.
     """
     up, hangs = own_up(scene, actor)
     figure = actor.figure if actor.figure.up == up else replace(actor.figure, up=up)
@@ -96,6 +97,6 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
         shifts = (wanted - upright.figure_translation - within) / pose.figure_scale
         upright.translations[roots] += shifts
     rotations = _OVER[:, None] * joint_rotations(skeleton, pose)[roots]
-    # The limits apply to the figure's own world, which is upside down.
+    # The limits apply to the figure's original world, which is upside down.
     set_joint_rotations(skeleton, upright, roots, rotations, clamp=False)
     return upright

@@ -84,7 +84,7 @@ def set_joint_rotations(
 ) -> None:
     """Set the rotations of joints relative to their parents, in place.
 
-    A ball joint's DOFs take the rotation as angles about x, y, z; other joints keep their DOFs as
+    A ball joint's DOFs are set to the angles about x, y, z; other joints keep their DOFs as
     close to 0 as the limits allow and store the remaining rotation as a quaternion.
 
     Parameters

@@ -1,4 +1,4 @@
-"""World matrices of some joints of a moving skeleton, without computing all others."""
+"""World matrices of a subset of the joints of a moving skeleton."""
 
 from __future__ import annotations
 

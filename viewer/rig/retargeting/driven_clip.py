@@ -39,7 +39,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     clip : SampledClip
         Motion of the figure.
     notes : list of Diagnostic
-        Messages, as from ``retarget``.
+        Messages as returned by ``retarget``.
 
     Raises
     ------
@@ -54,7 +54,7 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
         return clip, notes
-    # The retargeted figure stands along its own up axis: it is rotated back to that of the world.
+    # The retargeted figure stands along its own up axis; rotate it back to the world's up axis.
     rotation = _Z_TO_Y if figure.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
     return _rotated(clip, figure, rotation), notes
 

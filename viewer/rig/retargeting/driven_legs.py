@@ -25,10 +25,10 @@ from viewer.rig.shape import shaped
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
-_ALIKE = 1e-4  # relative to the body
+_ALIKE = 1e-4  # lengths this close are equal, relative to the body
 _UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
-_FOLDED = 1e-3  # extension of a leg at rest
-_STEEP = 0.9  # sine of the steepest foot of a standing person
+_FOLDED = 1e-3  # extension at rest below which a leg is folded
+_STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ class DrivenLegs:
 
     def heights(self, worlds: Floats, up: Floats) -> Floats:
         """Return the height of the lowest point of each foot: (N, L)."""
-        # The matrices have the scales of the joints, and the soles are in the same unit.
+        # The matrices include the scales of the joints, and the soles are in the same unit.
         return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
     def straightness(self, worlds: Floats) -> Floats:
@@ -282,8 +282,8 @@ def foot_paths(
     pairs : list of LegPair
         The legs.
     vectors : list of ((N, 3), (N, 3))
-        From the ankles of the figure to its balls and heels: they replace those of a source without
-        ball joints or without a standing rest pose.
+        Vectors from the ankles of the figure to its balls and heels; they replace the source's if
+        it has no ball joints or no standing rest pose.
     up : (3,)
         The up axis.
     """

@@ -1,4 +1,4 @@
-"""Plan of where and when the feet of a driven figure must stand."""
+"""Plan of the positions and times at which the feet of a driven figure must be planted."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class FootPlan:
         return moved - (moved @ self.up)[:, None] * self.up
 
     def slide(self, feet: Sequence[tuple[Floats, Floats]]) -> float:
-        """Return the total distance that balls and heels slide while they stand."""
+        """Return the total distance that balls and heels slide while they are in contact."""
         total = 0.0
         for points, contacts in zip(feet, self.contacts, strict=True):
             for contact in contacts:
@@ -102,8 +102,8 @@ class FootPlan:
     def floor(self, foot: int) -> Floats:
         """Return the height below which a foot with contacts must not sink: (N,).
 
-        This is the ground of the previous or next contact, whichever is lower. Where the source's
-        own foot sinks below that, the limit follows it.
+        This is the ground of the previous or next contact, whichever is lower. If the source's foot
+        sinks below that, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))

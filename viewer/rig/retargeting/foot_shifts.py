@@ -17,8 +17,8 @@ _EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 _LIFTS, _LIFTED = 4, 20.0  # passes that lift sinking feet, and their weight
 _SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the default translation, relative to a standing foot
-_STRAIGHT = (0.8, 0.95)  # relative lengths up to which a leg is bent, and from which it is straight
+_FLIGHT = 0.05  # weight of the default translation relative to that of a standing foot
+_STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class _Wanted:
     flat: Floats  # (N, 3), horizontal
     is_flat: Bools  # (N,), rows with horizontal corrections
     rise: Floats  # (N,)
-    holds: Floats  # (N,), how far the foot is held in place
+    holds: Floats  # (N,), degree to which the foot is held in place, 0 to 1
     above: Floats  # (N,), height of the sole above the floor
 
 
@@ -40,13 +40,13 @@ def foot_shifts(
 ) -> tuple[list[Floats], Floats]:
     """Return the translations of all feet and of the body.
 
-    A foot is corrected while it stands. The body smoothly follows standing feet on straight legs,
-    so that these need not bend; other feet follow the body.
+    A foot is corrected while it is on the ground. The body smoothly follows planted feet on
+    straight legs, so that these need not bend; other feet follow the body.
 
     Parameters
     ----------
     plan : FootPlan
-        Where the feet must stand, with at least one contact.
+        Positions and times at which the feet must be planted, with at least one contact.
     points : list of ((N, 3), (N, 3))
         Paths of the balls and the heels.
     heights : (N, L)
@@ -142,8 +142,8 @@ def _smoothed(plan: FootPlan, targets: Floats, weights: Floats) -> Floats:
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
     """Return the mean translation of the standing feet, (N, 3), smooth over time.
 
-    ``weights``: weights of the feet, (N, L). ``usual``: the translation without standing feet, (N,
-    3).
+    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without standing feet,
+    (N, 3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):

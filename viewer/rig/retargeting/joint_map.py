@@ -112,7 +112,7 @@ def _find(
     title: str,
     at: tuple[Path | None, int | None],
 ) -> int:
-    """Return the joint with a label; ``at``: file and line for messages."""
+    """Return the joint with a label; ``at`` is the file and line for messages."""
     if name in joints:
         return joints[name]
     same = [label for label, joint in joints.items() if skeleton.names[joint] == name]

@@ -39,7 +39,7 @@ _WORDS = {
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
 _AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
-# Removed before a side or a word.
+# Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
 _SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
@@ -53,7 +53,7 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # fraction of the joints; a first word that more joints share is a prefix
+_SHARED = 0.6  # fraction of the joints; a first word shared by more joints is a prefix
 _MOST = 2000  # number of joints; a skeleton with more is not a body
 _SPINES = ("spine1", "spine2", "spine3")
 
@@ -129,7 +129,7 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
     Returns
     -------
     tuple of J str
-        As ``canonical_names``.
+        Names as returned by ``canonical_names``.
     """
     if skeleton.humanoid is not None:
         return _stated(skeleton.humanoid, skeleton.n_joints)
@@ -137,7 +137,7 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def joints_by_place(skeleton: Skeleton) -> set[int]:
-    """Return the joints whose meaning follows from their place in the hierarchy, not their names.
+    """Return the joints identified by their position in the hierarchy, not by their names.
 
     These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
     humanoid has none.
@@ -282,7 +282,7 @@ def _tokens(name: str) -> list[str]:
 
 
 def _key(tokens: list[str]) -> _Key:
-    """Return the side, taken from either end, and the word of a name."""
+    """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
     tokens = [token for token in tokens if token != "c"]  # centre joints in VRM
@@ -297,7 +297,7 @@ def _key(tokens: list[str]) -> _Key:
         return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
     word = _word(tokens)
     for letters in ("left", "right", "l", "r"):
-        # lfemur: a lower-case side without a separator counts only before a known word.
+        # lfemur: a lower-case side without a separator is recognised only before a known word.
         if word.startswith(letters) and word not in _ROLES and _is_known(word[len(letters) :]):
             return _SIDES[letters], word[len(letters) :]
     return "", word

@@ -1,9 +1,9 @@
-"""Feet of driven figures, planted where those of the source stand (after Kovar et al. 2002).
+"""Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
 
-Retargeting keeps the directions of limbs, so that feet slide and sink where proportions differ.
+Retargeting keeps the directions of limbs, so that feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
-sole on the ground; before and after, the correction fades in and out. Hips and knees rotate to
-reach the ankles, and the body is lowered where legs are too short.
+sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
+the ankles reach their targets, and the body is lowered if a leg is too short.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from viewer.rig.retargeting.retarget import Retargeted
 __all__ = ["PlantedFeet", "plant_feet"]
 
 _EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
-_ROUNDING = 1e-6  # relative to the body
+_ROUNDING = 1e-6  # tolerance of lengths, relative to the body
 _STEPS = 5  # reported as progress, from retargeting to the comparison
 
 
@@ -49,8 +49,8 @@ class PlantedFeet:
     n_contacts : int
         Number of contacts of all feet.
     source, before, after : float
-        Total distance that feet slide while they stand, in figure units: in the source, scaled to
-        the figure; and in the figure before and after.
+        Total distance that feet slide while they are on the ground, in figure units: in the source,
+        scaled to the figure, and in the figure before and after planting.
     gap_before, gap_after : float
         Largest height of a standing sole above or below the ground.
     lowered : float
@@ -73,7 +73,7 @@ class PlantedFeet:
 
     @property
     def is_better(self) -> bool:
-        """Whether feet slide less or are nearer to the ground, and neither got worse."""
+        """Whether feet slide less or are nearer to the ground, and neither is worse than before."""
         slack = _ROUNDING * self.size
         slides, gap = self.after - self.before, self.gap_after - self.gap_before
         return max(slides, gap) <= slack and min(slides, gap) < -slack
@@ -98,7 +98,7 @@ def plant_feet(
     clip : SampledClip
         The motion; unchanged if it would not improve.
     changes : PlantedFeet or None
-        What was changed; None if the figure or the source has no recognised legs, or the figure has
+        Changes made; None if the figure or the source has no recognised legs, or the figure has
         the source's proportions.
     """
     pairs = leg_pairs(found, figure)

@@ -16,7 +16,7 @@ __all__ = ["SIDES", "Postures", "postures_of", "rest_posture", "unit"]
 
 SIDES = ("left", "right")
 _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_MOST = 4000  # frames; of longer motions, every n-th frame is used
+_MOST = 4000  # maximum number of frames; of longer motions, every n-th frame is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,7 +77,7 @@ class Postures:
         )
 
     def chosen(self, frames: Bools) -> Postures:
-        """Return some of the poses."""
+        """Return the poses at the given indices."""
         return replace(
             self,
             rows=self.rows[frames],

@@ -213,7 +213,7 @@ def _matched_above(matches: Matches, parents: Ints) -> Ints:
 
 
 def _standing(source: RestPose, target: RestPose, matches: Matches) -> Floats:
-    """Return the rotation of the target's body as a whole, from its sides and the up axis."""
+    """Return the rotation of the target's whole body, from its sides and the up axis."""
     joints = {
         name: joint
         for joint, name in enumerate(matches.names)

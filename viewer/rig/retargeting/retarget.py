@@ -84,7 +84,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 
 
 def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
-    """Return the same motion of a skeleton in the unit of its path, as that of MHR in metres."""
+    """Return the same motion of a skeleton in the unit of its path, such as metres for MHR."""
     clip, scales = motion.clip, motion.clip.figure_scales
     usual = 1.0 if scales is None or len(scales) == 0 else float(np.median(scales))
     if scales is None or usual == 1.0 or not 0.0 < usual < np.inf:
@@ -104,7 +104,7 @@ class Retargeted:
     clip : SampledClip
         Motion of the figure.
     notes : list of Diagnostic
-        Messages, as of ``retarget``.
+        Messages as returned by ``retarget``.
     source : SkeletonMotion
         The motion, with the rest pose that was used.
     matches : Matches
@@ -133,7 +133,7 @@ def retarget(
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
-    and hierarchy matches joint by joint. Limbs take the directions of the source's limbs, exactly;
+    and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
     spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
@@ -217,14 +217,14 @@ class _Job:
     target: Skeleton
     rests: tuple[RestPose, RestPose]  # in the figure's axes
     matches: Matches
-    to_target: Floats  # (3, 3), the source's axes to the figure's
+    to_target: Floats  # (3, 3), from the source's axes to the figure's
     is_same: bool
 
 
 def _job(
     motion: SkeletonMotion, source: Skeleton, to: tuple[Skeleton, str], matches: Matches
 ) -> _Job:
-    """Return the inputs of a retargeting; ``to``: the figure's skeleton and up axis."""
+    """Return the inputs of a retargeting; ``to`` is the figure's skeleton and up axis."""
     target, up = to
     to_target = up_rotation(motion.figure.up, up)
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)

@@ -120,7 +120,7 @@ def deform(
     figure : Figure
         Figure with a mesh. Without skeleton or skin the mesh is returned in the bind pose.
     pose : Pose, optional
-        DOFs in lengths and radians; the file's own pose if omitted.
+        DOFs in lengths and radians; the pose stored in the file if omitted.
     method : str or Skinning
         A key of ``METHODS``, or all skinning options.
 

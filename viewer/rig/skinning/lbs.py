@@ -24,8 +24,8 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Transform by blended matrices: v' = B [v 1], n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
-    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If some
-    scale or shear, they use its inverse transpose, n' = unit(B^-T n).
+    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If any
+    joint scales or shears, normals use its inverse transpose, n' = unit(B^-T n).
 
     Parameters
     ----------

@@ -58,13 +58,13 @@ class Springs:
     tails : (N, 3)
         The point that swings, in the rest space of the joint.
     stiffness : (N,)
-        Speed towards the rest direction, per second.
+        Speed towards the rest direction, scene units per second.
     drags : (N,)
         Fraction of the speed that is lost in each step, 0 to 1.
     gravities : (N, 3)
         Constant speed in figure space, per second.
     radii : (N,)
-        Radius of the sphere around the point that collides.
+        Radius of the colliding sphere around the point.
     centers : (N,) int32
         Joint relative to which inertia is evaluated; -1 for figure space.
     colliders : Colliders

@@ -80,7 +80,7 @@ def _with_value(channel: TransformChannel, key: int, value: Floats) -> Transform
     values = channel.values.copy()
     values[key] = value
     if channel.path == "rotation" and len(values) > 1:
-        # Choose the sign nearer to a neighbour, because cubic interpolation does not.
+        # Choose the sign of the quaternion nearer to a neighbour, as cubic interpolation does not.
         neighbour = values[key - 1 if key else 1]
         values[key] *= -1.0 if values[key] @ neighbour < 0.0 else 1.0
     if channel.tangents is None:
