@@ -11,6 +11,7 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
 from viewer.rig.bodies.feature import Feature
 from viewer.rig.bodies.shape_space import ShapeSpace
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.expressions import ExpressionRules
 from viewer.rig.materials.material_binds import MaterialBinds
 
@@ -257,6 +258,22 @@ class Correctives:
         """Return the offsets, read from the file on first use."""
         return _values(self.offsets)
 
+    def of_vertices(self, vertices: Ints, weights: Floats) -> Floats:
+        """Return sum_p c_p d_p at some vertices only: (N, 3) for weights (P,)."""
+        active = np.flatnonzero(weights)
+        if isinstance(self.offsets, SparseOffsets):
+            offsets = self.offsets.of_vertices(vertices)[active]
+        else:
+            offsets = self.values()[active[:, None], vertices[None, :]]
+        return np.einsum("p,pva->va", weights[active], offsets.astype(np.float64, copy=False))
+
+    def check_values(self) -> None:
+        """Read the offsets; raises FormatError if they are damaged."""
+        if isinstance(self.offsets, SparseOffsets):
+            self.offsets.total(np.zeros(self.offsets.shape[0]))
+        else:
+            self.values()
+
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_p c_p d_p, skipping joints without rotation.
 
@@ -270,6 +287,10 @@ class Correctives:
         (V, 3)
             Figure units.
         """
+        if isinstance(self.offsets, SparseOffsets) and weights.any():
+            found = self.offsets.total(weights)
+            if found is not None:
+                return found
         total = np.zeros(3 * self.n_vertices)
         for rows in active_rows(weights, self.block):
             total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)
