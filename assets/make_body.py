@@ -1,6 +1,6 @@
 """Generate the bundled human body: body.npz, in SMPL's file layout, in assets/samples.
 
-Run ``python assets/make_body.py`` from any folder; it takes about two minutes and gives the same
+Run ``python assets/make_body.py`` from any folder; it takes about two minutes and writes the same
 file every time. Needs numpy, scipy and scikit-image.
 """
 

@@ -1,7 +1,7 @@
 """Generate the sample fox: fox.skel, fox.skin and fox.png in assets/samples.
 
-Run ``python assets/make_fox.py`` from any folder; it takes about a minute and gives the same
-files every time. Needs numpy, scipy, scikit-image, pillow and xatlas.
+Run ``python assets/make_fox.py`` from any folder; it takes about a minute and writes the same files
+every time. Needs numpy, scipy, scikit-image, pillow and xatlas.
 """
 
 import sys
@@ -21,7 +21,8 @@ from generator_tools.surface import mirror, normals
 from PIL import Image
 
 BAKED_SIZE = 1024
-TEXTURE_SIZE = 512  # averages four baked texels; half the size makes the viewer start 20 ms earlier
+# Each texel averages four baked ones; half the size lets the viewer start 20 ms earlier.
+TEXTURE_SIZE = 512
 
 
 def main() -> None:

@@ -24,11 +24,11 @@ from viewer.loading import bundled_body
 from viewer.rendering.passes.ground_pass import parse_color
 
 _HERE = Path(__file__).resolve().parent
-_MOST_BYTES = 4_000_000  # of all pictures together
+_MOST_BYTES = 4_000_000  # maximum size of all pictures together
 
 
 def main(names: list[str]) -> int:
-    """Draw the named pictures, or all and the page; return the exit code."""
+    """Draw the named pictures, or all pictures and the page; return the exit code."""
     unknown = [name for name in names if name not in PICTURES]
     if unknown:
         sys.stderr.write(f"no picture {', '.join(unknown)}; there are {', '.join(PICTURES)}\n")

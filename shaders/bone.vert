@@ -1,12 +1,13 @@
 #version 330
-// Places parts of a skeleton: instances of a shape between a joint and its child, or at a joint.
+// Transforms parts of a skeleton: instances of a shape between a joint and its child, or at a
+// joint.
 
 in vec3 in_corner;      // x and z across in half widths, y from the joint (0) to the end (1)
-in vec3 in_normal;      // in the same frame; 0 for one normal per triangle
+in vec3 in_normal;      // in the frame of in_corner; 0 for one normal per triangle
 in float in_tint;       // 0: the joint's colour, 1: the colour of axis in_link.z
-in ivec3 in_link;       // joint; its child, -1 for an end, -2 for a ball; axis that marks the roll
-in vec4 in_end;         // end without a child: direction in joint space, length in figure units
-in vec3 in_width;       // fraction of the length; smallest and largest half width, figure units
+in ivec3 in_link;       // joint; child, -1 for an end, -2 for a ball; axis that marks the roll
+in vec4 in_end;         // for an end: direction in joint space, length in figure units
+in vec3 in_width;       // half width: fraction of the length; minimum and maximum, figure units
 in vec3 in_color;       // linear
 
 uniform mat4 u_model_view;     // figure space, minus the skeleton's centre, to camera space
@@ -15,7 +16,7 @@ uniform mat4 u_projection;
 uniform sampler2D u_world;     // joint matrices to figure space minus centre, three rows each
 uniform int u_selected;        // joint to draw in u_highlight; -1 for none
 uniform int u_only;            // joint to draw alone; -1 for all
-uniform float u_height;         // of the image, pixels
+uniform float u_height;         // height of the image, pixels
 uniform vec3 u_highlight;      // linear
 uniform bool u_has_color;      // use u_color instead of in_color
 uniform vec3 u_color;          // linear
@@ -55,8 +56,8 @@ vec3 unit_or(vec3 v, vec3 otherwise) {
     return size > 1e-12 ? v / size : otherwise;
 }
 
-// Unit vector perpendicular to a unit direction: from an axis of the joint, or any if that axis is
-// parallel.
+// Unit vector perpendicular to a unit direction: the perpendicular part of an axis of the joint, or
+// an arbitrary one if that axis is parallel to the direction.
 vec3 across(vec3 way, vec3 wanted) {
     vec3 side = unit_or(wanted, vec3(0.0));
     side -= way * dot(way, side);

@@ -2,10 +2,10 @@
 // A camera's image without its lens distortion: each ideal pixel is looked up where the lens
 // projected it (the model of OpenCV, as in viewer/rendering/pinhole.py).
 
-in vec2 v_pixel;                // ideal pixel; 0, 0 is the centre of the first one
+in vec2 v_pixel;                // ideal pixel; 0, 0 is the centre of the first pixel
 
 uniform sampler2D u_texture;    // sRGB, straight alpha, first row at the top
-uniform vec2 u_size;            // of the calibrated image, pixels
+uniform vec2 u_size;            // size of the calibrated image, pixels
 uniform mat3 u_intrinsic;       // camera space to pixels
 uniform mat3 u_inverse;         // pixels to camera space
 uniform float u_lens[8];        // k1 k2 p1 p2 k3 k4 k5 k6

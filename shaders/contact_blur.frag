@@ -6,10 +6,10 @@ in vec2 v_place;
 
 uniform sampler2D u_field;  // depth from below the ground, or the fields blurred along one axis
 uniform bool u_is_depth;
-uniform float u_bottom;     // heights at depths 0 and 1, sizes of a figure
+uniform float u_bottom;     // heights at depths 0 and 1, in figure sizes
 uniform float u_top;
 uniform float u_near;       // height at which contact ends
-uniform vec2 u_narrow;      // standard deviations of the blurs, widths of the field
+uniform vec2 u_narrow;      // standard deviations of the two blurs, in field widths
 uniform vec2 u_wide;
 
 out vec2 f_darkness;        // darkness by contact, and by occluders farther above

@@ -1,6 +1,6 @@
 #version 330
-// Writes depth only. Blended surfaces cover a fraction of the texels, their alpha, in a pattern
-// that the shadow filters average.
+// Writes depth only. A blended surface covers a fraction of the texels equal to its alpha, in a
+// pattern that the shadow filter averages.
 
 #ifdef MATERIALS
 #pragma include surface

@@ -1,5 +1,6 @@
 #version 330
-// Ground grid: lines one pixel wide at any distance, every tenth one stronger; all fade out.
+// Ground grid: lines one pixel wide at any distance, every tenth one stronger, fading out with
+// distance.
 
 in vec2 v_ground;
 
@@ -10,7 +11,8 @@ uniform vec3 u_line_color;  // sRGB
 
 out vec4 f_color;           // sRGB, premultiplied by alpha
 
-// Coverage of lines at integers, given the width of a pixel; 0 where the lines are less than a pixel apart.
+// Coverage of lines at integers, given the width of a pixel; 0 if the lines are less than a pixel
+// apart.
 float lines(vec2 place, vec2 width) {
     vec2 distance = abs(fract(place - 0.5) - 0.5) / width;
     vec2 line = clamp(1.0 - distance, 0.0, 1.0) * clamp(1.0 - 2.0 * width, 0.0, 1.0);

@@ -7,7 +7,7 @@ uniform mat4 u_model_view;  // ground space (x right, y up in the image seen fro
 uniform mat4 u_projection;
 uniform float u_extent;     // half the side length of the square, scene units
 
-out vec2 v_ground;          // scene units from the grid's centre, a line crossing
+out vec2 v_ground;          // scene units from the grid's centre, where two lines cross
 
 void main() {
     v_ground = u_extent * in_corner;

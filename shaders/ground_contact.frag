@@ -2,7 +2,7 @@
 // Contact shadows on the ground: black with an opacity, so that they also show on a transparent
 // background.
 
-in vec2 v_place;            // in the field
+in vec2 v_place;            // position in the field, 0 to 1
 
 uniform sampler2D u_field;  // darkness by contact, and by occluders farther above
 uniform vec2 u_opacity;     // opacity of each kind

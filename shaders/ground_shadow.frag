@@ -4,9 +4,9 @@
 
 #pragma include shadow
 
-in vec2 v_place;            // in the shadow map
+in vec2 v_place;            // position in the shadow map, 0 to 1
 
-uniform vec3 u_depth;       // depth in the map: at v_place 0, and its increase along both axes
+uniform vec3 u_depth;       // depth in the map at v_place 0, and its increase along each axis
 uniform float u_opacity;
 
 out vec4 f_color;           // sRGB, premultiplied by alpha

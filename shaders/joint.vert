@@ -4,7 +4,7 @@
 #pragma include normals
 
 in vec3 in_corner;      // corner of the cube
-in vec3 in_normal;      // normal of its face
+in vec3 in_normal;      // normal of the cube's face
 in vec3 in_low;         // per joint: lowest corner of the box, joint space
 in vec3 in_high;        // per joint: highest corner
 in vec3 in_color;       // per joint, linear

@@ -4,7 +4,7 @@
 in vec2 v_pixel;                // texel coordinates
 flat in vec3 v_color;           // sRGB colour of the letters
 
-uniform sampler2D u_texture;    // grey premultiplied by opacity, and opacity
+uniform sampler2D u_texture;    // grey value premultiplied by opacity, and opacity
 
 out vec4 f_color;               // sRGB, premultiplied by alpha
 

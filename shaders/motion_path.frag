@@ -5,7 +5,7 @@ in vec3 v_color;
 in float v_time;        // scene time, seconds
 
 uniform float u_now;    // seconds
-uniform float u_reach;  // seconds before and after u_now at which it has faded out; 0: no fading
+uniform float u_reach;  // seconds before and after u_now over which the path fades; 0: no fading
 uniform float u_opacity;
 
 out vec4 f_color;

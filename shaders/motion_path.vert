@@ -3,13 +3,13 @@
 
 in vec3 in_start;       // figure space minus centre
 in vec3 in_end;
-in vec2 in_times;       // of both ends, scene time in seconds
+in vec2 in_times;       // scene times of both ends, seconds
 in vec3 in_color;       // sRGB
 
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
-uniform vec2 u_size;    // of the image, pixels
-uniform float u_width;  // of the line, pixels
+uniform vec2 u_size;    // size of the image, pixels
+uniform float u_width;  // width of the line, pixels
 
 out vec3 v_color;       // sRGB
 out float v_time;
@@ -30,7 +30,8 @@ void main() {
     way = dot(way, way) > 0.0 ? normalize(way) : vec2(1.0, 0.0);
     float side = gl_VertexID % 2 == 0 ? -1.0 : 1.0;
     vec4 place = at_end ? end : start;
-    // Half a width to each side; the image is 2 units wide in normalized device coordinates.
+    // Offset by half a width to each side; the image is 2 units wide in normalized device
+    // coordinates.
     place.xy += u_width / u_size * side * vec2(-way.y, way.x) * place.w;
     gl_Position = place;
     v_time = at_end ? in_times.y : in_times.x;

@@ -5,8 +5,8 @@ uniform sampler2D u_geometry;   // unit normal and z, camera space; z is 0 in th
 uniform vec4 u_unproject;       // camera x and y at depth 1, or at any depth: scale and shift of pixels
 uniform bool u_orthographic;
 uniform float u_radius;         // scene units
-uniform float u_pixels;         // per scene unit, at depth 1 or at any depth
-uniform float u_phase;          // of the pattern of directions, 0 to 1
+uniform float u_pixels;         // pixels per scene unit, at depth 1 or at any depth
+uniform float u_phase;          // phase of the pattern of directions, 0 to 1
 
 out vec2 f_occlusion;           // fraction of the ambient light, and z in camera space
 
@@ -23,7 +23,7 @@ float arc(float horizon, float n) {
     return 0.25 * (-cos(2.0 * horizon - n) + cos(n) + 2.0 * horizon * sin(n));
 }
 
-// Largest cosine of the angle between view direction and horizon in one image direction.
+// Largest cosine of the angle between the view direction and the horizon in one image direction.
 float horizon(vec2 pixel, vec2 direction, vec3 position, vec3 to_eye, float reach, float start,
               float lowest) {
     float found = lowest;
@@ -51,7 +51,7 @@ void main() {
         return;
     vec3 position = position_at(pixel, geometry.a), normal = geometry.rgb;
     vec3 to_eye = u_orthographic ? vec3(0.0, 0.0, 1.0) : normalize(-position);
-    // Depths on the surface itself have rounding errors.
+    // The offset prevents rounding errors of the depth from occluding the surface itself.
     position += 1e-3 * u_radius * normal;
     float reach = u_radius * u_pixels / (u_orthographic ? 1.0 : -geometry.a);
     float noise = fract(52.9829189 * fract(dot(pixel, vec2(0.06711056, 0.00583715))) + u_phase);

@@ -1,10 +1,10 @@
 #version 330
-// Outlines around a mask: a coloured line with a thin dark one around it.
+// Outlines around a mask: a coloured line with a thin dark border.
 
 uniform sampler2D u_mask;       // coverage, 0 to 1: selected, hovered
 uniform sampler2D u_distance;   // distance along the row, in units of u_reach + 1 pixels
 uniform int u_reach;            // pixels
-uniform float u_width;          // of the coloured line, pixels
+uniform float u_width;          // width of the coloured line, pixels
 uniform vec3 u_colors[2];       // sRGB, selected and hovered
 
 uniform bool u_straight;        // do not multiply by alpha

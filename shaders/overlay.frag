@@ -1,7 +1,7 @@
 #version 330
 // Copies a texture unchanged.
 
-in vec2 v_pixel;                // from the lower left corner
+in vec2 v_pixel;                // pixels from the lower left corner
 
 uniform sampler2D u_texture;    // sRGB, premultiplied by alpha
 

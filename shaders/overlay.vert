@@ -3,9 +3,9 @@
 
 uniform vec2 u_place;       // lower left corner, pixels
 uniform vec2 u_extent;      // width and height, pixels
-uniform vec2 u_picture;     // of the image, pixels
+uniform vec2 u_picture;     // size of the image, pixels
 
-out vec2 v_pixel;           // from the lower left corner
+out vec2 v_pixel;           // pixels from the lower left corner
 
 void main() {
     v_pixel = u_extent * vec2(gl_VertexID & 1, gl_VertexID >> 1);

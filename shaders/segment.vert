@@ -9,10 +9,10 @@ in float in_width;      // pixels
 
 uniform mat4 u_model_view;
 uniform mat4 u_projection;
-uniform vec2 u_size;        // of the image, pixels
+uniform vec2 u_size;        // size of the image, pixels
 uniform float u_border;     // width of the border, pixels
-uniform float u_lift;       // fraction of the distance to the eye by which it is moved forward
-uniform float u_height;     // distance moved in parallel projections, scene units
+uniform float u_lift;       // fraction of the eye distance by which the segment is moved forward
+uniform float u_height;     // distance moved forward in parallel projections, scene units
 uniform bool u_orthographic;
 
 out vec4 v_color;

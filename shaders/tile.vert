@@ -1,11 +1,11 @@
 #version 330
-// A strip of four vertices for each image tile in or next to which the edge of a mask lies.
+// A strip of four vertices for each image tile that contains the edge of a mask or is next to it.
 
 uniform sampler2D u_mask;       // coverage, 0 to 1, with mipmaps
 uniform int u_level;            // mipmap level to sample
 uniform int u_reach;            // pixels around the tile to consider
 
-const int SIDE = 16;            // of a tile, pixels
+const int SIDE = 16;            // width and height of a tile, pixels
 
 void main() {
     ivec2 size = textureSize(u_mask, 0), coarse = textureSize(u_mask, u_level);

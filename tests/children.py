@@ -1,12 +1,12 @@
-"""Run Python in a separate process that receives signals, however the tests were started."""
+"""Commands that run Python in a separate process in which no signal is ignored."""
 
 from __future__ import annotations
 
 import sys
 
-# A signal that is ignored when a program starts stays ignored, as after nohup, in a shell's
-# background and on many machines that run tests. Not in preexec_fn: that forks a process that may
-# have threads.
+# A signal that is ignored when a program starts stays ignored: after nohup, in background jobs of a
+# shell, and on many CI runners. A preexec_fn is no alternative, because it would run in a fork of a
+# process that may have threads.
 _LISTEN = (
     "import os, signal, sys\n"
     "for name in ('SIGINT', 'SIGTERM', 'SIGHUP'):\n"
@@ -16,6 +16,6 @@ _LISTEN = (
 
 
 def listening(*arguments: object) -> list[str | bytes]:
-    """Return a command: Python with these arguments, in which no signal is ignored."""
+    """Return a command that runs Python with these arguments and ignores no signal."""
     given = [one if isinstance(one, bytes) else str(one) for one in arguments]
     return [sys.executable, "-I", "-S", "-c", _LISTEN, *given]

@@ -17,9 +17,9 @@ from run_time import RunTime
 pytest_plugins = ["examples", "stored_pictures"]
 
 ROOT = Path(__file__).resolve().parents[1]
-# Folders and files whose tests and examples all draw, or depend on one that draws.
+# Folders and files in which every test and example draws, or depends on one that draws.
 DRAWING = ("tests/app/", "tests/rendering/", "viewer/rendering/", "viewer/__init__.py")
-# These tests wait more than they compute. Begun last, one process would end long after the other.
+# These tests mostly wait. If they started last, one worker would finish long after the others.
 FIRST = ("tests/test_window.py", "tests/test_interrupts.py")
 SHARED_DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 SHARED = SHARED_DATA / "cse169"
@@ -30,13 +30,14 @@ settings.load_profile("fixed")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    if not hasattr(config, "workerinput"):  # in workers, their controller counts for all
+    # The controller measures for all workers.
+    if not hasattr(config, "workerinput"):
         config.pluginmanager.register(RunTime())
 
 
 def pytest_collection_finish() -> None:
-    # Tests, modules and libraries stay to the end: the garbage collector need not look at them
-    # again and again.
+    # Tests, modules and libraries live until the end of the run, so the garbage collector need not
+    # scan them repeatedly.
     gc.collect()
     gc.freeze()
 
@@ -87,7 +88,7 @@ _NUMBERS = itertools.count()
 
 @pytest.fixture(autouse=True)
 def own_settings(tmp_path_factory, monkeypatch) -> None:
-    """No test reads or changes the settings of the user who runs it, or those of another test."""
+    """Keep tests from reading or changing the user's settings or those of another test."""
     folder = tmp_path_factory.getbasetemp() / f"settings{next(_NUMBERS)}"
     for name in ("XDG_CONFIG_HOME", "XDG_DATA_HOME", "XDG_STATE_HOME"):
         monkeypatch.setenv(name, str(folder / name))
@@ -96,7 +97,7 @@ def own_settings(tmp_path_factory, monkeypatch) -> None:
 
 @pytest.fixture
 def quick_fits(monkeypatch) -> None:
-    """Alignments use an eighth of the usual points: much faster, and nearly as good."""
+    """Align figures with an eighth of the usual points, which is much faster and nearly as good."""
     monkeypatch.setattr("viewer.autorig.alignment.surface_alignment.SAMPLES", 250)
 
 
@@ -114,7 +115,7 @@ def gl_framebuffer() -> Iterator[moderngl.Framebuffer]:
 
 @pytest.fixture
 def ctx(gl_framebuffer: moderngl.Framebuffer) -> Iterator[moderngl.Context]:
-    """A context, current and with a framebuffer bound; no test leaves an error behind."""
+    """A current context with a framebuffer bound; the test fails if it leaves a GL error."""
     context: moderngl.Context = gl_framebuffer.ctx
     with context:
         gl_framebuffer.use()

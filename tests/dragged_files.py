@@ -85,7 +85,7 @@ def _library():
 
 
 class _Source:
-    """A program that offers files."""
+    """A program that offers files for dragging."""
 
     def __init__(self, display, window, paths):
         self.x11, self.window = _library(), int(window)
@@ -150,7 +150,7 @@ def drag_files(display, window, paths, place=(400, 300)):
     paths : sequence of Path
         Files and folders.
     place : (int, int)
-        Where they are dropped, pixels of the screen.
+        Drop position in screen pixels.
     """
     source = _Source(display, window, paths)
     try:
@@ -161,7 +161,7 @@ def drag_files(display, window, paths, place=(400, 300)):
         source.send("XdndPosition", 0, place[0] << 16 | place[1], 0, copy)
         assert source.wait_for("XdndStatus")[1] & 1, "the window does not accept files"
         source.send("XdndDrop", 0, 0, 0, 0)
-        # GLFW answers with the length of what it read.
+        # GLFW answers with the number of bytes that it read.
         assert source.wait_for("XdndFinished")[1], "the window did not take the files"
     finally:
         source.x11.XCloseDisplay(source.display)

@@ -1,4 +1,4 @@
-"""The real window driven by xdotool; screenshots are compared."""
+"""The real window, driven by xdotool, and comparisons of its screenshots."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from children import listening
 from PIL import ImageGrab
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 60.0  # seconds until an expected event counts as missing
-# Processor time in milliseconds: a frame in software takes several times longer, and waking up to
-# look at the clock a tenth of it.
+PATIENCE = 60.0  # timeout of an expected event in seconds
+# A threshold of processor time in milliseconds. A frame drawn in software takes several times
+# longer; waking up to check the clock takes a tenth of it.
 A_FRAME = 8.0
 
 
@@ -98,7 +98,7 @@ class Window:
         return np.array(ImageGrab.grab(xdisplay=self.display).convert("RGB"))
 
     def wait_until_quiet(self, still=0.25):
-        """Return the screen as soon as it shows the figure and has not changed for a while."""
+        """Return the screen once it shows the figure and has not changed for ``still`` seconds."""
         last = [self.screen(), time.monotonic()]
 
         def is_quiet():
@@ -114,7 +114,8 @@ class Window:
         part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
 
         def changed():
-            # A change may go away again before the picture is still: a highlight, half a frame.
+            # A change such as a highlight or a partly drawn frame may disappear before the picture
+            # settles.
             still = self.wait_until_quiet()
             return still if (still[part] != before[part]).any() else None
 
@@ -125,7 +126,8 @@ class Window:
         _wait_for(lambda: (self.screen()[part] == wanted[part]).all(), "an earlier picture")
 
     def key(self, name):
-        # Without a window manager the focus may be lost, and keys follow the pointer then.
+        # Without a window manager the focus may be lost; keys then go to the window under the
+        # pointer.
         self.tell("windowfocus", "--sync", self.id)
         self.tell("key", "--clearmodifiers", name)
 
@@ -145,11 +147,12 @@ class Window:
 
     def milliseconds_of_cpu(self):
         """Return the processor time of all threads, by the process's own clock."""
-        # As clock_getcpuclockid of the C library makes it (Linux: CPUCLOCK_SCHED is 2).
+        # The clock's number as clock_getcpuclockid of the C library computes it (on Linux,
+        # CPUCLOCK_SCHED is 2).
         return 1e3 * time.clock_gettime(~self.process.pid << 3 | 2)
 
     def is_asleep(self, seconds=0.6):
-        """Return whether the window draws no frame for longer than it may sleep at once."""
+        """Return whether the window draws no frame for longer than its longest sleep."""
         before = self.milliseconds_of_cpu()
         time.sleep(seconds)
         return self.milliseconds_of_cpu() - before < A_FRAME

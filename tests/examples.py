@@ -1,4 +1,4 @@
-"""Modules are imported as doctests only if they contain examples: one in fifteen does."""
+"""Collection of doctests from the modules that contain examples, which is one in fifteen."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import pytest
 def pytest_collect_file(
     file_path: Path,
 ) -> Generator[None, list[pytest.Collector], list[pytest.Collector]]:
-    """Drop collectors of examples, which pytest makes for every module."""
+    """Drop the doctest collectors of modules without examples."""
     collectors = yield
     if not collectors or b">>> " in file_path.read_bytes():
         return collectors

@@ -12,7 +12,7 @@ from viewer.rig.figure import Figure
 
 
 def family_figure(kind: str, folder: Path, n_vertices: int = 96, **changes) -> Figure:
-    """Return the figure of ``synthetic_smpl.model``; a change of None leaves an array out."""
+    """Return the figure of ``synthetic_smpl.model``; an array set to None is left out."""
     arrays = {**model(kind, n_vertices), **changes}
     path = folder / f"{kind}.npz"
     np.savez(path, **{key: value for key, value in arrays.items() if value is not None})

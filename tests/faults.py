@@ -13,13 +13,13 @@ from viewer.errors import ViewerError
 Fault = tuple[str, int | None, dict[str, Any]]
 
 NAN = pytest.approx(float("nan"), nan_ok=True)
-"""Equals NaN, as values of faults."""
+"""A value that compares equal to NaN, for the values of faults."""
 
 INF = float("inf")
 
 
 def fault_of(found: Diagnostic) -> Fault:
-    """Return the key, line and values of a diagnostic; a diagnostic among these likewise."""
+    """Return the key, line and values of a diagnostic, also of diagnostics among its values."""
     values = {
         name: fault_of(value) if isinstance(value, Diagnostic) else value
         for name, value in found.values.items()

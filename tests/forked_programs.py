@@ -1,7 +1,7 @@
 """Programs forked from a process that has imported the viewer, to save the time of imports.
 
-A forked program starts at its own first line, with default signal handlers, and ends as any program
-does: exit functions run, and the interpreter is torn down.
+A forked program starts at its first line, with default signal handlers, and ends as any program
+does: exit functions run, and the interpreter is shut down.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from pathlib import Path
 from children import listening
 
 ROOT = Path(__file__).resolve().parents[1]
-PATIENCE = 100.0  # seconds after which a program counts as hung
-# All modules that a run imports, except its first one.
+PATIENCE = 100.0  # timeout of a program in seconds
+# All modules that a run imports after its first one.
 IMPORTED = (
     "numpy",
     "moderngl",
@@ -47,7 +47,7 @@ IMPORTED = (
 
 
 class Forker:
-    """The process that forks; it has no threads and no OpenGL context."""
+    """The process that is forked; it has no threads and no OpenGL context."""
 
     def __init__(self) -> None:
         self._connection, other = socket.socketpair()
@@ -57,7 +57,7 @@ class Forker:
                 listening(__file__, other.fileno()),
                 env={**os.environ, "PYTHONPATH": str(ROOT)},
                 pass_fds=[other.fileno()], stdin=subprocess.DEVNULL,
-                # Pipes, as those that forked programs get in their place.
+                # These are pipes because forked programs replace them with their own pipes.
                 stdout=subprocess.PIPE, stderr=subprocess.PIPE,
             )  # fmt: skip
 
@@ -69,7 +69,7 @@ class Forker:
         for _, writing in pipes:
             os.close(writing)
         streams = []
-        for reading, _ in pipes:  # too little to fill a pipe
+        for reading, _ in pipes:  # too short to fill a pipe
             with os.fdopen(reading, "rb") as stream:
                 streams.append(stream.read())
         code = int(self._connection.recv(16) or self._failed())

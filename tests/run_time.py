@@ -1,4 +1,4 @@
-"""Wall time of a run, printed next to its budget, and the tests that took longest.
+"""Wall time of a run, printed next to its budget, and its slowest tests.
 
 ``VIEWER_TEST_BUDGET`` is the budget in seconds; ``make test`` and ``make quick`` set it. A run that
 takes longer does not fail: that would depend on the machine.
@@ -16,7 +16,7 @@ SHOWN = 10
 
 
 class RunTime:
-    """Collects how long each test took, on whichever process."""
+    """Durations of all tests, collected from all processes."""
 
     def __init__(self) -> None:
         self._start = time.monotonic()

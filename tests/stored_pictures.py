@@ -1,4 +1,4 @@
-"""Golden images: their location, and which of them a run re-renders.
+"""Golden images: their location, and the ones that a run re-renders.
 
 ``VIEWER_UPDATE_GOLDEN`` holds their names, or ``all``; ``make golden NAME…`` sets it. Look at every
 re-rendered image before committing it.
@@ -26,7 +26,7 @@ def is_redrawn(name: str) -> bool:
 
 
 def name_of(item: pytest.Item) -> str:
-    """Return the image that a test marked ``golden`` compares; empty for other tests."""
+    """Return the image name of a test marked ``golden``, or an empty name for other tests."""
     mark = item.get_closest_marker("golden")
     if mark is None:
         return ""

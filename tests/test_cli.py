@@ -43,10 +43,10 @@ def _refused(done, code, *words):
     assert all(word in lines[0] for word in words), lines
 
 
-def test_garbage_is_collected_once_the_program_has_started(rig, capsys):
+def test_garbage_collection_is_enabled_once_the_program_has_started(rig, capsys):
     frozen = gc.get_freeze_count()
     assert run(["info", str(rig[0])]) == 0
-    assert gc.get_freeze_count() <= frozen  # nothing was suspended
+    assert gc.get_freeze_count() <= frozen  # collection was not suspended
     gc.disable()
     try:
         assert run(["info", str(rig[0])]) == 0
@@ -97,7 +97,7 @@ def test_usage_error_is_one_line(arguments, capsys, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("words", [["--up", "-z"], ["--up=-z"], ["--up", "-y"]])
-def test_negative_axes_may_follow_a_blank(words, rig, capsys):
+def test_negative_axis_may_follow_a_space(words, rig, capsys):
     assert run(["info", *words, *map(str, rig)]) == 0
     assert capsys.readouterr().err == ""
 
@@ -112,7 +112,7 @@ def test_negative_axes_may_follow_a_blank(words, rig, capsys):
         ("vew", "view"),
     ],
 )
-def test_mistyped_command_suggests_the_nearest(word, meant, capsys, tmp_path, monkeypatch):
+def test_mistyped_command_suggests_the_nearest_name(word, meant, capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for rest in ([], ["x.skel"], ["x.skel", "-o", "y.png"]):
         assert run([word, *rest]) == 2
@@ -120,9 +120,10 @@ def test_mistyped_command_suggests_the_nearest(word, meant, capsys, tmp_path, mo
         assert f'"{word}"; did you mean {meant}?' in said and said.count("\n") == 1
 
 
-def test_non_command_word_is_treated_as_a_file(capsys, tmp_path, monkeypatch):
+def test_word_unlike_any_command_is_treated_as_a_file(capsys, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    # Far from every command, with a suffix, in a folder, or there.
+    # A word unlike any command, with a suffix, or in a folder; the last case below is an existing
+    # file.
     for word in ("walk", "rendr.skel", "./rendr"):
         assert run([word]) == 2
         said = capsys.readouterr().err
@@ -146,13 +147,13 @@ def test_non_command_word_is_treated_as_a_file(capsys, tmp_path, monkeypatch):
         (["doctor", "--hlp"], "--hlp", "--help"),
     ],
 )
-def test_unknown_option_is_reported_first_with_the_nearest(arguments, unknown, meant, capsys):
+def test_unknown_option_is_reported_first_with_the_nearest_name(arguments, unknown, meant, capsys):
     assert run(arguments) == 2
     said = capsys.readouterr().err
     assert f"option {unknown}; did you mean {meant}" in said and "required" not in said
 
 
-def test_unknown_letters_are_refused_and_known_ones_are_not(capsys, rig, tmp_path):
+def test_unknown_short_options_are_refused_and_abbreviations_accepted(capsys, rig, tmp_path):
     assert run(["render", "-x"]) == 2
     assert "unknown option -x (" in capsys.readouterr().err
     picture = str(tmp_path / "x.png")
@@ -170,7 +171,7 @@ def test_unknown_letters_are_refused_and_known_ones_are_not(capsys, rig, tmp_pat
         (["convert", "--as", "gtlf"], "gltf", "gltf"),
     ],
 )
-def test_unknown_value_lists_the_choices_and_the_nearest(arguments, choices, meant, capsys):
+def test_unknown_value_lists_choices_and_suggests_the_nearest(arguments, choices, meant, capsys):
     assert run(arguments) == 2
     said = capsys.readouterr().err
     assert choices in said and f'"{arguments[-1]}"; did you mean {meant}?' in said
@@ -184,7 +185,7 @@ def test_invalid_file_is_one_line_with_its_location(tmp_path):
     assert not (tmp_path / "x.png").exists()
 
 
-def test_missing_gl_is_exit_code_4(rig, tmp_path):
+def test_missing_opengl_is_exit_code_4(rig, tmp_path):
     done = call(
         "render", *rig, "-o", tmp_path / "x.png",
         environment={"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"},
@@ -210,7 +211,7 @@ def test_pipe_closed_before_anything_is_written_is_silent(rig):
     assert process.wait(30) == 0
 
 
-def test_full_output_is_exit_code_5(rig):
+def test_full_disk_is_exit_code_5(rig):
     with Path("/dev/full").open("wb") as full:
         _refused(call("info", *rig, stdout=full), 5, "No space left")
 
@@ -233,8 +234,8 @@ def test_terminal_without_unicode_is_not_an_error(tmp_path):
 @pytest.mark.parametrize(
     ("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)], ids=["term", "int"]
 )
-def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
-    # The program stops itself at the moment when the temporary file is complete.
+def test_signal_while_writing_leaves_no_temporary_file(rig, tmp_path, number, code):
+    # The program signals itself as soon as the temporary file is complete.
     program = (
         "import os, sys, viewer.media.saving, viewer.cli\n"
         f"os.fsync = lambda handle: os.kill(os.getpid(), {int(number)})\n"
@@ -253,7 +254,7 @@ def test_signal_while_writing_leaves_no_file(rig, tmp_path, number, code):
 def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     pipe = tmp_path / "pipe.png"
     os.mkfifo(pipe)
-    # It waits for a reader of the pipe, or is about to.
+    # At this point the program is waiting for a reader of the pipe, or is about to wait.
     program = (
         "import os, sys, threading, viewer.media.saving as save, viewer.cli\n"
         "write = save._write_through\n"
@@ -275,7 +276,7 @@ def test_sigterm_ends_a_waiting_program(rig, tmp_path):
     "name",
     ["with blank", "quo'te\"s", "{x} %s %(a)d", "new\nline", "-1", "umläut", b"un\xffdecodable"],
 )
-def test_unusual_file_names(tmp_path, name):
+def test_unusual_file_names_are_accepted(tmp_path, name):
     folder = os.fsencode(tmp_path)
     path = os.path.join(folder, os.fsencode(name) + b".skel")  # noqa: PTH118
     with open(path, "w") as stream:  # noqa: PTH123
@@ -327,6 +328,6 @@ def test_info_needs_files(capsys):
 
 
 @pytest.mark.parametrize("command", ["diff", "rig"])
-def test_other_commands_that_need_files_name_them(command, capsys):
+def test_other_commands_without_files_name_the_missing_argument(command, capsys):
     assert run([command]) == 2
     assert {"diff": "REFERENCE", "rig": "TARGET"}[command] in capsys.readouterr().err

@@ -18,7 +18,7 @@ def test_every_error_is_a_viewer_error(name):
     assert issubclass(getattr(errors, name), ViewerError)
 
 
-def test_exit_codes_distinguish_input_graphics_and_output():
+def test_exit_codes_distinguish_input_graphics_and_output_errors():
     assert (FormatError.exit_code, RenderError.exit_code, OutputError.exit_code) == (2, 4, 5)
     assert errors.RigError.exit_code == errors.UnsupportedFormatError.exit_code == 2
 
@@ -30,7 +30,7 @@ def test_format_error_begins_with_file_and_line():
     assert str(wrong("a b.skel")) == "a b.skel: positions: expected 3 numbers, found 2"
 
 
-def test_format_error_shows_an_unusual_path_on_one_line():
+def test_format_error_shows_a_path_with_control_characters_on_one_line():
     assert str(wrong("a\nb\udcff\x1b[0m{}%s")).startswith(
         "a\\nb\\udcff\\x1b[0m{}%s: positions: expected"
     )

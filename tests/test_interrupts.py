@@ -1,6 +1,5 @@
-"""Signals at chosen moments: termination, late signals, and leftover files.
-
-Programs signal themselves at the moment that is tested, so nothing depends on how fast they are.
+"""Signals at chosen moments: termination, late signals, and leftover files. Programs signal
+themselves at the tested moment, so no test depends on their speed.
 """
 
 from __future__ import annotations
@@ -30,7 +29,8 @@ INT, TERM = signal.SIGINT, signal.SIGTERM
 ENDINGS = {INT: (130, b"viewer: interrupted\n"), TERM: (143, b"viewer: terminated\n")}
 BOTH = pytest.mark.parametrize("number", [INT, TERM], ids=["int", "term"])
 
-# What a child runs: ``strike()`` signals it, once, at a moment that the test's own lines choose.
+# The program of a child process. ``strike()`` signals it once, at a moment that the test's lines
+# choose.
 PROGRAM = """
 import os, sys
 from viewer.__main__ import main
@@ -114,7 +114,7 @@ def end(tmp_path, forker):
 
 
 def _started(program, arguments, folder):
-    """Run a program in a new interpreter, in which nothing is imported yet."""
+    """Run a program in a new interpreter, in which no module is imported yet."""
     return subprocess.run(
         listening("-c", program, *arguments),
         env={**os.environ, "PYTHONPATH": str(ROOT)},
@@ -169,7 +169,8 @@ def test_signal_while_moderngl_calls_python_does_not_crash(end, number, helper, 
         "import viewer.rendering.recorder as r\nbefore(r._Drawer, 'release')\n"
         "def fail(*_): strike()\nr.pose_scene = fail",
         "import viewer.media.video as v\nafter(v.VideoSink, 'write')",
-        # In the encoder's thread; the handler runs in the main one, which must be scheduled.
+        # The signal arrives in the encoder's thread; the handler runs in the main thread, which
+        # must be scheduled first.
         "import viewer.media.video as v, viewer.interrupts as i\n"
         "old = v.VideoSink.close\n"
         "def close(sink):\n"
@@ -222,7 +223,7 @@ LATE = {
 @BOTH
 @pytest.mark.parametrize("moment", LATE)
 @pytest.mark.parametrize("kind", [PNG, MP4, OBJ], ids=["png", "mp4", "ply"])
-def test_signal_after_the_work_is_done_changes_nothing(end, number, moment, kind, tmp_path):
+def test_signal_after_the_work_is_done_is_ignored(end, number, moment, kind, tmp_path):
     command, places = kind
     lines = LATE[moment].replace("{number}", str(int(number)))
     is_late = moment[:4] in ("exit", "tear")
@@ -234,7 +235,7 @@ def test_signal_after_the_work_is_done_changes_nothing(end, number, moment, kind
             assert picture.size == (40, 30)
 
 
-def test_closed_terminal_ends_a_run_too(end):
+def test_closed_terminal_ends_a_run(end):
     command, places = PNG
     moment = "import viewer.rendering.renderer as m\nbefore(m.Renderer, 'draw')"
     wanted = (129, b"viewer: hung up\n", OLD)
@@ -281,7 +282,7 @@ def test_ignored_signal_stays_ignored(end):
 @pytest.mark.parametrize("arguments", [["--version"], ["info", "/no/such.skel"], ["info", "-?"]])
 def test_handlers_of_the_caller_are_restored(arguments, capsys):
     def mine(number, frame):
-        """Do nothing."""
+        """Ignore the signal."""
 
     kept = {number: signal.signal(number, mine) for number in (INT, TERM)}
     hook = sys.unraisablehook
@@ -303,7 +304,7 @@ def test_run_works_in_another_thread(tmp_path, capsys):
     assert codes == [0] and not capsys.readouterr().err
 
 
-def test_signal_raises_while_watched(ctrl_c):
+def test_signal_raises_inside_watched(ctrl_c):
     reached = []
     with pytest.raises(Interrupted) as stop, watched():
         ctrl_c()
@@ -322,7 +323,7 @@ def test_deferred_signal_raises_at_the_end_of_the_block(ctrl_c):
     assert reached == ["inner"]
 
 
-def test_signal_is_left_to_the_caller_where_nobody_watches(ctrl_c):
+def test_signal_outside_watched_is_left_to_the_caller(ctrl_c):
     reached = []
     with pytest.raises(KeyboardInterrupt):
         with deferred(), deferred():

@@ -111,7 +111,7 @@ def test_skeletons_and_skins_are_paired(files, order, expected):
     assert parts(viewer.load(*files(*order))) == expected
 
 
-def test_skin_of_another_skeleton_is_refused_with_both_names_and_counts(files):
+def test_skin_of_a_different_skeleton_is_refused_with_both_names_and_counts(files):
     skel, skin = files("2.skel", "3.skin")
     expected = f"{skin}: expected 2 bind matrices, one per joint of {skel}, found 3"
     assert refusal(skel, skin) == expected
@@ -126,7 +126,7 @@ def test_unpaired_skin_among_pairs_is_refused(files):
     )
 
 
-def test_skin_without_weights_cannot_follow_a_skeleton(files, tmp_path):
+def test_skin_without_weights_is_refused_with_a_skeleton(files, tmp_path):
     (skel,) = files("2.skel")
     bare = tmp_path / "bare.skin"
     bare.write_text("positions 1 { 0 0 0 } normals 1 { 0 0 1 } triangles 1 { 0 0 0 }")
@@ -138,14 +138,14 @@ def test_skin_without_weights_cannot_follow_a_skeleton(files, tmp_path):
     )
 
 
-def test_real_skin_of_another_skeleton_is_refused(shared):
+def test_real_skin_of_a_different_skeleton_is_refused(shared):
     skel, skin = shared / "test.skel", shared / "wasp.skin"
     assert refusal(skel, skin) == (
         f"{skin}: expected 6 bind matrices, one per joint of {skel}, found 23"
     )
 
 
-# Side by side
+# Placement side by side
 
 
 def spans(scene):
@@ -153,11 +153,11 @@ def spans(scene):
     return [tuple(box[:, 0].tolist()) for box in boxes]
 
 
-def test_one_actor_stays_where_it_is(files):
+def test_single_actor_is_not_moved(files):
     assert spans(viewer.load(*files("2.skin", left=7.0))) == [(7, 8)]
 
 
-def test_actors_are_spaced_a_quarter_of_the_wider_apart(files):
+def test_actors_are_spaced_by_a_quarter_of_the_wider_one(files):
     paths = files("2.skin", left=-5.0, width=4.0) + files("3.skin", left=100.0, width=1.0)
     paths += files("4.skin", left=-9.0, width=8.0)
     # 4 wide, a gap of 1, 1 wide, a gap of 2, 8 wide.
@@ -198,7 +198,7 @@ def test_skeleton_with_a_skin_suffix_opens_with_a_warning(files):
     assert scene.warnings == (f"{wrong}: .skel file with the suffix .skin",)
 
 
-def test_swapped_names_still_pair(files):
+def test_files_with_swapped_suffixes_are_paired(files):
     skel, skin = files("2.skel", "2.skin")
     text = skel.read_text()
     skel.write_text(skin.read_text())
@@ -219,7 +219,7 @@ def test_any_file_name_is_accepted(files, name):
     assert viewer.load(other).warnings == ()
 
 
-def test_5_million_blank_lines_before_a_skeleton_load(tmp_path):
+def test_5_million_blank_lines_before_a_skeleton_are_accepted(tmp_path):
     path = tmp_path / "a.skel"
     path.write_bytes(b"\n" * 5_000_000 + b"balljoint a { }")
     assert parts(viewer.load(path)) == [("a", 1, None)]
@@ -270,18 +270,18 @@ def test_folder_is_refused(tmp_path):
     assert refusal("") == f".: {wanted}"
 
 
-def test_file_as_a_folder_is_refused(files):
+def test_path_through_a_file_is_refused(files):
     (skel,) = files("2.skel")
     assert refusal(skel / "a.skel") == f"{skel}/a.skel: cannot be read: Not a directory"
 
 
-def test_pipe_is_refused_at_once(tmp_path):
+def test_pipe_is_refused_without_reading(tmp_path):
     path = tmp_path / "pipe.skel"
     os.mkfifo(path)
     assert refusal(path) == f"{path}: expected a file, found a pipe"
 
 
-def test_device_is_refused_at_once():
+def test_device_is_refused_without_reading():
     assert refusal("/dev/zero") == "/dev/zero: expected a file, found a device"
 
 
@@ -294,7 +294,7 @@ def test_socket_is_refused(tmp_path, monkeypatch):
         assert refusal("s.skel") == "s.skel: expected a file, found a socket"
 
 
-def test_link_is_followed_and_a_broken_one_named(files, tmp_path):
+def test_link_is_followed_and_broken_link_is_named(files, tmp_path):
     (skel,) = files("2.skel")
     link = tmp_path / "link.skel"
     link.symlink_to(skel)
@@ -312,7 +312,7 @@ def test_circular_link_is_refused(tmp_path):
 def test_unreadable_file_is_refused(files, monkeypatch):
     (skel,) = files("2.skel")
     skel.chmod(0)
-    if os.access(skel, os.R_OK):  # root reads everything
+    if os.access(skel, os.R_OK):  # root may read every file
 
         def refuse(path, mode):
             raise PermissionError(13, "Permission denied")
@@ -322,7 +322,7 @@ def test_unreadable_file_is_refused(files, monkeypatch):
 
 
 def test_invalid_name_is_refused(tmp_path):
-    # Newer Pythons name the call that found it as well.
+    # Newer Python versions also name the call that failed.
     assert refusal("a\0b.skel").startswith("a\\x00b.skel: cannot be read: ")
     long = "x" * 300 + ".skel"
     assert refusal(long) == f"{'x' * 299}…: cannot be read: File name too long"
@@ -358,7 +358,7 @@ def test_size_cap_can_be_set(files):
     )
 
 
-def test_one_bad_file_among_good_ones_is_named(files, tmp_path):
+def test_one_invalid_file_among_valid_ones_is_named(files, tmp_path):
     bad = tmp_path / "bad.skel"
     bad.write_text("balljoint a {\n\noffset up }")
     assert refusal(*files("2.skel", "2.skin"), bad) == (
@@ -366,7 +366,7 @@ def test_one_bad_file_among_good_ones_is_named(files, tmp_path):
     )
 
 
-def test_warnings_of_all_files_are_gathered(files, tmp_path):
+def test_warnings_of_all_files_are_collected(files, tmp_path):
     first, second = tmp_path / "a.skel", tmp_path / "b.skel"
     first.write_text("balljoint a { foo }")
     second.write_text("balljoint b {\nbar }")
@@ -379,9 +379,9 @@ def test_warnings_of_all_files_are_gathered(files, tmp_path):
 # The bundled figure
 
 
-def test_no_files_open_the_bundled_figure():
+def test_load_without_files_opens_the_bundled_figure():
     if not all(path.exists() for path in bundled_files()):
-        pytest.skip("the bundled figure is not there yet")
+        pytest.skip("the bundled figure does not exist yet")
     scene = viewer.load()
     assert len(scene.actors) == 1
     assert scene.warnings == ()

@@ -22,7 +22,7 @@ GUESS = "centimetres assumed (skeleton 170 high)"
 
 @pytest.fixture
 def bvh(tmp_path):
-    """Return a file of a person in some unit."""
+    """Write a BVH file of a person in the given unit and return its path."""
 
     def write(scale=100.0, name="walk.bvh", text=None):
         path = tmp_path / name
@@ -33,7 +33,7 @@ def bvh(tmp_path):
 
 
 def places(actor, time=0.1):
-    """Return the joints at some time, by the names of the file."""
+    """Return the joint positions at some time, keyed by the names in the file."""
     pose_actor(actor, time)
     found = viewer.joint_matrices(actor.figure, actor.pose)[:, :3, 3]
     return [found[actor.figure.skeleton.names.index(name)] for name in PERSON_JOINTS]
@@ -60,13 +60,13 @@ def test_bvh_with_a_body_is_scaled_to_metres(bvh):
     assert_allclose(places(skeleton), PERSON_TURNED, rtol=0, atol=1e-12)
     facts = dict(skeleton.figure.facts)
     assert facts["unit"] == "cm, estimated from the skeleton's size of 170; scaled to metres"
-    # Common units: the box is as high as the people, who stand next to each other.
+    # In common units the box is as high as the people, who stand next to each other.
     width, height, _ = np.ptp(scene_box(scene), axis=0)
     assert 1.7 < height < 2.5 and width < 4.0
 
 
 @pytest.mark.parametrize(("scale", "word"), [(100, "centimetres"), (1000, "millimetres")])
-def test_bvh_with_figures_that_look_like_metres(bvh, scale, word):
+def test_bvh_is_scaled_to_match_figures_of_metre_size(bvh, scale, word):
     fox = viewer.loading.bundled_files()
     scene = load(*fox, bvh(scale))
     assert [actor.figure.name for actor in scene.actors] == ["fox", "walk"]
@@ -75,7 +75,7 @@ def test_bvh_with_figures_that_look_like_metres(bvh, scale, word):
     assert_allclose(places(scene.actors[1]), PERSON_TURNED, rtol=0, atol=1e-12)
 
 
-def test_bvh_with_figures_of_unknown_unit_and_other_size_is_unscaled(bvh, tmp_path):
+def test_bvh_with_figures_of_unknown_unit_and_different_size_is_unscaled(bvh, tmp_path):
     giant = tmp_path / "giant.obj.skel"
     giant.write_text("balljoint root { offset 0 0 0 balljoint tip { offset 0 20 0 } }")
     scene = load(giant, bvh())
@@ -93,7 +93,7 @@ def test_two_bvh_files_are_scaled_only_if_their_units_differ(bvh):
             assert_allclose(places(actor), PERSON_TURNED, rtol=0, atol=1e-12)
 
 
-def test_bvh_with_captured_keypoints(bvh, tmp_path):
+def test_bvh_is_scaled_to_match_captured_keypoints(bvh, tmp_path):
     folder = tmp_path / "out" / "keypoints3d"
     folder.mkdir(parents=True)
     points = [[0.1 * k, 0.0, 0.05 * k, 1.0] for k in range(25)]
@@ -113,15 +113,17 @@ def test_unknown_units_are_never_scaled(bvh):
 @pytest.mark.parametrize(
     ("unit", "scale"), [("m", 1), ("cm", 100), ("mm", 1000), ("in", 1 / 0.0254)]
 )
-def test_a_requested_unit_is_not_guessed(bvh, unit, scale):
+def test_requested_unit_is_used_without_a_guess(bvh, unit, scale):
     scene = load(bvh(scale), motion=MotionSettings(unit=unit))
     assert units(scene) == ["m"] and scene.warnings == ()
-    assert_allclose(places(scene.actors[0]), PERSON_TURNED, rtol=0, atol=1e-7)  # six decimals
+    assert_allclose(
+        places(scene.actors[0]), PERSON_TURNED, rtol=0, atol=1e-7
+    )  # The file has six decimals.
     fact = dict(scene.actors[0].figure.facts)["unit"]
     assert fact == f"{unit} in the file, as requested" + "; scaled to metres" * (unit != "m")
 
 
-def test_a_requested_up_axis_is_not_guessed(bvh):
+def test_requested_up_axis_is_used_without_a_guess(bvh):
     text = person(1.0).replace("0.000000 -0.050000 0.000000", "0.000000 0.000000 -0.050000")
     for number in ("-0.400000", "-0.450000", "0.600000", "0.200000"):
         text = text.replace(f"0.000000 {number} 0.000000", f"0.000000 0.000000 {number}")
@@ -132,7 +134,7 @@ def test_a_requested_up_axis_is_not_guessed(bvh):
     assert asked.up == "z" and asked.warnings == ()
 
 
-def test_bvh_drives_the_model(bvh):
+def test_bvh_drives_the_body_model(bvh):
     path = bvh()
     named = load(path, motion=MotionSettings(model=bundled_body()))
     among = load(path, bundled_body())
@@ -143,7 +145,7 @@ def test_bvh_drives_the_model(bvh):
     one, other = named.actors[0].clip, among.actors[0].clip
     assert np.array_equal(one.rotations, other.rotations)
     assert np.array_equal(one.figure_translations, other.figure_translations)
-    # In the second frame it lies: left and right hip are one above the other.
+    # In the second frame the body lies on its side, with one hip above the other.
     hips = places(named.actors[0])[1], places(named.actors[0])[3]
     along = (hips[0] - hips[1]) / np.linalg.norm(hips[0] - hips[1])
     assert along[1] > 0.99
@@ -155,7 +157,7 @@ def test_every_motion_drives_a_separate_model(bvh):
     assert first.figure is second.figure and (first.clip.name, second.clip.name) == ("walk", "b")
 
 
-def test_a_model_together_with_other_figures(bvh):
+def test_model_opens_together_with_other_figures(bvh):
     scene = load(
         *viewer.loading.bundled_files(), bvh(), motion=MotionSettings(model=bundled_body())
     )
@@ -163,7 +165,7 @@ def test_a_model_together_with_other_figures(bvh):
     assert scene.actors[0].clip is None and scene.actors[1].clip is not None
 
 
-def test_a_model_that_does_not_fit_is_refused(bvh, tmp_path):
+def test_model_without_matching_joints_is_refused(bvh, tmp_path):
     snake = "HIERARCHY ROOT a { OFFSET 0 0 0 CHANNELS 1 Xrotation End Site { OFFSET 0 1.7 0 } }"
     path = bvh(text=f"{snake} MOTION Frames: 1 Frame Time: 0.1\n0\n")
     with pytest.raises(RigError) as caught:
@@ -176,7 +178,7 @@ def test_a_model_that_does_not_fit_is_refused(bvh, tmp_path):
     assert str(wrong.value) == f"{path}: --model: not a body model"
 
 
-def test_option_beside_skips_the_model_with_a_note(bvh):
+def test_option_beside_ignores_the_model_with_a_note(bvh):
     path = bvh()
     scene = load(path, motion=MotionSettings(model=bundled_body(), drives=False))
     assert units(scene) == ["cm"]
@@ -202,7 +204,7 @@ def test_figures_driven_by_an_upside_down_world_are_upright(bvh, named):
     assert joints[names.index("head"), 1] > joints[names.index("left_knee"), 1] + 0.5
 
 
-def test_a_body_written_as_bvh_round_trips_on_its_model(tmp_path):
+def test_body_written_as_bvh_round_trips_on_its_model(tmp_path):
     from viewer.cli import run
 
     smpl = tmp_path / "SMPL.npz"

@@ -41,7 +41,7 @@ def hero(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def capture(tmp_path_factory):
-    """A folder of two people who stand along z."""
+    """A folder of captured frames of two people whose up axis is z."""
     folder = tmp_path_factory.mktemp("take") / "take"
     upright = {"Rh": [[np.pi / 2, 0.0, 0.0]]}
     frames = {
@@ -91,7 +91,7 @@ def test_captured_people_are_shown_as_the_character(capture, hero, is_named):
             assert_allclose(found, directions(before, time, NAMES), rtol=0, atol=1e-6)
 
 
-def test_the_path_of_a_capture_is_scaled_in_its_own_world(capture, hero):
+def test_root_translation_of_a_capture_is_scaled_by_the_ratio_of_leg_lengths(capture, hero):
     actors = [load(capture).actors[0], load(capture, hero).actors[0]]
     moves = []
     for actor in actors:
@@ -107,7 +107,7 @@ def test_the_path_of_a_capture_is_scaled_in_its_own_world(capture, hero):
     assert_allclose(moves[1], factor * moves[0], rtol=0, atol=1e-9)
 
 
-def test_amass_moves_the_figure_of_the_model_option(amass, hero):
+def test_amass_motion_drives_the_figure_of_the_model_option(amass, hero):
     (plain,) = load(amass).actors
     (found,) = load(amass, motion=MotionSettings(model=hero)).actors
     assert found.figure.name == "hero" and found.title == "walk"
@@ -115,7 +115,7 @@ def test_amass_moves_the_figure_of_the_model_option(amass, hero):
 
 
 @pytest.mark.parametrize("is_named", [True, False])
-def test_a_joint_map_applies_to_all_people_of_a_capture(capture, hero, is_named, tmp_path):
+def test_joint_map_applies_to_all_people_of_a_capture(capture, hero, is_named, tmp_path):
     files = [capture] if is_named else [capture, hero]
     settings = MotionSettings(model=hero if is_named else None)
     (own, _) = load(*files, motion=settings).actors
@@ -134,7 +134,7 @@ def test_a_joint_map_applies_to_all_people_of_a_capture(capture, hero, is_named,
 
 
 @pytest.mark.parametrize("feet", [True, False])
-def test_whole_captures_are_retargeted_once_and_growing_ones_part_by_part(
+def test_whole_captures_are_retargeted_once_and_growing_ones_in_parts(
     capture, hero, feet, monkeypatch
 ):
     calls = []
@@ -146,7 +146,7 @@ def test_whole_captures_are_retargeted_once_and_growing_ones_part_by_part(
     monkeypatch.setattr(capturing, "driven_clip", counted)
     settings = MotionSettings(model=hero, feet=feet)
     whole = load(capture, motion=settings).actors
-    # The first frame of both people, to show something, then all frames.
+    # The first frame of both people is retargeted for an early display, then all frames.
     assert calls == [1, 1, 4, 4]
     calls.clear()
     scene, (builder,) = begin(read_files([capture], settings=settings), settings)
@@ -160,9 +160,9 @@ def test_whole_captures_are_retargeted_once_and_growing_ones_part_by_part(
 
 
 @pytest.mark.parametrize("is_named", [True, False])
-def test_fingers_that_the_body_lacks_are_a_note(is_named, hero, tmp_path):
+def test_finger_joints_missing_in_the_body_are_reported_in_a_note(is_named, hero, tmp_path):
     poses = np.zeros((2, 156))
-    poses[:, 66:69] = 0.3  # left_index1: the hands follow 22 joints
+    poses[:, 66:69] = 0.3  # left_index1: the hands follow the 22 body joints
     np.savez(tmp_path / "hand.npz", poses=poses, trans=np.zeros((2, 3)), mocap_framerate=30.0)
     paths = (tmp_path / "hand.npz", *(() if is_named else (hero,)))
     scene = load(*paths, motion=MotionSettings(model=hero if is_named else None))
@@ -171,7 +171,7 @@ def test_fingers_that_the_body_lacks_are_a_note(is_named, hero, tmp_path):
     assert [note.values["names"] for note in notes] == [["left_index1"]]
 
 
-def test_gravity_points_down_in_the_world_of_the_motion(amass, hero):
+def test_gravity_points_along_the_down_axis_of_the_motion(amass, hero):
     (found,) = load(amass, motion=MotionSettings(model=hero, springs=True)).actors
     skeleton = found.springs.skeleton_of(found.figure)
     assert_allclose(skeleton.springs.gravities, [[0, 0, -0.6]] * 3, rtol=0, atol=1e-12)
@@ -179,7 +179,7 @@ def test_gravity_points_down_in_the_world_of_the_motion(amass, hero):
     assert still.springs.skeleton_of(still.figure) is still.figure.skeleton
 
 
-def test_a_model_that_is_no_humanoid_is_refused(capture, tmp_path):
+def test_non_humanoid_model_is_refused(capture, tmp_path):
     path = tmp_path / "box.skel"
     path.write_text("balljoint root { balljoint tip { offset 0 1 0 } }")
     (tmp_path / "box.skin").write_text(
@@ -193,7 +193,7 @@ def test_a_model_that_is_no_humanoid_is_refused(capture, tmp_path):
         load(capture, motion=MotionSettings(model=out))
 
 
-def test_an_animation_of_another_figure_moves_a_character(hero, tmp_path):
+def test_animation_of_another_figure_drives_a_character(hero, tmp_path):
     dancer = tmp_path / "dancer.vrm"
     dancer.write_bytes(swinging().glb())
     (found,) = load(hero, motion=MotionSettings(motions=(dancer,), animation="turn")).actors
@@ -205,7 +205,7 @@ def test_an_animation_of_another_figure_moves_a_character(hero, tmp_path):
         load(hero, motion=MotionSettings(motions=(dancer,), animation="jump"))
 
 
-def test_a_skeleton_with_animations_moves_a_character_beside_it(hero, tmp_path):
+def test_skeleton_with_animations_drives_a_character_opened_with_it(hero, tmp_path):
     file = swinging()
     file.root["nodes"] = file.root["nodes"][:-2]
     del file.root["meshes"], file.root["materials"], file.root["extensions"]["VRMC_springBone"]
@@ -222,7 +222,7 @@ def test_a_skeleton_with_animations_moves_a_character_beside_it(hero, tmp_path):
     assert beside[1].clip is None
 
 
-def test_a_file_without_motion_is_refused(hero, capsys):
+def test_file_without_motion_is_refused(hero, capsys):
     assert run(["info", str(hero)]) == 0
     capsys.readouterr()
     out = str(hero.with_suffix(".png"))

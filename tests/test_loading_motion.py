@@ -150,19 +150,19 @@ def test_people_without_shapes_are_reported_once(tmp_path, smpl):
     assert text not in load(tmp_path / "output", smpl).warnings
 
 
-def test_frame_rate_is_as_requested(recording, smpl):
+def test_requested_frame_rate_is_used(recording, smpl):
     scene = load(recording, smpl, motion=MotionSettings(frame_rate=50.0))
     assert scene.actors[0].clip.end == pytest.approx(3 / 50)
 
 
-def test_up_axis_is_as_requested(recording, smpl):
+def test_requested_up_axis_is_used(recording, smpl):
     assert load(recording, smpl, motion=MotionSettings(up="y")).up == "y"
     turned = load(recording, smpl, motion=MotionSettings(up="-y"))
     assert turned.up == "y"
     assert_allclose(turned.actors[1].placement[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-15)
 
 
-def test_hands_alone_need_their_model(tmp_path):
+def test_hands_alone_require_a_hand_model(tmp_path):
     folder = tmp_path / "smpl"
     folder.mkdir()
     record = person(0, 0.0) | {"poses": [[0.0] * 9]}
@@ -171,7 +171,7 @@ def test_hands_alone_need_their_model(tmp_path):
         load(folder)
 
 
-def test_bvh_drives_a_body_or_is_shown_alone(tmp_path):
+def test_bvh_drives_a_body_or_is_shown_as_a_skeleton(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     alone = load(path)
@@ -189,7 +189,7 @@ def test_bvh_drives_a_body_or_is_shown_alone(tmp_path):
     assert len(beside.actors) == 2
 
 
-def test_bvh_that_drives_nothing_is_a_separate_actor(tmp_path):
+def test_bvh_that_drives_no_model_is_a_separate_actor(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     scene = load(path, *write_rig(tmp_path))
@@ -201,7 +201,7 @@ def test_bvh_that_drives_nothing_is_a_separate_actor(tmp_path):
     )
 
 
-def test_bvh_unit_rate_and_up_are_as_requested(tmp_path):
+def test_requested_unit_rate_and_up_axis_of_a_bvh_are_used(tmp_path):
     path = tmp_path / "legs.bvh"
     path.write_text(BVH)
     scene = load(path, motion=MotionSettings(unit="cm", frame_rate=20.0, up="z"))
@@ -215,7 +215,7 @@ def morph_text():
     return "positions 1 { 0 5 6 7 } normals 1 { 0 0 0 1 }"
 
 
-def test_morph_joins_its_skin_with_or_without_a_skeleton(tmp_path):
+def test_morph_is_added_to_its_skin_with_or_without_a_skeleton(tmp_path):
     skel, skin = write_rig(tmp_path)
     morph = tmp_path / "smile.morph"
     morph.write_text(morph_text())
@@ -256,7 +256,7 @@ def test_rig_file_opens_its_files_even_with_cycles(tmp_path):
     assert only.figure.skeleton is None
 
 
-def test_clip_fits_skel_rigs_only(tmp_path, smpl):
+def test_anim_clip_is_accepted_for_skel_rigs_only(tmp_path, smpl):
     # An SMPL body has 72 DOFs, as a .skel-style rig of 23 joints, with different meanings.
     channel = " channel { extrapolate constant constant keys 1 { 0 0 flat flat } }"
     path = tmp_path / "walk.anim"

@@ -10,7 +10,7 @@ from viewer.near_names import did_you_mean, name_hint, near_names
     [
         ("rendr", ["view", "render", "rig"], ["render"]),
         ("LEFT_KNEE", ["left_knee", "head"], ["left_knee"]),
-        ("knee", ["hip", "L_Knee", "R_Knee"], ["L_Knee", "R_Knee"]),  # a part of both
+        ("knee", ["hip", "L_Knee", "R_Knee"], ["L_Knee", "R_Knee"]),  # contained in both names
         ("left_kneee", ["right_knee", "left_knee"], ["left_knee"]),  # by far the nearest
         ("tail", ["hip", "knee"], []),
         ("", ["hip", ""], []),
@@ -19,11 +19,11 @@ from viewer.near_names import did_you_mean, name_hint, near_names
         ("a1", [f"a{i}" for i in range(2, 20)], ["a10", "a11", "a12", "a13", "a14"]),
     ],
 )
-def test_near_names(text, names, near):
+def test_near_names_are_found(text, names, near):
     assert near_names(text, names) == near
 
 
-def test_suggestions_offer_one_or_several():
+def test_suggestions_list_one_or_several_names():
     assert did_you_mean("rendr", ["render"]) == "did you mean render?"
     assert did_you_mean("ab", ["abx", "aby", "abz"]) == "did you mean abx, aby or abz?"
     assert did_you_mean("tail", ["hip"]) == ""

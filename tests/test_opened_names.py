@@ -41,7 +41,7 @@ Frame Time: 0.1
 
 
 def names(*paths, **settings):
-    """Return what the actors of files are called, and their scene."""
+    """Return the names of the actors of files and the name of their scene."""
     scene = load(*paths, motion=MotionSettings(**settings))
     return [actor.name for actor in scene.actors], scene.title
 
@@ -78,7 +78,7 @@ def test_people_in_a_recording_are_named_after_it(seq):
     assert names(seq / "keypoints3d") == (people[2:], "seq_smpl")
 
 
-def test_generic_folder_name_falls_back_to_the_opened_folder(seq, monkeypatch):
+def test_generic_folder_name_is_replaced_by_the_parent_folder(seq, monkeypatch):
     monkeypatch.chdir(seq / "smpl")
     assert names(".")[1] == names("../smpl")[1] == names("..")[1] == "seq_smpl"
 
@@ -92,7 +92,7 @@ def test_body_motions_are_named_after_their_file_whatever_the_model(walk, tmp_pa
     assert names(walk) == (["walk"], "walk")
     (tmp_path / "jump.bvh").write_text(BVH)
     driven = load(bundled_body_path(), tmp_path / "jump.bvh")
-    assert [actor.name for actor in driven.actors] == ["body"]  # that figure was opened
+    assert [actor.name for actor in driven.actors] == ["body"]  # the body itself was opened
     named = names(tmp_path / "jump.bvh", model=bundled_body_path())
     assert named == (["jump"], "jump")
     assert names(tmp_path / "jump.bvh") == (["jump"], "jump")

@@ -27,7 +27,7 @@ __all__ = [
     "ViewerError",
 ]
 
-_LONGEST = 1000  # characters of a message with names in it
+_LONGEST = 1000  # maximum length of a message that contains names, characters
 
 
 class ViewerError(Exception):

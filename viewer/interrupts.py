@@ -14,7 +14,7 @@ while pure Python or numpy code runs::
             write(file)
 
 A signal after the last ``poll`` is too late: the work is done, and the result is success. A second
-signal, a second or more after the first, ends a program that does not respond.
+signal at least a second after the first ends a program that does not respond.
 
 Work on many items can end gracefully: within ``postponed``, the first signal only sets a flag, so
 that the running items are finished, and the second one raises as described.
@@ -60,7 +60,7 @@ _PAUSE = 0.02  # seconds before raising is attempted again
 
 
 class Interrupted(BaseException):
-    """A signal ends the run. Not an ``Exception``, so that no handler mistakes it for an error.
+    """A signal that ends the run; not an ``Exception``, so that no handler treats it as an error.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def watched() -> Iterator[None]:
         watch.start()
         yield
     finally:
-        watch.is_held = True  # before anything is called: handlers may run at any call
+        watch.is_held = True  # set before any call: handlers may run during each
         watch.stop()
         _current = None
 
@@ -244,7 +244,7 @@ def raising() -> Iterator[None]:
 class Postponed:
     """The signals received in a ``postponed`` block.
 
-    ``number``: that of the first signal; 0 if there was none.
+    ``number``: number of the first signal; 0 if there was none.
     """
 
     def __init__(self) -> None:
@@ -276,7 +276,7 @@ class Postponed:
 
 @contextmanager
 def postponed() -> Iterator[Postponed]:
-    """Record the first signal in the block; one that follows a second or more later acts as before.
+    """Record the first signal in the block; one that follows at least a second later acts as usual.
 
     Outside the main thread, no signal is received.
     """

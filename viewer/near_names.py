@@ -9,14 +9,14 @@ from viewer.phrases import printable
 __all__ = ["did_you_mean", "name_hint", "near_names", "question"]
 
 _MOST_NEAR = 5
-_MOST_LISTED = 20  # lists up to this length are shown whole
-_BEGINNING = 6  # names of a longer list
+_MOST_LISTED = 20  # lists of at most this length are shown completely
+_BEGINNING = 6  # number of names shown of a longer list
 _MARGIN = 0.15  # maximum difference from the best similarity ratio; other names are unlikely
-_LONGEST = 80  # characters of a name
+_LONGEST = 80  # maximum length of a name in characters
 
 
 def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]:
-    """Return the names that resemble a text, the most likely first.
+    """Return the names that resemble the given text, the most likely first.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Progress reports from functions that take long to receivers such as a progress bar."""
+"""Progress reports from slow functions to receivers such as a progress bar."""
 
 from __future__ import annotations
 

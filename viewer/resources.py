@@ -26,7 +26,7 @@ def resource(kind: str, *parts: str) -> Path:
     ViewerError
         If it is missing from the installation.
     """
-    # A wheel puts the folders inside the package; a checkout has them beside it.
+    # The folders are inside the package in a wheel, and next to it in a checkout.
     for base in (_PACKAGE, _PACKAGE.parent):
         path = base.joinpath(kind, *parts)
         if path.exists():

@@ -16,7 +16,7 @@ from viewer.phrases import printable
 __all__ = ["is_stdout", "require_stdout", "standard_streams", "summary_stream", "write_stdout"]
 
 _STDOUT = ("/dev/stdout", "/dev/fd/1", "/proc/self/fd/1")
-_MOST_LINKS = 40  # limit of the Linux kernel
+_MOST_LINKS = 40  # the limit of the Linux kernel
 
 
 def is_stdout(path: str | Path) -> bool:
@@ -115,7 +115,7 @@ class _Messages(io.TextIOBase):
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text, or drop it if that fails."""
+        """Write text, or drop it if that fails."""
         try:
             self._stream.write(text)
         except (OSError, ValueError):
@@ -139,7 +139,7 @@ class _Messages(io.TextIOBase):
 
     def _lose(self) -> None:
         # Python would report text that is still buffered when it exits.
-        with contextlib.suppress(OSError, ValueError):  # no file, as in tests
+        with contextlib.suppress(OSError, ValueError):  # not a real file, as in tests
             null = os.open(os.devnull, os.O_WRONLY)
             os.dup2(null, self._stream.fileno())
             os.close(null)

@@ -12,7 +12,7 @@ Triple = tuple[float, float, float]
 class Bulge:
     """Displacement of the skin around a point when a joint bends, in metres, at a 90 degree bend.
 
-    It grows with 1 - cos of the angle, but only if the bend about ``about`` is positive.
+    It grows with 1 - cos of the angle if the bend about ``about`` is positive; otherwise it is 0.
     """
 
     place: Triple
@@ -37,7 +37,7 @@ class Bend:
         Radius in metres around the joint within which the skin is corrected.
     fold : (2,)
         On the inner side of the bend: fraction of the distance to the bone that is preserved, and
-        strength with which flesh is kept on its own side.
+        strength with which flesh stays on its side of the bend.
     smooth : float
         Amount of smoothing of the bend.
     """

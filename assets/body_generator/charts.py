@@ -15,10 +15,11 @@ from scipy.sparse import csr_matrix, eye
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu, spsolve
 
-ROUNDS = 12  # iterations of relaxing a chart
+ROUNDS = 12  # iterations of the relaxation of a chart
 MARGIN = 0.006  # margin around each chart, as a fraction of the square
-SMOOTHING = 8  # smoothing iterations of the values that decide between front and back
-NECK, SHOULDER, WRIST, CROTCH, SOLE = 1.490, 0.200, 0.700, 0.800, 0.030  # metres; ends of charts
+SMOOTHING = 8  # smoothing iterations of the values that distinguish front and back
+# Coordinates at which charts end, metres.
+NECK, SHOULDER, WRIST, CROTCH, SOLE = 1.490, 0.200, 0.700, 0.800, 0.030
 
 # Trunk front, back; arm below, above; hand below, above; sole; head; leg front, back: vertical axis
 # and magnification of each chart.
@@ -50,7 +51,7 @@ def _labels(vertices: Floats, triangles: np.ndarray) -> np.ndarray:
 
 
 def _without_spikes(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Assign triangles that have two edges in common with another chart to that chart."""
+    """Assign triangles that share two edges with another chart to that chart."""
     edges = find_edges(triangles)
     pairs = edges.faces[edges.faces[:, 1] >= 0]
     charts = label.max() + 1
@@ -63,7 +64,7 @@ def _without_spikes(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
 
 
 def _joined(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
-    """Assign all but the largest piece of each chart to the chart with the most common edges."""
+    """Assign all but the largest piece of each chart to the chart with most shared edges."""
     edges = find_edges(triangles)
     pairs = edges.faces[edges.faces[:, 1] >= 0]
     for _ in range(20):
@@ -82,7 +83,7 @@ def _joined(triangles: np.ndarray, label: np.ndarray) -> np.ndarray:
             touching = piece[pairs] == stray
             other = pairs[touching.sum(axis=1) == 1][~touching[touching.sum(axis=1) == 1]]
             label[piece == stray] = np.bincount(label[other]).argmax()
-    raise ValueError("charts do not settle")
+    raise ValueError("the charts do not converge")
 
 
 def _rim(triangles: np.ndarray) -> np.ndarray:

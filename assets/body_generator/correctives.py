@@ -17,14 +17,14 @@ from .anatomy import Bend, Bulge, bend_of, samples
 from .joints import CENTRES, NAMES, PARENTS, PARTNERS, index
 from .pose import rotation, skin, world
 
-SAMPLES = 24  # random rotations per joint, in addition to those about single axes
+SAMPLES = 24  # number of random rotations per joint, in addition to those about single axes
 RIDGE = 0.05
-ROUNDS = 3  # rounds of correction and smoothing
-SMOOTHING = 3  # smoothing iterations per round
+ROUNDS = 3  # iterations of correction and smoothing
+SMOOTHING = 3  # smoothing passes per iteration
 LEAST = 3e-4  # metres; smaller corrections are dropped
 MUSH_PASSES = 12  # iterations of smoothing a bend
 RESTORE = 0.85  # fraction of the lost distance to the bone that is restored
-DEEPEST = 0.05  # metres; length limit of corrections
+DEEPEST = 0.05  # metres; maximum length of corrections
 STRAIGHT = 0.2  # minimum length of the sum of two unit vectors at a joint that has a fold
 
 
@@ -66,7 +66,7 @@ def _subtree(j: int) -> np.ndarray:
 
 
 def _influence(body: Body, bend: Bend, j: int) -> Floats:
-    """Return 0..1 (V,): near the joint and moved by it or its parent."""
+    """Return 0..1 (V,): 1 near the joint where its weights blend with its parent's."""
     far = np.linalg.norm(body.vertices - CENTRES[j], axis=1) / bend.reach
     share = body.weights[:, _subtree(j)].sum(axis=1)
     mixed = np.clip(12 * share * (1 - share), 0, 1)

@@ -9,7 +9,7 @@ from .loft import Part, ball, loft, placed, turn
 
 WRIST = (0.690, 1.372, -0.019)
 ANKLE = (0.108, 0.0, -0.036)
-TOE_OUT = 7.0  # degrees
+TOE_OUT = 7.0  # degrees by which the foot points outwards
 # x, y, z of each finger's knuckle, two middle joints and tip.
 FINGERS = (
     ((86, 1, 29.5), (126, -3, 36.5), (151, -10, 40.5), (172, -19, 43)),
@@ -18,8 +18,8 @@ FINGERS = (
     ((79, -1, -29), (110, -7, -37), (129, -13, -41.5), (147, -20, -45)),
 )
 THICKNESS = (9.4, 9.6, 9.2, 8.1)  # radius of each finger at the knuckle
-TAPER = (0.96, 0.88, 0.76)  # radii at the further joints and the tip, relative to the knuckle's
-MILLIMETRE = 1e-3  # metres; the fingers' tables are in millimetres
+TAPER = (0.96, 0.88, 0.76)  # radii at the other joints and the tip, relative to that at the knuckle
+MILLIMETRE = 1e-3  # metres; the tables of the fingers are in millimetres
 
 
 def _finger(joints: Floats, radius: float) -> list[Part]:

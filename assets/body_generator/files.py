@@ -11,7 +11,7 @@ from .shape import DIRECTIONS
 PLACE = 1e-5  # metres; rounding step of the template
 SHAPE_LEVELS = 2.0**15  # rounding steps per metre of the shape directions
 POSE_LEVELS = 2.0**13  # rounding steps per metre of the pose directions
-FEWEST = 2  # pose directions with fewer steps are dropped
+FEWEST = 2  # minimum number of steps of a pose direction; smaller ones are dropped
 TEXCOORD_LEVELS = 2.0**14
 
 
@@ -26,7 +26,7 @@ def rounded_shapes(directions: Floats) -> np.ndarray:
 
 
 def rounded_poses(columns: Floats) -> np.ndarray:
-    """Round pose directions to multiples of their step and drop the smallest."""
+    """Round pose directions to multiples of their step and drop those below the minimum."""
     steps = np.round(columns * POSE_LEVELS)
     steps[np.abs(steps) < FEWEST] = 0
     return (steps / POSE_LEVELS).astype(np.float16)

@@ -47,7 +47,7 @@ def _other(name: str) -> str:
     return f"{swapped[side]}_{rest}" if side in swapped else name
 
 
-# Each joint's mirror counterpart; a middle joint is its own.
+# Mirror counterpart of each joint, which is the joint itself for joints in the middle.
 PARTNERS = np.array([NAMES.index(_other(name)) for name in NAMES])
 
 

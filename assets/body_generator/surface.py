@@ -9,7 +9,7 @@ from generator_tools.surface import graded_length, mirror
 from .figure import distance, project
 
 STEPS = (0.0056, 0.0026)  # metres between grid planes, coarse and fine
-LARGEST = 0.0245  # metres; edge length on the trunk and thighs
+LARGEST = 0.0245  # metres; maximum edge length, on the trunk and thighs
 GROWTH = 0.20  # metres of edge length per metre from the nearest detail
 # Centre, radius and edge length of balls with finer triangles.
 DETAILS = (

@@ -2,7 +2,7 @@
 
 The total weight of a joint and all joints below it is its parent's total times a step along a
 direction through the joint, so the totals are nested and the weights sum to 1. Heat diffusion over
-the surface then smooths them without crossing gaps, as between the legs or the fingers.
+the surface then smooths them without crossing gaps, such as those between the legs or the fingers.
 """
 
 from dataclasses import dataclass
@@ -16,8 +16,8 @@ from scipy.sparse.linalg import splu
 from .joints import NAMES, PARENTS, PARTNERS
 
 DIFFUSION = 0.013  # metres; distance over which the weights spread
-MOST = 4  # joints per vertex
-LEVELS = 4096  # weights are multiples of the inverse of this
+MOST = 4  # maximum number of joints per vertex
+LEVELS = 4096  # weights are multiples of the inverse of this number
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +56,7 @@ BESIDE_SPINE = Step((0.075, 0, 0), (1, 0, 0), 0.060)
 CROTCH = 0.805  # metres above the floor; the inner thighs below follow only the legs
 BETWEEN = Step((0.033, 0, 0), (1, 0, 0), 0.040)
 BELOW_WAIST = Step((0, 1.12, 0), (0, -1, 0), 0.050)
-NAPE = 1.44  # metres above the floor; above it the neck's step is not limited sideways
+NAPE = 1.44  # metres above the floor, above which the neck's step is not limited sideways
 
 
 def _gate(name: str, points: Floats) -> Floats:
@@ -94,7 +94,7 @@ def _totals(vertices: Floats) -> Floats:
 
 
 def _limited(weights: Floats) -> Floats:
-    """Keep the `MOST` largest weights of each row, fading out the others without a jump."""
+    """Keep the `MOST` largest weights of each row; the others fade out continuously."""
     next_largest = np.sort(weights, axis=1)[:, -MOST - 1]
     weights = np.maximum(weights - next_largest[:, None], 0)
     return weights / weights.sum(axis=1, keepdims=True)

@@ -5,8 +5,8 @@ import xatlas
 from generator_tools.shapes import Floats
 
 HEAD = np.array([0.01, 0.485, 0.300])
-HEAD_SCALE = 1.1  # additional texel density at the face
-HEAD_REACH = 0.13  # metres
+HEAD_SCALE = 1.1  # relative enlargement of the face
+HEAD_REACH = 0.13  # radius of the enlarged region, metres
 
 
 def _magnify_head(vertices: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Shapes that are blended, in order, to a fox; metres, +Y up, facing +Z, left is +X."""
+"""Shapes that are blended, in order, into a fox; metres, +Y up, facing +Z, left is +X."""
 
 from dataclasses import dataclass
 

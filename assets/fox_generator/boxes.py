@@ -5,7 +5,7 @@ from generator_tools.shapes import Floats
 
 from .skeleton import Joint
 
-TRIM = 6.0  # percentage of the vertices outside the box on each side
+TRIM = 6.0  # percentage of the vertices that lie outside the box on each side
 # A skull box and a muzzle box are recognisable as a fox; one box around the whole head would not
 # be.
 FIXED = {

@@ -141,7 +141,7 @@ def _eyes(points: Floats, colour: Floats) -> Floats:
     side /= np.linalg.norm(side)
     up = np.cross(gaze, side)
     u, v, front = q @ side, q @ up, q @ gaze
-    v = v - 0.17 * u  # slant: the outer corner is higher
+    v = v - 0.17 * u  # slant of the eye: the outer corner is higher
     ahead = rise(0.0, 0.2, front)
     rim = np.hypot(u / 1.06, v / 0.87)
     colour = _over(colour, SOOT, rise(1.06, 0.98, rim) * ahead)

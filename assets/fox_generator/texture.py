@@ -13,7 +13,7 @@ from .body import distance
 from .colours import paint
 
 MARGIN = 14  # number of texels by which edge colours are spread beyond the charts
-COLOURS = 256  # palette size
+COLOURS = 256  # number of colours in the palette
 
 
 def crease_shade(vertices: Floats, normals: Floats) -> Floats:
@@ -36,7 +36,8 @@ def _cover(uv: Floats, size: int) -> tuple[np.ndarray, np.ndarray, Floats]:
         return rows.ravel()[:0], columns.ravel()[:0], np.empty((0, 3))
     bc = np.linalg.solve(edge, (at - uv[0]).T).T
     weights = np.column_stack([1 - bc.sum(axis=1), bc])
-    inside = weights.min(axis=1) > -1e-6  # tolerance: a texel on an edge belongs to both triangles
+    # The tolerance assigns a texel on an edge to both triangles.
+    inside = weights.min(axis=1) > -1e-6
     return rows.ravel()[inside], columns.ravel()[inside], weights[inside]
 
 

@@ -15,7 +15,7 @@ from .skeleton import Joint, segments
 
 CONTRAST = 1.3  # exponent that attenuates the long tails of the diffusion
 INNER_LEG = 0.022  # distance in metres from the midline at which legs begin
-SMALLEST = 0.006  # smaller weights are dropped
+SMALLEST = 0.006  # weights below this are dropped
 # Blending distance between the joints of a region, in limb radii.
 SPREAD = {"torso": 0.75, "neck": 0.8, "head": 0.5, "jaw": 0.35, "ear": 0.8, "tail": 0.8}
 
@@ -23,7 +23,8 @@ SPREAD = {"torso": 0.75, "neck": 0.8, "head": 0.5, "jaw": 0.35, "ear": 0.8, "tai
 def _allowed(vertices: Floats, table: list[Joint]) -> np.ndarray:
     """Return a mask (V, J) of the joints that may influence a vertex: same region, same side."""
     own = np.array(REGIONS)[regions(vertices)]
-    # Between the legs the underside of the trunk is nearer to the legs' shapes than to its own.
+    # Between the legs the underside of the trunk is nearer to the shapes of the legs than to that
+    # of the trunk.
     own[np.isin(own, ("fore", "hind")) & (np.abs(vertices[:, 0]) < INNER_LEG)] = "torso"
     allowed = own[:, None] == np.array([joint.region for joint in table])
     side = np.array([joint.name[-2:] for joint in table])

@@ -23,7 +23,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["Person", "camera_at", "write_cameras", "write_frames"]
 
-_NOISE = 0.008  # noise of keypoints, metres
+_NOISE = 0.008  # standard deviation of the noise of keypoints, metres
 
 
 @dataclass(frozen=True, slots=True)

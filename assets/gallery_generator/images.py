@@ -42,7 +42,7 @@ def write_images(folder: Path, scene: Scene, frames: range, rate: float, numbers
 
 def _widened(view: CameraView) -> CameraView:
     """Return an ideal camera at the same position that also sees a margin."""
-    assert view.size is not None  # synthetic cameras have one
+    assert view.size is not None  # synthetic cameras have a size
     size = round(_MARGIN * view.size[0]), round(_MARGIN * view.size[1])
     intrinsic = view.intrinsic.copy()
     intrinsic[:2, 2] += 0.5 * (np.array(size) - view.size)
@@ -51,7 +51,7 @@ def _widened(view: CameraView) -> CameraView:
 
 def _bent(pixels: Bytes, wide: CameraView, view: CameraView) -> Bytes:
     """Return the distorted image: each pixel is looked up at its position in the ideal image."""
-    assert view.size is not None  # synthetic cameras have one
+    assert view.size is not None  # synthetic cameras have a size
     rows, columns = np.mgrid[: view.size[1], : view.size[0]]
     places = np.stack([columns, rows, np.ones_like(rows)]).reshape(3, -1)
     bent = np.linalg.solve(view.intrinsic, places)[:2]

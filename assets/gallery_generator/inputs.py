@@ -22,7 +22,7 @@ RATE = 30.0
 N_FRAMES = 61
 IMAGE = 20  # frame of the capture with images
 _SIZE, _FOCAL = (480, 270), 330.0
-_RADIUS = 2.5  # distance of the cameras from the middle, metres
+_RADIUS = 2.5  # distance of the cameras from the centre of the scene, metres
 _LENS = (-0.22, 0.03)
 _ANGLES = (-62.0, 8.0, 75.0, 165.0)  # azimuths of the cameras around the people, degrees
 

@@ -44,7 +44,7 @@ def page() -> str:
 
 
 def _wrapped(command: str) -> str:
-    """Return a command in lines that end with a backslash, but the last one, broken at options."""
+    """Return a command broken at options into lines that end with a backslash, except the last."""
     lines = [""]
     for part in re.split(r" (?=-)", command):
         longer = f"{lines[-1]} {part}".lstrip()

@@ -11,7 +11,7 @@ __all__ = ["MOST", "saturated_fraction"]
 MOST = 1e-3
 """Largest permitted fraction of saturated pixels."""
 
-_BLACK = 2  # out of 255
+_BLACK = 2  # largest value of a black channel, out of 255
 
 
 def saturated_fraction(
@@ -24,10 +24,10 @@ def saturated_fraction(
     pixels : (H, W, 4) uint8
         sRGB.
     background : (int, int, int), optional
-        Exact colour of pixels that do not count.
+        Exact colour of pixels that are ignored.
     has_data : bool
         Whether colours show numbers: the last colour of the colour map has one full channel, so
-        only two channels count.
+        only two channels are tested.
     """
     white = (pixels[..., :3] == 255).all(axis=2)
     # Gutters of contact sheets are white from side to side.

@@ -86,7 +86,7 @@ def walk(body: Figure, n_frames: int, rate: float, gait: Gait) -> Walk:
             lower = int(np.argmin(feet[:, 1]))
             steps[frame] = before[lower, 2] - feet[lower, 2]
         before = feet
-    # A constant speed looks better than the small errors of the angles.
+    # A constant speed looks better than one with the small errors of the angles.
     steps[1:] = 0.5 * steps[1:] + 0.5 * steps[1:].mean()
     travelled = np.cumsum(steps)[:, None] * heading[:, 2]
     translations = travelled + np.array([gait.start[0], 0.0, gait.start[1]])
@@ -113,7 +113,7 @@ def _pose(angle: float, arms: float) -> Floats:
         found[_KNEES[side]] = _vector(_about(0, knee))
         found[_ANKLES[side]] = _vector(_about(0, ankle))
         found[_TOES[side]] = _vector(_about(0, -1.2 * push))
-        # An arm swings with the other leg.
+        # An arm swings with the opposite leg.
         arm = arms * 22.0 * np.sin(leg)
         found[_SHOULDERS[side]] = _vector(_about(0, arm + 4.0) @ _about(2, -74.0 * sign))
         bend = 18.0 + arms * 14.0 * max(-np.sin(leg), 0.0)

@@ -27,7 +27,7 @@ def planes(
 
 
 def _sample(distance: Distance, axes: list[Floats]) -> np.ndarray:
-    """Sample the distance on the grid, exactly only in the blocks that the surface may cross."""
+    """Sample the distance on the grid; it is exact only in blocks that the surface may cross."""
     shape = tuple(len(axis) for axis in axes)
     blocks = [np.stack([axis[:-1:BLOCK], axis[BLOCK::BLOCK]]) for axis in axes]
     centres = np.stack(np.meshgrid(*[b.mean(0) for b in blocks], indexing="ij"), axis=-1)

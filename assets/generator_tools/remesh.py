@@ -1,7 +1,7 @@
 """Isotropic remeshing: split long edges, collapse short ones, flip for valence 6, relax.
 
 Botsch and Kobbelt 2004, "A Remeshing Approach to Multiresolution Modeling", with each pass applied
-to a set of independent edges at once. The mesh is one half, open along the plane x = 0.
+to a whole set of independent edges. The mesh is one half, open along the plane x = 0.
 """
 
 from collections.abc import Callable
@@ -190,7 +190,7 @@ def drop_unused(vertices: Floats, triangles: Ints) -> tuple[Floats, Ints]:
 
 
 def flip_for_valence(vertices: Floats, triangles: Ints) -> Ints:
-    """Flip edges where that brings the four valences closer to 6 (4 on the rim)."""
+    """Flip edges if that brings the four valences closer to 6 (4 on the rim)."""
     edges = find_edges(triangles)
     n = len(vertices)
     valence = np.bincount(edges.ends.ravel(), minlength=n)

@@ -1,4 +1,4 @@
-"""Signed distances of the shapes that a figure is blended from.
+"""Signed distances of the shapes from which a figure is blended.
 
 Every shape maps points (N, 3) in metres to distances (N,): negative inside, zero on the surface.
 """
@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 Floats = NDArray[np.float64]
 
-MIRROR_SOFTNESS = 0.006  # metres; rounds the crease that mirroring would leave on the midline
-FAR = 0.12  # metres; beyond this distance from its box, a shape's distance is only a bound
+MIRROR_SOFTNESS = 0.006  # metres; radius that rounds the crease left by mirroring on the midline
+FAR = 0.12  # metres; farther than this from its box, a shape's distance is only a bound
 
 
 def fold(points: Floats) -> Floats:

@@ -15,8 +15,8 @@ def graded_length(
 ) -> Floats:
     """Return the target edge length (N,) at each point.
 
-    ``largest``, or less near the balls of ``details`` (centre, radius, edge length inside), away
-    from which the length grows by ``growth`` metres per metre.
+    The length is ``largest``, or less near the balls of ``details`` (centre, radius, edge length
+    inside), away from which the length grows by ``growth`` metres per metre.
     """
     length = np.full(len(points), largest)
     for centre, radius, fine in details:

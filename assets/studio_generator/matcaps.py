@@ -1,7 +1,8 @@
 """Pictures of lit spheres, which matcap shading looks up by normal (Sloan et al. 2001).
 
-The sphere touches the picture's edges; beyond it the edge of the sphere continues, so that
-interpolation at the silhouette sees no background. Lights are directions in camera space.
+The sphere touches the picture's edges; beyond it, the colours of the edge are repeated, so that
+interpolation at the silhouette does not include the background. Lights are directions in camera
+space.
 """
 
 import numpy as np
@@ -50,6 +51,6 @@ def _unit(x: float, y: float, z: float) -> np.ndarray:
 
 
 def _encoded(linear: np.ndarray) -> np.ndarray:
-    """Return sRGB of linear light (IEC 61966-2-1), cut to 0 to 1."""
+    """Return linear light as sRGB (IEC 61966-2-1), clamped to 0 to 1."""
     light = np.clip(linear, 0.0, 1.0)
     return np.where(light <= 0.0031308, 12.92 * light, 1.055 * light ** (1 / 2.4) - 0.055)

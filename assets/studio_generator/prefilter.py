@@ -53,7 +53,7 @@ def specular(
     Parameters
     ----------
     radiance : callable
-        Of unit vectors.
+        Returns the radiance from unit vectors.
     directions : (..., 3)
         Normals, also the directions of view and reflection.
     alpha : float
@@ -83,7 +83,7 @@ def split_sum(size: int, n_samples: int) -> np.ndarray:
     Returns
     -------
     (size, size, 2)
-        Columns run over n . v, rows over roughness, at the middles of equal steps.
+        Columns run over n . v, rows over roughness, at the centres of equal steps.
     """
     steps = (np.arange(size) + 0.5) / size
     first, second = _spread(n_samples)

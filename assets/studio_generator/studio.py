@@ -20,7 +20,7 @@ class SoftBox:
     azimuth, inclination : float
         Direction of its centre, degrees: to the right of +z, and above the horizon.
     width, height : float
-        Half its sides, as tangents of the angle seen from the middle of the room.
+        Half its sides, as tangents of the angle seen from the centre of the room.
     color : (r, g, b)
         Radiance.
     """
@@ -40,8 +40,8 @@ BOXES = (
     SoftBox(-142.0, 18.0, 0.16, 0.80, (3.4, 3.5, 3.7)),
     SoftBox(138.0, 24.0, 0.20, 0.70, (3.9, 3.8, 3.6)),
 )
-_EXPOSURE = 0.48  # the brightest place of a white matte sphere is almost white
-_EDGE = 0.07  # width of a box's soft edge, a tangent
+_EXPOSURE = 0.48  # exposure with which the brightest point of a white matte sphere is almost white
+_EDGE = 0.07  # width of a box's soft edge, as a tangent
 
 
 def radiance(directions: np.ndarray) -> np.ndarray:
@@ -68,7 +68,7 @@ def radiance(directions: np.ndarray) -> np.ndarray:
 
 
 def _coverage(box: SoftBox, directions: np.ndarray) -> np.ndarray:
-    """Return how much of a direction's light is the box's, 0 to 1."""
+    """Return the fraction of a direction's light that comes from the box, 0 to 1."""
     azimuth, inclination = np.radians(box.azimuth), np.radians(box.inclination)
     flat = np.cos(inclination)
     towards = np.array([flat * np.sin(azimuth), np.sin(inclination), flat * np.cos(azimuth)])

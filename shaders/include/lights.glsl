@@ -1,7 +1,7 @@
 // The lights of the scene, for all lit shading modes.
 
-uniform vec3 u_light_directions[2];  // key and rim: towards each light, unit length, camera space
-uniform vec3 u_light_colors[2];      // linear, times strength
+uniform vec3 u_light_directions[2];  // to the key and rim lights, unit length, camera space
+uniform vec3 u_light_colors[2];      // linear colour times strength
 uniform vec3 u_up;                   // the scene's up axis, unit length, camera space
 uniform vec3 u_ambient;              // ambient light on an upright surface, linear
 uniform vec3 u_ambient_growth;       // added to surfaces that face up, subtracted if they face down

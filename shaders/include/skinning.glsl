@@ -9,7 +9,7 @@ in uvec4 in_bindings;    // first pair, number of pairs, index of the vertex in 
 
 uniform sampler2D u_palette;    // skinning matrices, three rows each, for each instance in turn
 uniform sampler2D u_pairs;      // joint and weight, strongest first for each vertex
-uniform int u_n_joints;         // matrices of one instance
+uniform int u_n_joints;         // number of matrices per instance
 uniform int u_n_offsets;        // entries of u_offset_list per instance; 0 for none
 uniform int u_n_sources;        // vertices in each row of u_offsets
 uniform sampler2D u_offset_list;  // row of u_offsets and weight, for each instance in turn
@@ -18,7 +18,7 @@ uniform sampler2D u_offsets;    // pose correctives, row by row
 // Properties of the instance, set by main before it calls any function.
 vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
-#ifdef AFFINE_PALETTE  // some joint of some instance scales or shears
+#ifdef AFFINE_PALETTE  // at least one joint of an instance scales or shears
 bool is_rigid;       // true if no joint of this instance scales or shears
 mat3 linear;         // linear part of the blended transform, set by skin()
 #endif

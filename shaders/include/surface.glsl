@@ -10,7 +10,7 @@ uniform sampler2D u_texture;    // sRGB, decoded by the sampler
 
 #ifndef MATERIALS
 vec4 base_color() {
-#ifdef UNTEXTURED  // software drivers would sample a texture only to discard the result
+#ifdef UNTEXTURED  // software drivers would sample the texture and discard the result
     return vec4(v_color, 1.0);
 #else
     return u_textured ? texture(u_texture, v_uv) : vec4(v_color, 1.0);
@@ -25,11 +25,11 @@ in vec4 v_other_uvs;            // second and third set of texture coordinates i
 in vec4 v_tint;                 // vertex colour, linear, and opacity
 
 uniform vec4 u_base_factor;     // linear
-uniform bool u_has_base_factor; // otherwise untextured surfaces have v_color
-uniform bool u_has_tint;        // v_tint multiplies the base colour, and replaces v_color
+uniform bool u_has_base_factor; // if false, untextured surfaces use v_color
+uniform bool u_has_tint;        // v_tint multiplies the base colour and replaces v_color
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
-uniform mat3 u_places[7];       // texture coordinates to those of each texture's image
+uniform mat3 u_places[7];       // transform of the texture coordinates of each image
 uniform int u_uv_sets[6];       // 0: v_uv, 1 and 2: v_other_uvs
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map

@@ -19,8 +19,8 @@ uniform bool u_has_emissive_map;
 uniform float u_occlusion_map_strength;  // 0: no map
 uniform vec3 u_emissive;        // linear
 uniform bool u_toon;
-uniform vec3 u_shade_color;     // linear, of the side away from the key light
-uniform vec2 u_shade_range;     // cosines at which the surface is in shade, and lit
+uniform vec3 u_shade_color;     // colour of the side away from the key light, linear
+uniform vec2 u_shade_range;     // cosines at which the surface is fully in shade and fully lit
 uniform sampler2D u_shade_map;
 uniform bool u_has_shade_map;
 #endif
@@ -77,7 +77,7 @@ vec3 direct(Surface s, vec3 normal, vec3 to_eye, vec3 to_light) {
     float alpha = max(s.roughness, SMOOTHEST);
     float squared = alpha * alpha * alpha * alpha;
     float narrow = n_h * n_h * (squared - 1.0) + 1.0;
-    float lobe = squared / (narrow * narrow);  // times pi
+    float lobe = squared / (narrow * narrow);  // GGX lobe times pi
     float smith = n_l * sqrt(n_v * n_v * (1.0 - squared) + squared)
         + n_v * sqrt(n_l * n_l * (1.0 - squared) + squared);
     vec3 fresnel = s.specular + (1.0 - s.specular) * pow(1.0 - v_h, 5.0);

@@ -1,11 +1,11 @@
-// Scalar quantity as a colour, with weak lighting so that colours remain comparable.
+// Scalar quantity as a colour, weakly lit so that colours remain comparable.
 flat in vec3 v_corners;          // scalars at the triangle's corners
 in vec3 v_barycentric;           // barycentric coordinates
 
 uniform vec2 u_scalar_range;     // lowest and highest value shown
 uniform sampler2D u_colormap;    // one row, sRGB, decoded by the sampler
-uniform bool u_categories;       // integers, each a column of u_colormap; negative for no category
-uniform bool u_dark_zero;        // exactly 0 has the colour u_nothing instead of the map's
+uniform bool u_categories;       // values are columns of u_colormap; negative: no category
+uniform bool u_dark_zero;        // show values of exactly 0 in u_nothing
 uniform bool u_isolines;         // draw lines at every tenth of the range
 uniform vec3 u_nothing;          // linear
 
@@ -17,7 +17,7 @@ vec3 category_color(float number) {
 // Colour of the category with the largest barycentric weight here. Interpolating the numbers would
 // give other categories.
 vec3 category() {
-    bvec3 same = equal(v_corners.xyz, v_corners.yzx);  // first and second, second and third, …
+    bvec3 same = equal(v_corners.xyz, v_corners.yzx);  // corners 1 and 2, 2 and 3, 3 and 1
     vec3 w = v_barycentric;  // summed over corners of the same category
     w += mix(vec3(0.0), v_barycentric.yzx, same);
     w += mix(vec3(0.0), v_barycentric.zxy, same.zxy);

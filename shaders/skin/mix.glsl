@@ -1,6 +1,6 @@
 #pragma needs lbs dqs
-// Blend of linear blend and dual quaternion skinning: (1 - blend factor) LBS + blend factor DQS.
-uniform float u_blend_factor;   // of DQS, 0 to 1
+// Mixture of linear blend and dual quaternion skinning: (1 - blend factor) LBS + blend factor DQS.
+uniform float u_blend_factor;   // weight of DQS, 0 to 1
 
 void skin(inout vec3 position, inout vec3 normal) {
     vec3 rest_normal = normal, dual_position = position, dual_normal = normal;

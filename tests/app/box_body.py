@@ -1,7 +1,7 @@
 """A box-shaped body model for hand calculation: three joints, two shapes, one corrective.
 
-The box is 2 m high, 0.5 m wide and 0.25 m deep. Its joints are the middle, and the middles of the
-left (+x) and the right (-x) side, which follow the second and the third joint as a whole.
+The box is 2 m high, 0.5 m wide and 0.25 m deep. Its joints are at the middle of the box, of its
+left side (+x), and of its right side (-x). Each side follows its own joint rigidly.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _FACES = (
 
 
 def arrays() -> dict[str, np.ndarray]:
-    """Return what an ``.npz`` of the model holds."""
+    """Return the arrays of the model's ``.npz`` file."""
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
     corners = 0.5 * signs * [WIDTH, HEIGHT, DEPTH]
     is_left = signs[:, 0] > 0
@@ -27,7 +27,8 @@ def arrays() -> dict[str, np.ndarray]:
     shapes[:, 1, 0] = STATURE * corners[:, 1]
     shapes[:, 0, 1] = GIRTH * corners[:, 0]
     correctives = np.zeros((8, 3, 18))
-    correctives[is_left, 0, 4] = -0.5  # R[1, 1] - 1 of the left joint: 1 - cos moves it outwards
+    # R[1, 1] - 1 of the left joint: 1 - cos moves the side outwards.
+    correctives[is_left, 0, 4] = -0.5
     return {
         "v_template": corners,
         "f": np.array(_FACES),

@@ -1,4 +1,4 @@
-"""Scenes of captures for tests: the tiny figure as several people, and points."""
+"""Scenes of captures for tests: the tiny figure as several people, and captured points."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ NAMES = ("nose", "left_eye", "right_eye", "neck")
 
 
 def timing(present, rate=10.0, first=0):
-    """A timeline: true for present frames."""
+    """Return the timing of a person who is present in the frames marked true."""
     present = np.asarray(present, dtype=bool)
     rows = np.where(present, np.cumsum(present) - 1, -1)
     return Timing(rate, rows, first_frame=first, holds=False)
 
 
 def walk(present, n_joints, name="take", rate=10.0, first=0):
-    """A motion in which the figure is at x = its row, rotated about y by a tenth of that."""
+    """A motion that places the figure in frame f at x = f, rotated about y by f / 10."""
     when = timing(present, rate, first)
     rows = np.arange(int(when.present.sum()), dtype=float)
     rotations = np.zeros((len(rows), n_joints, 4))

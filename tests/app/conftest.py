@@ -1,4 +1,4 @@
-"""Fixtures for interface tests: apps closed after each test, and tiny files."""
+"""Fixtures for interface tests: apps that are closed after each test, and tiny files."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def hand(drive, rig):
 
 @pytest.fixture
 def drive_body(drive, tmp_path):
-    """Open apps that show a made-up body model: "box" or a kind of the SMPL family."""
+    """Open apps that show a synthetic body model: "box" or a kind of the SMPL family."""
 
     def open_body(kind="box", size=(1000, 1000), pixels_per_point=0.5, **columns):
         arrays = box_body.arrays() if kind == "box" else model(kind, **columns)

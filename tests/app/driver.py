@@ -36,16 +36,16 @@ def make_state(scene: Scene, paths=(), samples=1) -> AppState:
 
 
 class Driver:
-    """Moves the mouse and presses keys; every event gets a frame of its own.
+    """A driver that moves the mouse and presses keys, with one frame for each event.
 
     Parameters
     ----------
     paths : str or Path
-        What to open; the bundled figure if none.
+        Files to open; the bundled figure if none.
     size, scale
         As for ``HeadlessApp``.
     pixels_per_point : float
-        As for ``HeadlessApp``; pictures are drawn with a quarter of the pixels unless they matter.
+        As for ``HeadlessApp``; by default pictures have a quarter of the pixels.
     samples : int
         Samples per pixel; 4, as in the window, takes ten times as long without a graphics card.
     scene : Scene, optional
@@ -66,20 +66,21 @@ class Driver:
     ):
         scene = scene or viewer.load(*paths)
         self.state = make_state(scene, paths, samples)
-        # All apps draw in one context with one set of programs, as far as they need OpenGL.
+        # All apps that need OpenGL share one context and one set of programs.
         graphics = thread_graphics()
         self.app = HeadlessApp(
             self.state, size, scale=scale, pixels_per_point=pixels_per_point, graphics=graphics
         )
         self.io = imgui.get_io()
-        # Clicks of a test follow each other quickly: only double_click means two as one.
+        # Clicks of a test follow each other quickly; only ``double_click`` is meant as a double
+        # click.
         self.io.mouse_double_click_time = 1e-4
         self._is_open = True
         imgui.load_ini_settings_from_memory(layout)
         try:
             self.step(4)
         except BaseException:
-            # One that stays open makes all later tests fail.
+            # An app that stays open makes all later tests fail.
             self.close()
             raise
 
@@ -221,7 +222,7 @@ class Driver:
         """Return whether a transient message contains a text."""
         return any(text in note.text for note in self.state.messages.notes)
 
-    # What is shown
+    # Queries of the interface
 
     def dof(self, label):
         """Return the value of a DOF of the first actor."""
@@ -245,7 +246,7 @@ class Driver:
         self.step(3)
 
     def finish_job(self):
-        """Run frames until the job is done and its result shown; few while a thread works."""
+        """Run frames until the job is done and its result is shown; wait for threads in between."""
         while (job := self.state.job) is not None:
             if isinstance(job, ThreadJob | CountedJob):
                 job.wait()
@@ -253,7 +254,7 @@ class Driver:
         self.step(3)
 
     def screen(self):
-        """Return what the window would show: (H, W, 3) uint8."""
+        """Return the picture of the window, (H, W, 3) uint8."""
         self.step(3)
         return self.app.pixels()[..., :3]
 
@@ -261,7 +262,7 @@ class Driver:
         return self.app.frame.scene_picture()
 
     def assert_sane(self):
-        """Check the invariants that hold whatever the user does."""
+        """Check the invariants that hold after any input."""
         camera = self.state.camera
         numbers = [*camera.target, camera.distance, camera.azimuth, camera.inclination, camera.fov]
         assert np.isfinite(numbers).all() and camera.distance > 0

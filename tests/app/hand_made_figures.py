@@ -1,4 +1,4 @@
-"""Tiny files whose size and front are known."""
+"""Tiny files of known size and front."""
 
 from __future__ import annotations
 

@@ -13,9 +13,9 @@ SIZE = (1280, 800)
 
 
 def arm_figure(orders=("xyz", "z", "xyz"), limits=None, root="", name="arm", up="y") -> Figure:
-    """Return three joints along x, one unit apart; each rotates about its named axes.
+    """Return a figure of three joints along x, one unit apart; each rotates about its named axes.
 
-    ``root`` names translations of the first joint; ``limits`` are by (joint, axis).
+    ``root`` names the translations of the first joint; ``limits`` maps (joint, axis) to limits.
     """
     dofs = [(0, "xyz".index(axis)) for axis in root]
     dofs += [(joint, 3 + "xyz".index(a)) for joint, word in enumerate(orders) for a in word]
@@ -57,7 +57,7 @@ def joint_seen(hand, joint):
 
 
 def around(center, radius, start, end, steps=8):
-    """Return positions on a circle in the window, counter-clockwise from +x, radians."""
+    """Return window positions on a circle; angles are in radians, counter-clockwise from +x."""
     return [
         (center[0] + radius * np.cos(a), center[1] - radius * np.sin(a))
         for a in np.linspace(start, end, steps)
@@ -65,7 +65,7 @@ def around(center, radius, start, end, steps=8):
 
 
 def drag_along(hand, places, held=""):
-    """Press at the first position and release at the last."""
+    """Drag with the mouse from the first position to the last."""
     with hand.holding(held):
         hand.move(places[0])
         hand.press()

@@ -1,4 +1,4 @@
-"""A bent arm whose mesh, rotated and scaled by thirty, is rigged from the arm itself."""
+"""A bent arm as template, and its mesh, rotated and scaled by thirty, as target for rigging."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ TRUE[:3, :3], TRUE[:3, 3] = SCALE * ROTATION, MOVE
 
 
 def bent():
-    """Return the arm and the pose of both."""
+    """Return the arm and the pose of arm and mesh."""
     figure = arm()
     pose = rest_pose(figure.skeleton)
     pose.dofs[6:] = 0.2, -0.1, 0.7
@@ -25,7 +25,7 @@ def bent():
 
 
 def scan(figure, pose) -> Figure:
-    """Return the posed arm's mesh alone, transformed."""
+    """Return the transformed mesh of the posed arm, without its rig."""
     positions = deform(figure, pose)[0] @ TRUE[:3, :3].T + MOVE
     return Figure("scan", mesh_of(positions, figure.mesh.triangles))
 

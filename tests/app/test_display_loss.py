@@ -14,7 +14,7 @@ from app.tiny import write_rig
 ROOT = Path(__file__).resolve().parents[2]
 DRAFT = ("--quality", "draft")
 
-# Run in a process of its own: the window's own frames end the server at a known moment.
+# This program runs in a separate process; its window kills the server in a known frame.
 PROGRAM = """
 import os, signal, sys
 from pathlib import Path
@@ -41,7 +41,7 @@ sys.exit(run(sys.argv[3:]))
 """
 
 
-# The same at start-up: the server has ended when a step begins.
+# This program loses its display at start-up: the server is killed before the given step.
 START = """
 import os, signal, sys
 from viewer.app.display import import_glfw
@@ -62,7 +62,7 @@ sys.exit(run(sys.argv[3:]))
 
 @pytest.fixture
 def server():
-    """A separate Xvfb: its process and display name."""
+    """The process and display name of a separate Xvfb."""
     if shutil.which("Xvfb") is None:
         text = "Xvfb not installed"
         pytest.fail(text) if os.environ.get("CI") == "true" else pytest.skip(text)
@@ -103,7 +103,7 @@ def check_end(done, display):
     assert lines[0].startswith("viewer: ") and "X server" in lines[0] and display in lines[0]
 
 
-def test_lost_display_is_one_line_and_exit_code_4(server, tmp_path):
+def test_lost_display_prints_one_line_and_ends_with_exit_code_4(server, tmp_path):
     check_end(ended(server, tmp_path), server[1])
 
 
@@ -115,7 +115,7 @@ def test_lost_display_leaves_no_half_written_recording(server, tmp_path):
 
 
 @pytest.mark.parametrize("step", ["create_window", "make_context_current", "swap_interval"])
-def test_display_lost_at_start_gives_the_same_message(server, tmp_path, step):
+def test_display_lost_at_start_prints_the_same_message(server, tmp_path, step):
     check_end(ended(server, tmp_path, step, START), server[1])
 
 
@@ -126,10 +126,10 @@ def test_previous_handler_is_restored():
         "from viewer.app.display_loss import stop_watching, watch_display\n"
         "ask = ctypes.CDLL('libX11.so.6')['XSetIOErrorHandler']\n"
         "ask.restype = ctypes.c_void_p\n"
-        "first = ask(None)\n"  # Xlib's own
+        "first = ask(None)\n"  # Xlib's default handler
         "ask(ctypes.c_void_p(first))\n"
         "watch_display()\n"
-        "watch_display()\n"  # twice is once
+        "watch_display()\n"  # the second call has no effect
         "held = ask(None)\n"
         "ask(ctypes.c_void_p(held))\n"
         "stop_watching()\n"

@@ -1,4 +1,4 @@
-"""Controls that cannot act are greyed and say why; the window wakes up to show tooltips."""
+"""Greyed controls and the reasons in their tooltips, for which the window wakes up."""
 
 from __future__ import annotations
 
@@ -57,12 +57,12 @@ def test_inapplicable_panels_are_greyed(hand, tooltips, title, why):
     assert tooltips[-1] == why
 
 
-def test_space_without_motion_says_why_nothing_happens(hand):
+def test_space_key_without_motion_shows_the_reason(hand):
     hand.key("space")
     assert not hand.state.clock.playing and hand.says(NOTHING_MOVES)
 
 
-def test_motion_controls_work(drive, rig, tooltips):
+def test_motion_controls_are_enabled_with_a_motion(drive, rig, tooltips):
     hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
     rest(hand, "Play")
     assert tooltips[-1] == "play or pause (Space)"
@@ -70,7 +70,7 @@ def test_motion_controls_work(drive, rig, tooltips):
     assert hand.state.clock.playing
 
 
-def test_controls_in_a_disabled_block_give_its_reason(hand, tooltips):
+def test_controls_in_a_disabled_block_show_its_reason(hand, tooltips):
     hand.show_panel("Weights")
     rest(hand, "Automatic")
     assert tooltips[-1] == "the heat map is off"
@@ -82,10 +82,10 @@ def test_gaps_can_be_filled_if_present(drive, rig):
     assert hand.state.clock.interpolate_gaps
 
 
-def test_filling_gaps_is_greyed_without_gaps(drive, rig, tooltips):
+def test_gap_filling_is_greyed_without_gaps(drive, rig, tooltips):
     scene = people(rig, [True] * 9)
     clip = scene.actors[0].clip
-    # Nobody is missing before the first or after the last frame either.
+    # Frames before the first and after the last frame of a person are not gaps.
     scene.actors[0].clip = replace(clip, timing=replace(clip.timing, holds=True))
     hand = drive(scene=scene, size=(1280, 800), samples=1)
     hand.click("Interpolate gaps")

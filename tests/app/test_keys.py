@@ -26,7 +26,7 @@ def test_shortcuts_are_unique_and_described():
     assert all(key.text for key in KEYS)
 
 
-def test_r_resets_every_dof_to_the_clamped_pose_of_the_file(hand):
+def test_r_key_resets_every_dof_to_the_clamped_pose_of_the_file(hand):
     for label in ("root.x", "root.y", "arm.x", "arm.z", "root.tx"):
         hand.drag(label, 0.9)
     hand.key("r")
@@ -36,7 +36,7 @@ def test_r_resets_every_dof_to_the_clamped_pose_of_the_file(hand):
     assert hand.dof("arm.x") != FILE_POSE["arm.x"]
 
 
-def test_s_toggles_the_skeleton(hand):
+def test_s_key_toggles_the_skeleton(hand):
     seen = []
     for _ in range(3):
         hand.key("s")
@@ -47,7 +47,7 @@ def test_s_toggles_the_skeleton(hand):
     assert hand.state.options.show == "skin"
 
 
-def test_k_toggles_the_bind_pose(hand):
+def test_k_key_toggles_the_bind_pose(hand):
     attached = hand.scene_picture()
     hand.key("k")
     assert hand.state.options.show == "binding"
@@ -57,7 +57,7 @@ def test_k_toggles_the_bind_pose(hand):
     assert (hand.scene_picture() == attached).all()
 
 
-def test_keys_named_in_the_interface_are_in_the_table():
+def test_keys_mentioned_in_the_interface_are_in_the_table():
     labels = {key.label for key in KEYS} | {"", "Alt+click"}
     used = set()
     for path in Path(viewer.app.__file__).parent.rglob("*.py"):
@@ -70,7 +70,7 @@ def test_keys_named_in_the_interface_are_in_the_table():
 
 @pytest.mark.parametrize("key", OPTION_KEYS)
 def test_letter_toggles_its_display_option_and_the_view(drive, key):
-    hand = drive()  # the bundled figure: it has a texture
+    hand = drive()  # the bundled figure, which has a texture
     before, picture = getattr(hand.state.options, OPTION_KEYS[key]), hand.scene_picture()
     hand.key(key)
     assert getattr(hand.state.options, OPTION_KEYS[key]) is not before
@@ -80,7 +80,7 @@ def test_letter_toggles_its_display_option_and_the_view(drive, key):
     assert (hand.scene_picture() == picture).all()
 
 
-def test_f_fits_the_posed_figure(hand):
+def test_f_key_fits_the_view_to_the_posed_figure(hand):
     hand.wheel(-8, hand.middle)
     hand.pull(hand.middle, (hand.middle[0] + 90, hand.middle[1]), button=1)
     far = hand.state.camera.distance
@@ -96,20 +96,20 @@ def test_f_fits_the_posed_figure(hand):
     ("keys", "view"),
     [(("_1", "keypad1"), (0, 0)), (("_3", "keypad3"), (90, 0)), (("_7", "keypad7"), (0, 90))],
 )
-def test_digits_choose_named_views(hand, keys, view):
+def test_digit_keys_choose_named_views(hand, keys, view):
     for key in keys:
         hand.state.camera.azimuth, hand.state.camera.inclination = 12.0, 34.0
         hand.key(key)
         assert (hand.state.camera.azimuth, hand.state.camera.inclination) == view
 
 
-def test_5_switches_the_projection(hand):
+def test_5_key_switches_the_projection(hand):
     for key, wanted in (("_5", True), ("keypad5", False)):
         hand.key(key)
         assert hand.state.camera.orthographic is wanted
 
 
-def test_tab_hides_the_panels_and_brings_them_back(hand):
+def test_tab_key_hides_the_panels_and_shows_them_again(hand):
     labels, rect = set(hand.state.item_rects), hand.state.view_rect
     hand.key("tab")
     assert not hand.state.item_rects
@@ -119,7 +119,7 @@ def test_tab_hides_the_panels_and_brings_them_back(hand):
     assert set(hand.state.item_rects) == labels and hand.state.view_rect == rect
 
 
-def test_h_and_question_mark_list_the_keys(hand):
+def test_h_and_question_mark_show_the_shortcut_list(hand):
     quiet = hand.screen()
     for key, held in (("h", ""), ("slash", "shift"), ("f1", "")):
         hand.key(key, held)
@@ -129,7 +129,7 @@ def test_h_and_question_mark_list_the_keys(hand):
         assert not hand.state.of(Keyboard).is_listed
 
 
-def test_escape_closes_in_order_and_never_quits(hand):
+def test_escape_closes_the_topmost_item_and_never_quits(hand):
     state = hand.state
     hand.click(hand.place("joint arm", 0.5))
     hand.key("h")
@@ -173,7 +173,7 @@ def test_letters_do_nothing_under_a_dialog_or_message(hand):
     assert hand.state.panels_visible
 
 
-def test_f12_saves_the_view_and_never_overwrites(hand, tmp_path, monkeypatch):
+def test_f12_saves_the_view_without_overwriting_files(hand, tmp_path, monkeypatch):
     folder = tmp_path / "pictures"
     folder.mkdir()
     monkeypatch.chdir(folder)
@@ -188,7 +188,7 @@ def test_f12_saves_the_view_and_never_overwrites(hand, tmp_path, monkeypatch):
     assert sorted(path.name for path in folder.iterdir()) == ["tiny-2.png", "tiny.png"]
     assert first.read_bytes() == kept
     assert any("tiny-2.png" in note.text for note in hand.state.messages.notes)
-    assert hand.undo_steps == 1  # only the wireframe
+    assert hand.undo_steps == 1  # only the wireframe differs
 
 
 def test_f12_reports_that_the_legend_is_not_in_the_image(hand, tmp_path, monkeypatch):
@@ -232,7 +232,7 @@ def test_ctrl_o_opens_the_file_dialog_in_the_figures_folder(hand, tmp_path):
 
 
 @pytest.mark.parametrize("redo", [("z", "ctrl shift"), ("y", "ctrl")])
-def test_undo_and_redo_walk_over_pose_and_display(hand, redo):
+def test_undo_and_redo_restore_pose_and_display(hand, redo):
     states = []
 
     def note():
@@ -252,7 +252,7 @@ def test_undo_and_redo_walk_over_pose_and_display(hand, redo):
     for wanted in reversed(states[:-1]):
         hand.key("z", "ctrl")
         assert now() == wanted
-    hand.key("z", "ctrl")  # nothing left
+    hand.key("z", "ctrl")  # no steps left
     assert now() == states[0]
     for wanted in states[1:]:
         hand.key(*redo)
@@ -269,13 +269,13 @@ def test_new_edit_after_undo_clears_redo(hand):
     assert not hand.state.options.wireframe and not hand.state.options.grid
 
 
-def test_ctrl_letters_are_not_plain_letters(hand):
+def test_ctrl_shortcuts_do_not_run_plain_letter_shortcuts(hand):
     for key in ("s", "w", "r", "h", "g"):
         hand.key(key, "ctrl")
     assert hand.undo_steps == 0 and not hand.state.of(Keyboard).is_listed
 
 
-def test_menu_entries_act(hand):
+def test_menu_entries_run_their_actions(hand):
     hand.drag("arm.x", 0.9)
     moved = hand.dofs()
     hand.menu("menu Edit", "Undo")
@@ -291,7 +291,7 @@ def test_menu_entries_act(hand):
 
 
 @pytest.mark.parametrize("key", ["q", "w"])
-def test_modifier_released_in_the_same_frame_still_counts(hand, key):
+def test_modifier_released_in_the_same_frame_is_used(hand, key):
     hand.io.add_key_event(imgui.Key.mod_ctrl, True)
     hand.step()
     hand.io.add_key_event(getattr(imgui.Key, key), True)

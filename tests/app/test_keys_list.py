@@ -1,4 +1,4 @@
-"""The shortcut list: complete columns at the usual text size, scrolled if they do not fit."""
+"""The shortcut list: complete columns at the usual text size, scrollable if they do not fit."""
 
 from __future__ import annotations
 
@@ -27,16 +27,16 @@ def listed(hand):
         ((1300, 400), (3, 17, True)),
         ((799, 500), (1, 50, False)),
         ((1199, 400), (2, 25, False)),
-        ((100, 2000), (1, 50, False)),  # too narrow for one
+        ((100, 2000), (1, 50, False)),  # too narrow for one column
         ((10, 1), (1, 50, False)),
     ],
 )
-def test_columns_are_few_and_fit(room, wanted):
+def test_list_uses_the_fewest_columns_that_fit(room, wanted):
     assert column_layout(50, room, (400.0, 20.0)) == wanted
 
 
 @pytest.mark.parametrize("size", [(900, 1150), (1200, 700)])
-def test_list_lies_within_the_window_and_takes_no_input(drive, rig, size):
+def test_list_stays_within_the_window_and_takes_no_input(drive, rig, size):
     hand = drive(*rig, size=size, samples=1)
     window = listed(hand)
     assert window.pos.y >= 0 and window.pos.y + window.size.y <= size[1]

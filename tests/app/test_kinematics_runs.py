@@ -1,4 +1,4 @@
-"""Forward kinematics of a pose run once a frame, however much of the window shows the pose."""
+"""The number of forward kinematics runs: once per frame, even if several panels show the pose."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig import kinematics
 
 @pytest.fixture
 def runs(monkeypatch):
-    """Number of poses that forward kinematics ran for."""
+    """The number of poses for which forward kinematics ran."""
     counted, run = [], kinematics.forward_kinematics
 
     def count(parents, local, root=None):
@@ -37,7 +37,7 @@ def show_everything(state):
     start_following(state, 0, 1)
 
 
-def test_an_edited_pose_runs_kinematics_once(hand, runs):
+def test_edited_pose_runs_kinematics_once(hand, runs):
     show_everything(hand.state)
     hand.step(4)
     runs.clear()
@@ -48,7 +48,7 @@ def test_an_edited_pose_runs_kinematics_once(hand, runs):
     assert runs == [1]
 
 
-def test_a_pose_of_a_body_runs_kinematics_once(box, runs):
+def test_edited_pose_of_a_body_model_runs_kinematics_once(box, runs):
     show_everything(box.state)
     box.step(4)
     runs.clear()
@@ -57,7 +57,7 @@ def test_a_pose_of_a_body_runs_kinematics_once(box, runs):
     assert runs == [1]
 
 
-def test_a_moved_camera_runs_none(hand, runs):
+def test_moved_camera_runs_no_kinematics(hand, runs):
     show_everything(hand.state)
     hand.step(4)
     runs.clear()

@@ -27,7 +27,7 @@ def test_view_keeps_half_of_the_width(drive, rig, size, scale):
     assert hand.state.view_rect[2] >= 0.25 * size[0] - 4.0
 
 
-def test_panels_join_one_column_where_the_window_is_narrow_and_part_again(hand):
+def test_panels_share_one_column_in_narrow_windows_and_separate_again(hand):
     left = hand.state.view_rect[0]
     resize(hand, 700, 640)
     assert left > 0.0 == hand.state.view_rect[0]
@@ -36,7 +36,7 @@ def test_panels_join_one_column_where_the_window_is_narrow_and_part_again(hand):
     assert {"Reset (R)", "Skeleton", "Distance"} <= set(hand.state.item_rects)
 
 
-def test_edge_that_was_dragged_stays(hand):
+def test_dragged_edge_keeps_its_position(hand):
     edge = hand.state.view_rect[0] - 1.0
     hand.pull((edge, 300.0), (edge + 60.0, 300.0))
     resize(hand, 700, 640)
@@ -45,7 +45,7 @@ def test_edge_that_was_dragged_stays(hand):
     assert hand.state.view_rect[0] == pytest.approx(edge + 61.0, abs=2.0)
 
 
-def test_curves_get_room_for_a_plot_while_they_are_in_front(drive, rig):
+def test_curves_panel_is_tall_enough_for_a_plot_while_in_front(drive, rig):
     hand = drive(scene=people(rig, [True] * 9), size=(1280, 800), samples=1)
     before = hand.state.view_rect[3]
     hand.show_panel("Curves")
@@ -57,7 +57,7 @@ def test_curves_get_room_for_a_plot_while_they_are_in_front(drive, rig):
     assert hand.state.view_rect[3] == pytest.approx(before, abs=1.0)
 
 
-def test_closed_panel_leaves_and_the_menu_brings_it_back(hand):
+def test_closed_panel_disappears_and_the_menu_reopens_it(hand):
     hand.menu("menu Window", "Joints")
     hand.step(3)
     assert hand.state.of(ShownPanels).closed == {"joints"} and "Filter" not in hand.state.item_rects
@@ -89,9 +89,9 @@ def test_panel_closes_by_its_cross(hand):
     assert hand.state.of(ShownPanels).closed == {"joints"}
 
 
-def test_all_panels_closed_leave_the_view(hand):
+def test_view_remains_when_all_panels_are_closed(hand):
     for name, panel in PANELS.items():
-        if not panel.needs and not panel.on_demand:  # the others are closed
+        if not panel.needs and not panel.on_demand:  # the other panels are closed
             set_open(hand.state, name, False)
     hand.step(3)
     x, _y, width, height = hand.state.view_rect
@@ -99,7 +99,7 @@ def test_all_panels_closed_leave_the_view(hand):
     hand.pull(hand.middle, (hand.middle[0] + 50, hand.middle[1]))
 
 
-def test_reset_layout_opens_every_panel_where_it_was(hand):
+def test_reset_layout_reopens_every_panel_at_its_position(hand):
     rect, labels = hand.state.view_rect, set(hand.state.item_rects)
     hand.menu("menu Window", "Joints")
     set_open(hand.state, "stats", False)
@@ -133,7 +133,7 @@ def test_small_windows_draw_without_errors(drive, rig, size):
     hand.assert_sane()
 
 
-def test_window_shrinks_to_nothing_and_grows_again(hand):
+def test_window_can_shrink_to_zero_size_and_grow_again(hand):
     for size in ((300, 200), (40, 300), (300, 1), (1, 1), (900, 640)):
         hand.io.display_size = imgui.ImVec2(*size)
         hand.step(4)

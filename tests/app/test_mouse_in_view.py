@@ -1,4 +1,4 @@
-"""The mouse in the view: orbit, pan, zoom, and nothing over panels."""
+"""The mouse in the view: orbit, pan, zoom, and no effect of the mouse over panels."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_pan_moves_the_target_with_the_pointer(hand, button, held):
     x, y = hand.middle
     hand.pull((x, y), (x + 64, y - 32), button, held)
     right, up, _ = camera_axes(camera)
-    points = 2 * camera.half_height / hand.state.view_rect[3]  # scene units a point
+    points = 2 * camera.half_height / hand.state.view_rect[3]  # scene units per point
     moved = camera.target - before.target
     assert moved @ right == pytest.approx(-64 * points)
     assert moved @ up == pytest.approx(-32 * points)
@@ -69,7 +69,7 @@ def test_wheel_zooms_to_the_pointer(hand):
     assert below_pointer() == pytest.approx(point)
 
 
-def test_wheel_before_the_mouse_was_seen_leaves_a_finite_camera(hand):
+def test_wheel_before_any_mouse_position_leaves_a_finite_camera(hand):
     hand.io.add_mouse_pos_event(-3.4e38, -3.4e38)
     hand.io.add_mouse_wheel_event(0.0, 5.0)
     hand.step(3)
@@ -99,7 +99,7 @@ def test_drag_that_begins_in_the_view_continues_over_panels(hand):
     assert hand.state.camera.azimuth != before and (hand.dofs() == pose).all()
 
 
-def test_mouse_works_where_hidden_panels_were(hand):
+def test_mouse_moves_the_camera_in_the_area_of_hidden_panels(hand):
     hand.key("tab")
     before = hand.state.camera.azimuth
     hand.pull((40, 300), (90, 300))
@@ -114,7 +114,7 @@ def test_orbit_stops_at_the_poles(hand):
     assert hand.state.camera.inclination == -90
 
 
-def test_endless_zoom_stays_finite(hand):
+def test_repeated_zoom_stays_finite(hand):
     for notches in (200, -400, 800):
         hand.wheel(notches, hand.middle)
         hand.assert_sane()

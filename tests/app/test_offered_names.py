@@ -1,4 +1,4 @@
-"""Names that the window offers for files: recordings, screenshots, poses, clips, exports."""
+"""File names that the window suggests for recordings, screenshots, poses, clips and exports."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.app.recording.state import KINDS, RecordSettings
 
 @pytest.fixture
 def recorded(drive, tmp_path):
-    """A test driver on a recording of two people, drawn with the bundled body."""
+    """A test driver on a capture of two people, drawn with the bundled body."""
     folder = write_frames(tmp_path / "seq_smpl" / "smpl", {0: [body(0), body(7)], 1: [body(0)]})
     return drive(folder, samples=1, size=(1000, 700))
 
@@ -39,7 +39,7 @@ def test_files_for_one_person_are_named_after_them(recorded):
     assert state.of(Files).dialog.name == "seq_smpl_7.obj"
 
 
-def test_motions_of_everyone_are_named_after_the_sequence(recorded):
+def test_motions_of_all_people_are_named_after_the_sequence(recorded):
     ask_for_motion(recorded.state)
     assert recorded.state.of(Files).dialog.name.startswith("seq_smpl.")
 

@@ -1,4 +1,4 @@
-"""Passes that the window draws in each frame, and fading shadows."""
+"""The number of passes that the window draws in each frame, and fading of shadows."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rendering.options import DisplayOptions
 DRAFT, FINAL = DisplayOptions(), DisplayOptions(quality="final", passes=4)
 
 
-def test_a_draft_is_drawn_once_for_each_change():
+def test_draft_quality_is_drawn_once_for_each_change():
     pace = Pace()
     assert pace.step("a", DRAFT, 0.0) is not None
     assert pace.step("a", DRAFT, 0.1) is None and not pace.is_unfinished
@@ -28,17 +28,17 @@ def test_final_quality_adds_passes_while_nothing_changes():
 
 
 @pytest.mark.parametrize("rate", [60, 3])
-def test_slow_drivers_fade_shadows_out_while_things_move_and_in_again(rate):
+def test_slow_drivers_fade_shadows_out_during_motion_and_in_again_after_it(rate):
     pace, strengths, qualities = Pace(), [], []
     for frame in range(90):
-        key = min(frame, 30)  # rests from the 31st frame on
+        key = min(frame, 30)  # nothing moves from the 31st frame on
         step = pace.step(key, FINAL, frame / rate)
         if step is not None:
             pace.measured(step, 0.08 if rate == 60 else 0.3)
             strengths.append(step.strength)
             qualities.append(step.options.quality)
     assert "draft" in qualities and qualities[-1] == "final" and strengths[-1] == 1.0
-    # No jump: fades out over a fifth of a second, and over at least two frames.
+    # Shadows do not jump: they fade out over a fifth of a second and at least two frames.
     assert np.abs(np.diff(strengths)).max() <= (1 / 12 if rate == 60 else 0.5) + 1e-9
 
 
@@ -50,7 +50,7 @@ def test_fast_drivers_keep_their_shadows():
         assert step.strength == 1.0 and step.options.quality == "final"
 
 
-def test_the_window_ends_with_the_average_of_all_passes(drive, rig):
+def test_final_picture_is_the_average_of_all_passes(drive, rig):
     hand = drive(*rig, samples=1)
     hand.step(3)
     draft = hand.scene_picture()

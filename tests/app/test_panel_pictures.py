@@ -1,4 +1,4 @@
-"""Golden images of the interface, compared coarsely: letters differ between machines.
+"""Golden images of the interface, compared coarsely because text differs between machines.
 
 ``make golden NAME…`` re-renders them; review them before committing.
 """
@@ -24,7 +24,7 @@ from viewer.app.weights.actions import pin_vertex
 
 SIZE = (560, 420)
 BODY_SIZE = (760, 680)
-MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after a blur that removes letters and hinting
+MOST_MEAN, MOST_LOCAL = 3.0, 40.0  # of 255, after a blur that removes text and hinting
 
 
 def _nothing(hand):
@@ -37,7 +37,7 @@ def _skeleton(hand):
 
 
 def _lights(hand):
-    # The tab is out of sight in so narrow a window.
+    # The tab is not visible in such a narrow window.
     hand.state.of(Layout).fronts.append("Lights")
     hand.step(3)
 
@@ -53,7 +53,7 @@ def _message(hand):
 
 def _dialog(hand):
     dialog = FileDialog(hand.state.paths[0].parent)
-    # Before the path field gets the focus, because a focused field keeps its text.
+    # The text is replaced before the path field is focused, because a focused field keeps its text.
     dialog.folder = Path("/figures")
     hand.state.of(Files).dialog = dialog
 
@@ -159,7 +159,7 @@ def test_interface_matches_golden_images(drive, rig, name):
 def test_body_panels_match_golden_images(drive_body, name):
     kind, prepare = BODIES[name]
     hand = drive_body(kind, size=BODY_SIZE, pixels_per_point=1.0)
-    hand.state.of(ShownPanels).closed.add("stats")  # its times differ between runs
+    hand.state.of(ShownPanels).closed.add("stats")  # the displayed times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
 
@@ -181,13 +181,13 @@ def _compare(pixels, name):
     path = GOLDEN / f"app_{name}.png"
     if is_redrawn(path.stem):
         Image.fromarray(pixels).save(path)
-    assert path.is_file(), f"{path} is missing: make golden {path.stem} draws it"
+    assert path.is_file(), f"{path} is missing: draw it with make golden {path.stem}"
     with Image.open(path) as golden:
         wanted = np.array(golden.convert("RGB"))
     assert _is_like(pixels, wanted), _difference(pixels, wanted)
 
 
-def test_comparison_distinguishes_states(drive, rig):
+def test_comparison_detects_a_different_state(drive, rig):
     hand = drive(*rig, size=SIZE, samples=4, pixels_per_point=1.0)
     start = _shown(hand, _nothing)
     hand.state.panels_visible = False

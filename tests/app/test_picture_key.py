@@ -1,4 +1,4 @@
-"""The cache key of the view: it changes with every visible change, and only then."""
+"""The cache key of the view, which changes with every visible change, and only then."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def state():
 
 
 def another(value):
-    """Return another value of the same kind."""
+    """Return a different value of the same type."""
     if isinstance(value, bool):
         return not value
     if isinstance(value, int | float):
@@ -148,7 +148,7 @@ CHANGES = CAMERA | OPTIONS | LIGHTS | KEY_LIGHT | SKINNING | POSE | ACTOR | REST
 
 
 @pytest.mark.parametrize("name", CHANGES)
-def test_every_change_of_what_is_drawn_changes_the_key(state, name):
+def test_every_visible_change_changes_the_key(state, name):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
     assert keys.key(state, SIZE) == before
@@ -192,7 +192,7 @@ def test_restored_values_give_an_equal_key(state):
     assert keys.key(state, SIZE) == before
 
 
-def test_a_still_scene_copies_nothing(state, monkeypatch):
+def test_unchanged_scene_is_not_copied(state, monkeypatch):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
     monkeypatch.setattr("viewer.app.picture_key.copy.deepcopy", None)
@@ -201,7 +201,7 @@ def test_a_still_scene_copies_nothing(state, monkeypatch):
     assert keys.key(state, SIZE) == before
 
 
-def test_the_frame_draws_when_the_key_changes_and_only_then(hand, monkeypatch):
+def test_frame_is_drawn_if_and_only_if_the_key_changes(hand, monkeypatch):
     renderer, drawn = hand.app.frame.renderer, []
     draw = renderer.draw
     monkeypatch.setattr(renderer, "draw", lambda *args: (drawn.append(1), draw(*args)))

@@ -1,6 +1,5 @@
-"""Pointer motion and press between two frames: the motion before the press is not a drag.
-
-Remote desktops, tablets and slow machines deliver both at once.
+"""Pointer motion and press between two frames, where the motion before the press is not a drag.
+Remote desktops, tablets and slow machines deliver both together.
 """
 
 from __future__ import annotations
@@ -20,7 +19,7 @@ from viewer.app.posing.state import Posing
 
 @pytest.fixture(params=[True, False], ids=["trickled", "at once"])
 def spread(request):
-    """Whether ImGui spreads quick input over several frames; set in the io of a test driver."""
+    """Whether ImGui spreads quick input over several frames; ``leap`` sets it."""
     return request.param
 
 
@@ -49,14 +48,14 @@ def test_press_after_a_pointer_jump_leaves_the_camera(hand, spread, button, held
     assert _aim(hand.state.camera) == before
 
 
-def test_drag_after_a_pointer_jump_starts_at_the_press(hand, spread):
+def test_drag_after_a_pointer_jump_starts_at_the_press_position(hand, spread):
     x, y = hand.middle
     hand.move((x - 100, y - 80))
     azimuth, inclination = hand.state.camera.azimuth, hand.state.camera.inclination
     leap(hand, (x, y), 0, spread)
     hand.move((x + 50, y + 25))
     hand.let_go()
-    # 0.4 degrees a point
+    # 0.4 degrees per point
     assert hand.state.camera.azimuth == pytest.approx(azimuth - 20)
     assert hand.state.camera.inclination == pytest.approx(inclination + 10)
 
@@ -71,7 +70,7 @@ def test_second_button_pressed_in_a_drag_does_not_stop_it(hand):
     assert hand.state.camera.target == pytest.approx(before.target)
 
 
-def test_splitter_follows_the_pointer_from_the_press(hand, spread):
+def test_splitter_follows_the_pointer_from_the_press_position(hand, spread):
     x, y, width, height = hand.state.view_rect
     before = _aim(hand.state.camera)
     hand.move((x + width / 2, y + height / 2))
@@ -102,7 +101,7 @@ def test_curve_plot_does_not_move_on_press(drive, rig, tmp_path, spread):
     assert hand.state.item_rects["key arm.x 0"][0] == pytest.approx(before[0] - 20, abs=0.5)
 
 
-def test_joint_handle_rotates_from_the_press(hand, spread):
+def test_joint_handle_rotates_from_the_press_position(hand, spread):
     hand.state.selected_joint = 1
     hand.key("e")
     hand.step(2)

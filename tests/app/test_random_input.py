@@ -1,6 +1,5 @@
-"""Monkey test of mouse and keyboard: nothing is raised and values stay finite.
-
-VIEWER_MONKEY_EVENTS=20000 tries more by hand.
+"""Random mouse and keyboard input, which must raise nothing and keep all values finite.
+VIEWER_MONKEY_EVENTS=20000 runs more events.
 """
 
 from __future__ import annotations
@@ -115,7 +114,7 @@ def _body_files(folder):
 
 
 def _keep_inside(folder, monkeypatch):
-    """Let dialogs browse any folder, but write into this one only."""
+    """Let dialogs browse any folder, but write only into the given folder."""
     monkeypatch.setenv("HOME", str(folder))
     for name in ("save_pose", "save_export"):
         save = getattr(menus, name)

@@ -1,4 +1,4 @@
-"""Open panels: most until they are closed, others only on request."""
+"""Open panels: most are open until closed, the others open only on request."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def test_panels_on_demand_are_closed_at_first(hand):
         assert is_open(state, name) == (not panel.on_demand)
 
 
-def test_opening_and_closing(hand):
+def test_panels_open_and_close(hand):
     state = hand.state
     for name in ("lint", "stats"):
         for opened in (True, True, False, False, True):

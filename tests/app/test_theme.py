@@ -1,4 +1,4 @@
-"""Fonts and colours of the interface: additional scripts, contrast of text."""
+"""Fonts and colours of the interface: additional scripts, and contrast of text."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.app.manual.manual_window import Manual
 from viewer.rendering.overlay.typeface import interface_font
 
 
-def test_fonts_of_the_system_complete_the_font_of_the_panels(hand, monkeypatch):
+def test_system_fonts_supplement_the_font_of_the_panels(hand, monkeypatch):
     assert not theme.lacks_letters(["hand_l", "\u0440\u0443\u043a\u0430", "\u03b1"])
     assert theme.lacks_letters(["hand_l", "\u95a2\u7bc0"])
     monkeypatch.setattr(theme, "system_fonts", lambda: (interface_font(),))

@@ -48,7 +48,7 @@ def test_enter_and_backspace_between_two_frames_keep_their_order(hand, type_at_o
     assert joint_tree(hand.state).filter == "arm"
 
 
-def test_click_between_two_frames_acts_also_while_text_is_entered(hand, type_at_once):
+def test_click_between_two_frames_acts_while_text_is_entered(hand, type_at_once):
     hand.click("Filter")
     type_at_once("arm")
     hand.step(2)
@@ -84,7 +84,7 @@ def test_shortcut_acts_if_its_modifier_is_released_before_the_next_frame(hand, t
     assert joint_tree(hand.state).filter == "root"
 
 
-def test_tab_reacts_if_the_mouse_reaches_it_just_before_the_click(hand):
+def test_tab_reacts_to_a_click_right_after_the_mouse_reaches_it(hand):
     tab = imgui.internal.find_window_by_name("Skinning").dc.dock_tab_item_rect
     hand.io.add_mouse_pos_event(tab.min.x + 10, (tab.min.y + tab.max.y) / 2)
     end_frame(imgui.get_current_context().input_events_queue)
@@ -115,12 +115,12 @@ def test_drag_between_two_frames_reaches_its_end(hand):
     [(A, 0, False), (A, CTRL, True), (ENTER, 0, True), (BACKSPACE, 0, True),
      (KEYPAD_1, 0, False), (KEYPAD_ENTER, 0, True)],
 )  # fmt: skip
-def test_only_text_keys_are_suppressed(key, modifiers, passes):
+def test_only_text_keys_are_ignored(key, modifiers, passes):
     keys = TypedKeys()
     assert keys.passes(key, PRESS, modifiers, is_typing=True) == passes
     assert keys.passes(key, REPEAT, modifiers, is_typing=True) == passes
     assert keys.passes(key, RELEASE, modifiers, is_typing=True) == passes
-    assert keys.passes(key, RELEASE, modifiers, is_typing=True)  # known to be up
+    assert keys.passes(key, RELEASE, modifiers, is_typing=True)  # reported as released
 
 
 def test_key_pressed_before_the_field_was_active_is_released():

@@ -1,4 +1,4 @@
-"""A tiny rig as files: one limited, one unlimited, one locked DOF, and a column that bends."""
+"""Files of a tiny rig with limited, unlimited and locked DOFs, and of a column that bends."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LABELS = ("root.tx", "root.ty", "root.tz", *FILE_POSE)
 
 
 def skin_text(n_bindings: int = 2) -> str:
-    """Return a column of three squares: the lowest follows the root, the highest the arm."""
+    """Return a .skin of three stacked squares: the lowest follows the root, the highest the arm."""
     corners = [(0.2, 0.2), (-0.2, 0.2), (-0.2, -0.2), (0.2, -0.2)]
     positions = [(x, y, z) for y in (0, 1, 2) for x, z in corners]
     normals = [(5 * x, 0, 5 * z) for _ in range(3) for x, z in corners]
@@ -67,7 +67,7 @@ def chain(n_joints: int) -> str:
 
 
 def comb(n_joints: int) -> str:
-    """Return a .skel in which every other joint is a child of the first, in a wide square."""
+    """Return a .skel of one root whose children form a square grid."""
     side = int(n_joints**0.5) + 1
     joints = (
         f"balljoint j {{ offset {0.2 * (k % side):.1f} {0.2 * (k // side):.1f} 0 }}\n"

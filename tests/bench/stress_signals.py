@@ -90,7 +90,9 @@ class Trial:
     def ending(self, code: int, said: bytes) -> str:
         """Return the exit code and all deviations from the expected outcome."""
         faults = [] if code in (0, self.code) else ["exit code"]
-        notes = b"".join(line for line in said.splitlines(True) if line.startswith(b"warning: "))
+        notes = b"".join(
+            line for line in said.splitlines(True) if line.startswith((b"warning: ", b"note: "))
+        )
         if said.replace(notes, b"") != (b"" if code == 0 else self.words):
             faults.append("words")
         faults += [f"left {path.name}" for path in self.folder.iterdir() if path != self.output]

@@ -42,7 +42,7 @@ def test_tables_are_laid_out_at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> N
     printed = terminal.getvalue()
     assert "\x1b[" in printed, "no style"
     assert "| R |" not in printed and "---" not in printed, "Markdown is left"
-    assert "reset the pose to that of the file" in printed
+    assert "reset the pose to the file's pose" in printed
 
 
 def test_help_for_a_command_lists_its_options(capsys: pytest.CaptureFixture[str]) -> None:

@@ -63,7 +63,7 @@ def test_unseen_keypoints_have_no_box(info, tmp_path):
     lines, found, err = info(folder)
     assert lines[1] == "  box        none: nothing is visible, z up"
     assert found["actors"][0]["present"] and found["actors"][0]["box"] is None
-    assert err == "warning: kp: no keypoint of person 0 is ever visible: every confidence is 0\n"
+    assert err == "note: kp: no keypoint of person 0 is ever visible: every confidence is 0\n"
 
 
 def test_morphs_are_listed_with_their_vertex_counts(info, tmp_path):

@@ -201,7 +201,7 @@ def test_pose_values_beyond_limits_are_clamped_with_a_note(folder, capsys):
     (folder / "hinge.skel").write_text("balljoint hinge { rotxlimit -1 0.5 }")
     actor, notes = described(capsys, "hinge.skel", "--pose", "0,0,0,2,0,0")
     assert actor["skeleton"]["dof_table"][3]["value"] == 0.5
-    assert notes == ["warning: 1 DOF of the pose clamped to its limits"]
+    assert notes == ["note: 1 DOF of the pose clamped to its limits"]
 
 
 def test_the_figure_is_placed(folder, capsys):
@@ -294,7 +294,7 @@ def test_pose_archive_error_names_the_key(folder, capsys):
 def test_mistyped_key_among_valid_ones_is_a_warning_with_its_line(folder, capsys):
     (folder / "p.json").write_text('{"betas": [1],\n"trnsl": [1, 2, 3]}')
     _, said = described(capsys, "smpl.npz", "--pose", "p.json")
-    assert len(said) == 1 and said[0].startswith("warning: p.json:2: ")
+    assert len(said) == 1 and said[0].startswith("note: p.json:2: ")
     assert "trnsl (did you mean transl?)" in said[0]
 
 

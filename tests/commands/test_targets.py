@@ -42,7 +42,9 @@ def refuse(capsys):
         capsys.readouterr()
         assert run(command) == 5
         captured = capsys.readouterr()
-        lines = [one for one in captured.err.splitlines() if not one.startswith("warning: ")]
+        lines = [
+            one for one in captured.err.splitlines() if not one.startswith(("warning: ", "note: "))
+        ]
         assert captured.out == "" and len(lines) == 1, captured
         assert all(word in lines[0] for word in words), lines
 

@@ -8,7 +8,14 @@ from itertools import count
 from pathlib import Path
 
 import pytest
-from commands.writing_runs import Inputs, contents, converting, drawing, into, write_inputs
+from commands.writing_runs import (
+    Inputs,
+    contents,
+    converting,
+    drawing,
+    into,
+    write_inputs,
+)
 
 from viewer.cli import run
 from viewer.media import saving
@@ -75,7 +82,9 @@ class _Stream:
 
 def refused(code: int, capsys, folder: Path) -> None:
     captured = capsys.readouterr()
-    lines = [one for one in captured.err.splitlines() if not one.startswith("warning: ")]
+    lines = [
+        one for one in captured.err.splitlines() if not one.startswith(("warning: ", "note: "))
+    ]
     assert code == 5 and len(lines) == 1, captured
     assert lines[0].startswith(f"viewer: {folder}") and lines[0].endswith(f": {FULL}"), lines
 

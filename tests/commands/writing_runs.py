@@ -13,6 +13,8 @@ from formats.synthetic_smpl import model
 
 from viewer.export import export
 
+REMARKS = ("warning: ", "note: ")
+"""Beginnings of lines about a command that goes on."""
 FREE = (".mtl", ".png")
 """Suffixes of companions: an ``.obj``'s take a name that no file has."""
 

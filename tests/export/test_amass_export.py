@@ -241,7 +241,7 @@ def test_figures_of_other_families_are_refused(family, tmp_path):
         written(clip_animation(family("mano"), hand), tmp_path / "a.npz")
     assert str(caught.value) == (
         "mano cannot be written as an AMASS motion: expected the joints of SMPL, SMPL+H or "
-        "SMPL-X, found others"
+        "SMPL-X, found different ones"
     )
     assert not list(tmp_path.iterdir())
 

@@ -65,7 +65,7 @@ def test_a_guessed_unit_is_used_for_bvh_and_reported_once(
     assert run(["convert", str(walk), "-o", str(out), *options]) == 0
     assert_allclose(bvh_places(out), factor * np.array(PERSON_TURNED), rtol=0, atol=2e-6)
     text, error = capsys.readouterr()
-    assert error == f"warning: {walk}: {GUESS}\n"
+    assert error == f"note: {walk}: {GUESS}\n"
     lines = text.splitlines()
     assert len(lines) == 1 and f", {word}, y up" in lines[0]
 
@@ -99,7 +99,7 @@ def test_gltf_of_centimetres_is_in_metres(walk, tmp_path, capsys):
     for name, options in (("motion.glb", []), ("pose.gltf", ["--time", "0.1"])):
         assert run(["convert", str(walk), "-o", str(tmp_path / name), *options]) == 0
         text, error = capsys.readouterr()
-        assert error == f"warning: {walk}: {GUESS}\n"
+        assert error == f"note: {walk}: {GUESS}\n"
         assert text.splitlines()[-1] == (
             "lengths are in centimetres: a node above the figure scales them to metres by 0.01"
         )
@@ -171,7 +171,8 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     assert notes[1:] == [
         "lengths were converted from centimetres to metres",
         "translations are relative to the skeleton's root at rest, (0.01, 0.95, 0.02) m: a model "
-        "with another rest root is offset by the difference (use --model for exact translations)",
+        "with a different root position at rest is offset by the difference (use --model for exact "
+        "translations)",
     ]
 
 

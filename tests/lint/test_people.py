@@ -20,10 +20,7 @@ def found(scene: Scene):
 
 def test_an_exchange_names_the_other_person_and_the_distance() -> None:
     (finding,) = found(exchanged())
-    assert finding.message == (
-        "jumps by 2000 mm to the position of person 1, who jumps to that of this person, in "
-        "1 frame: 120"
-    )
+    assert finding.message == ("swaps positions with person 1, 2000 mm away, in 1 frame: 120")
 
 
 def test_an_exchange_and_the_way_back_are_two_frames() -> None:

@@ -99,6 +99,32 @@ def test_a_capture_without_a_rate_has_that_of_the_video(tmp_path, video):
     assert scene.actors[0].clip.timing.frame_rate == 50.0
 
 
+@pytest.mark.parametrize(("rate", "keys"), [(None, ["F007.capture-no-rate"]), (25.0, [])])
+def test_an_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
+    write_frames(tmp_path / "take" / "smpl", {n: [body(0), body(1)] for n in range(3)})
+    scene = load(tmp_path / "take", motion=MotionSettings(frame_rate=rate))
+    assert scene.actors[0].clip.timing.frame_rate == (rate or 30.0)
+    found = [note for note in scene.diagnostics if note.key.endswith("no-rate")]
+    assert [note.key for note in found] == keys
+    assert all("--fps" in str(note) for note in found)
+
+
+def test_a_single_frame_needs_no_frame_rate(tmp_path):
+    write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
+    keys = [note.key for note in load(tmp_path / "take").diagnostics]
+    assert "F007.capture-no-rate" not in keys
+
+
+@pytest.mark.parametrize("option", ["video", "images"])
+def test_footage_of_several_captures_is_refused(tmp_path, video, option):
+    takes = [write_filmed(tmp_path / name) for name in ("a", "b")]
+    (tmp_path / "flat" / "01").mkdir(parents=True)
+    given = MotionSettings(**{option: video if option == "video" else tmp_path / "flat"})
+    with pytest.raises(RigError, match=f"expected one capture with --{option}, found 2") as found:
+        load(*takes, motion=given)
+    assert found.value.cause.key == "F001.several-captures"
+
+
 def test_a_folder_of_images_counted_from_1_belongs_to_the_only_camera(tmp_path):
     take = write_filmed(tmp_path / "take")
     for number in (1, 2, 3):

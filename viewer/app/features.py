@@ -7,13 +7,13 @@ function of the state. Both are imported on first use.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 
 __all__ = [
     "ACTIONS",
@@ -54,7 +54,7 @@ class Panel:
         ``"actors"`` a motion or several actors, ``"parts"`` a mesh of several parts, ``"drive"`` a
         motion of another skeleton; empty if the panel is always available.
     leads : bool
-        Whether it is brought in front of the other tabs when a scene makes it available.
+        Whether it is brought to the front of its tabs when a scene makes it available.
     on_demand : bool
         Whether it is closed until the user opens it.
     """
@@ -93,7 +93,7 @@ class Shortcut:
 
     @property
     def name(self) -> str:
-        """Name of the action in the preferences: it stays the same when keys and texts change."""
+        """Name of the action in the preferences: it stays the same when keys and labels change."""
         return " ".join([self.action, *map(str, self.arguments)])
 
     def run(self, state: AppState) -> None:
@@ -114,7 +114,8 @@ class Action:
     arguments : tuple
         Additional arguments of the action.
     why : str
-        Function of the state that returns why the action is disabled; empty if it never is.
+        Function of the state that returns the reason why the action is disabled; empty if it is
+        always enabled.
     """
 
     text: str
@@ -127,7 +128,7 @@ class Action:
         _function(self.action)(state, *self.arguments)
 
     def reason(self, state: AppState) -> str:
-        """Return why it is disabled; empty if it can be run."""
+        """Return the reason why it is disabled; empty if it can be run."""
         return str(_function(self.why)(state)) if self.why else ""
 
 
@@ -160,7 +161,7 @@ PANELS = {
 """Panels in the order in which they are docked and listed in the menu."""
 
 KEYS = (
-    Shortcut((_K.r,), "R", "reset the pose to that of the file", "posing.pose_actions.reset_pose"),
+    Shortcut((_K.r,), "R", "reset the pose to the file's pose", "posing.pose_actions.reset_pose"),
     Shortcut((_K.s,), "S", "show or hide the skeleton", "view.display_actions.toggle_skeleton"),
     Shortcut(
         (_K.k,),

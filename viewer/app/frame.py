@@ -65,7 +65,7 @@ __all__ = ["Frame"]
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
 _LAID_OUT = 2
-"""The frame from which on the panels leave the view its own place; ImGui counts from 1."""
+"""First frame in which the panels leave room for the view; ImGui counts from 1."""
 
 
 class Frame:
@@ -331,7 +331,7 @@ class Frame:
                 state.say(problem_text)
 
     def stream(self, builders: Sequence[Builder]) -> None:
-        """Begin to read the rest of captures."""
+        """Begin to read the remaining parts of captures."""
         left = [builder for builder in builders if not builder.is_done]
         self.state.of(Files).stream = Stream(left, self.wake) if left else None
 

@@ -70,8 +70,8 @@ class HeadlessApp:
     def step(self, frames: int = 1) -> None:
         """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
 
-        Panels are painted only by ``pixels``, because with software rendering that takes longer
-        than the rest of a frame.
+        Panels are painted only by ``pixels``, because with software rendering this takes longer
+        than all other steps of a frame.
         """
         self._make_current()
         for _ in range(frames):
@@ -95,7 +95,7 @@ class HeadlessApp:
     def picture(self, fits: bool = True) -> Bytes:
         """Return the whole interface as pixels, (H, W, 4) uint8, with the camera fitted.
 
-        Messages do not time out, however long drawing takes.
+        Messages do not time out, regardless of how long drawing takes.
         """
         for note in self.state.messages.notes:
             note.until = math.inf

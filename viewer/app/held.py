@@ -20,12 +20,12 @@ def is_held(state: AppState) -> bool:
 
 
 def _is_widget_held() -> bool:
-    """Return whether a widget is held. A field that is typed into changes nothing until it is left.
+    """Return whether a widget is held. A text field changes nothing until it loses the focus.
 
-    Tab goes from field to field without a frame in between, and each number is an edit of its own.
+    Tab goes from field to field without a frame in between, and each number is a separate edit.
     """
     active = imgui.internal.get_active_id()
-    # The state stays after typing: a slider may be dragged whose number was typed before.
+    # This state persists after typing: the same slider may be dragged afterwards.
     is_text = imgui.internal.get_input_text_state(active) is not None
     return active != 0 and not (is_text and imgui.get_io().want_text_input)
 

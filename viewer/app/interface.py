@@ -54,7 +54,7 @@ def draw_interface(state: AppState) -> list[Path]:
 
 
 def _dock_of_neighbour(panel: Panel) -> int:
-    """Return the dock node of another panel with the same place, or 0 if none is docked."""
+    """Return the dock node of another panel with the same initial dock, or 0 if none is docked."""
     for other in PANELS.values():
         window = None
         if other.place == panel.place and other is not panel:
@@ -71,7 +71,7 @@ def _draw_panel(state: AppState, name: str, panel: Panel) -> bool:
     flags = imgui.WindowFlags_.no_focus_on_appearing if is_quiet else imgui.WindowFlags_.none
     neighbour = _dock_of_neighbour(panel)
     if neighbour:
-        # A panel that is missing from the stored layout would float over the others.
+        # A panel that is missing from the stored layout would float over the other panels.
         imgui.set_next_window_dock_id(neighbour, imgui.Cond_.first_use_ever)
     shown, stays = imgui.begin(panel.title, True, flags)
     appears = imgui.is_window_appearing()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -13,11 +13,20 @@ from viewer.app.files.state import Files
 from viewer.app.palette.palette_window import Palette
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
+from viewer.data_classes import dataclass
 
 __all__ = ["Keyboard", "handle_keys"]
 
-_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # repeat while held
-_ALWAYS = ("Esc", "Ctrl+Q")  # also while a message or dialog is open
+_REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # these repeat while held
+_NAVIGATION = {  # these navigate an open menu or list, and choose from it
+    imgui.Key.left_arrow,
+    imgui.Key.right_arrow,
+    imgui.Key.up_arrow,
+    imgui.Key.down_arrow,
+    imgui.Key.space,
+    imgui.Key.enter,
+}
+_ALWAYS = ("Esc", "Ctrl+Q")  # these work even while a message or dialog is open
 _Bound = tuple[imgui.Key, bool, Shortcut]
 """A key without modifiers, whether it repeats while held, and its action."""
 
@@ -32,6 +41,8 @@ class Keyboard:
         Whether the list of keys is shown.
     modifiers : int
         Modifiers in the previous frame, as ImGui's bits.
+    has_menu : bool
+        Whether a menu or list was open when keys were last handled. ImGui may have closed it since.
     chosen : dict
         The user's keys for which the table below was made, as in ``Preferences.keys``.
     bound : dict
@@ -40,6 +51,7 @@ class Keyboard:
 
     is_listed: bool = False
     modifiers: int = 0
+    has_menu: bool = False
     chosen: dict[str, str] = field(default_factory=dict)
     bound: dict[int, list[_Bound]] = field(default_factory=dict)
 
@@ -53,18 +65,20 @@ class Keyboard:
 def handle_keys(state: AppState) -> None:
     """Run the actions of keys pressed in this frame; letters typed into a text box are ignored."""
     keyboard = state.of(Keyboard)
+    had_menu, keyboard.has_menu = keyboard.has_menu, _has_menu()
+    _let_menus_have_keys(keyboard.has_menu)
     # Ctrl may be released in the frame in which the letter is pressed. Modifiers held in the
     # previous frame still count, or Ctrl+S would be interpreted as S.
     now = imgui.get_io().key_mods
     held, keyboard.modifiers = now | keyboard.modifiers, now
     if imgui.get_io().want_text_input:
         return
-    # Otherwise ImGui would move the focus with Tab also while nothing is typed.
+    # Otherwise ImGui would move the focus with Tab even while nothing is typed.
     imgui.internal.set_key_owner(imgui.Key.tab, imgui.get_id("viewer"))
     if state.of(Palette).is_open:
         # Letters may be typed before the text box of the palette has the focus.
         return
-    if imgui.is_key_pressed(imgui.Key.escape, False) and _close_menus():
+    if imgui.is_key_pressed(imgui.Key.escape, False) and (_close_menus() or had_menu):
         return
     appearance = state.of(Appearance)
     if appearance.captured:
@@ -76,13 +90,15 @@ def handle_keys(state: AppState) -> None:
     for key, repeats, shortcut in keyboard.of(chosen, int(held)):
         if is_covered and shortcut.label not in _ALWAYS:
             continue
+        if (had_menu or keyboard.has_menu) and key in _NAVIGATION:
+            continue
         if imgui.is_key_pressed(key, repeats):
             shortcut.run(state)
             break
 
 
 def _bound(chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
-    """Return the keys by their modifiers; to take chords apart in every frame is slow."""
+    """Return the keys by their modifiers; splitting chords in every frame would be slow."""
     mask = int(imgui.Key.mod_mask_)
     bound: dict[int, list[_Bound]] = {}
     for shortcut in KEYS:
@@ -92,11 +108,25 @@ def _bound(chosen: Mapping[str, str]) -> dict[int, list[_Bound]]:
     return bound
 
 
-def _close_menus() -> bool:
-    """Close an open menu or list; return whether there was one. Messages handle Esc themselves."""
+def _let_menus_have_keys(has_menu: bool) -> None:
+    """Let ImGui move through an open menu or list with the arrow keys, from the next frame on.
+
+    Without a menu, these keys step through frames, and ImGui must not move the focus with them.
+    """
+    io, flag = imgui.get_io(), imgui.ConfigFlags_.nav_enable_keyboard
+    io.config_flags = io.config_flags | flag if has_menu else io.config_flags & ~flag
+
+
+def _has_menu() -> bool:
+    """Return whether a menu or list is open. Messages handle keys themselves."""
     any_popup = imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level
     has_modal = imgui.internal.get_top_most_popup_modal() is not None
-    if has_modal or not imgui.is_popup_open("", any_popup):
+    return not has_modal and imgui.is_popup_open("", any_popup)
+
+
+def _close_menus() -> bool:
+    """Close an open menu or list; return whether there was one."""
+    if not _has_menu():
         return False
     imgui.internal.close_popup_to_level(0, True)
     return True

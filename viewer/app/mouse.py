@@ -71,7 +71,7 @@ def handle_mouse(state: AppState) -> None:
 def _drags(button: imgui.MouseButton_) -> bool:
     """Return whether the pointer's motion since the last frame belongs to a drag."""
     if imgui.is_mouse_clicked(button):
-        return False  # the motion came before the press
+        return False  # the motion preceded the press
     # A motion and a release within one frame also belong to the drag.
     return imgui.is_mouse_dragging(button, 0.0) or imgui.is_mouse_released(button)
 

@@ -1,9 +1,10 @@
-"""Choice of what to draw in each frame: more passes of still scenes, less of moving ones."""
+"""Drawing steps of each frame: more passes of still scenes, lower quality of moving ones."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.sampling import n_passes
 
@@ -35,7 +36,7 @@ class Pace:
         self._key: object = None
         self._changed = self._now = float("-inf")
         self._is_moving = False
-        self._done = 0  # passes of the image that is shown
+        self._done = 0  # completed passes of the image that is shown
         self._strength = 1.0
         self._cost = 0.0  # frame time with shadows, once measured
         self.is_unfinished = False

@@ -75,7 +75,7 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
     font = interface_font()
     if font is not None:
         imgui.get_io().fonts.add_font_from_file_ttf(str(font), _FONT_POINTS)
-    # A click on a number that can be dragged begins to type it.
+    # A click on a draggable number begins text input.
     imgui.get_io().config_drag_click_to_input_text = True
     set_theme(theme)
     style = imgui.get_style()
@@ -93,7 +93,7 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
 
 
 def lacks_letters(texts: Iterable[str]) -> bool:
-    """Return whether the current font lacks a letter of some texts."""
+    """Return whether the current font lacks a glyph for any letter of some strings."""
     font = imgui.get_io().fonts.fonts[0]
     letters = {letter for text in texts if not text.isascii() for letter in text}
     return not all(font.is_glyph_in_font(ord(letter)) for letter in letters)

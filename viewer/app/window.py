@@ -59,8 +59,8 @@ __all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 _SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two frames
 _FIRST_FRAMES = 3  # frames after which fonts for additional scripts are loaded
-_IDLE_SECONDS = 0.5  # interval at which messages that time out are checked
-_BUSY_SECONDS = 0.05  # the same interval while a file is being read
+_IDLE_SECONDS = 0.5  # interval between checks for messages that time out, seconds
+_BUSY_SECONDS = 0.05  # interval between frames while a file is being read, seconds
 
 
 def show(
@@ -110,7 +110,7 @@ def show(
     points = scene_points(scene, options.show)
     camera = camera or facing_camera(guess_front(scene), scene.up)
     files = tuple(map(Path, paths))
-    hold()  # GLFW's callbacks swallow exceptions raised in them, such as an interrupt
+    hold()  # exceptions raised in GLFW's callbacks, such as interrupts, would be lost
     state = AppState(scene, camera, options, bounding_box(points), files)
     state.motion_settings = motion
     if motion is not None and motion.frame_rate is not None:
@@ -380,5 +380,5 @@ def _window_size(scale: float) -> tuple[int, int]:
 def _context() -> moderngl.Context:
     try:
         return moderngl.create_context(require=330)
-    except Exception as problem:  # glcontext raises plain Exception
+    except Exception as problem:  # glcontext raises bare Exception
         raise RenderError(explain(str(problem))) from None

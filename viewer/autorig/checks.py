@@ -18,7 +18,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 __all__ = ["check_lines", "newly_outside", "residual_of", "with_joint_name"]
 
-_EXACT = 1e-4  # residual over size above which a warning is given
+_EXACT = 1e-4  # ratio of residual to size above which a warning is given
 
 
 def newly_outside(
@@ -44,7 +44,8 @@ def newly_outside(
     joints : (J, 3) or None
         Joint positions in the target's frame; None if they are the template's.
     transferred : (J,) bool or None
-        Joints that are expected inside, unlike those of a part that the target lacks; None for all.
+        Joints that are expected to be inside, unlike joints of a part that the target lacks; None
+        for all.
     """
     own = joint_matrices(template, pose)[:, :3, 3]
     before = outside(posed, template.require_mesh().triangles, own)

@@ -1,4 +1,4 @@
-"""The seed method, kept for comparison: aligned boxes, nearest vertices, copied joints."""
+"""The seed method, provided for comparison: aligned boxes, nearest vertices, copied joints."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["nearest"]
 
 
 def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
-    """Apply the steps of Tex-An Mesh: the target is changed, the template's joints are not.
+    """Apply the steps of Tex-An Mesh: the target is changed; the template's joints are not.
 
     As in the original, pose correctives are neither removed nor added back. Only nearly singular
     blended matrices are replaced by the nearest rotation, which is reported.

@@ -8,11 +8,12 @@ import os
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.diagnostics import described
 from viewer.diagnostics.record import Record, recorded
 from viewer.errors import ViewerError
@@ -22,7 +23,7 @@ from viewer.phrases import printable
 __all__ = ["FunctionJob", "attempt"]
 
 _BAD_INPUT, _UNWRITTEN, _DEFECT = 2, 5, 1  # exit codes
-_LONGEST = 2000  # characters of a message
+_LONGEST = 2000  # maximum length of a message in characters
 
 
 @dataclass(frozen=True)
@@ -34,7 +35,8 @@ class FunctionJob:
     function : callable
         Called with an ``Item``; must be importable by its name if items run in other processes. A
         dict that it returns is the ``values`` of the result, anything else ``values["value"]``.
-        The folder of the item's output exists; an output that it writes is one of the result.
+        The folder of the item's output exists; if it writes the output, that is listed in the
+        result.
     """
 
     function: Callable[[Item], Any]
@@ -83,7 +85,8 @@ def attempt(item: Item, call: Callable[[Item], Any]) -> Result:
     with recorded() as record, contextlib.ExitStack() as stack:
         stack.enter_context(contextlib.redirect_stdout(out))
         stack.enter_context(contextlib.redirect_stderr(err))
-        # Also interrupts the item if it is writing, which defers signals until the block ends.
+        # Also interrupts an item that is writing, although writing defers signals until the block
+        # ends.
         stack.enter_context(watched())
         result = _outcome(item, call, record)
     return replace(

@@ -7,9 +7,9 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, SUFFIXES
 from viewer.phrases import counted, printable
@@ -67,7 +67,7 @@ def find_inputs(
         Whether each folder is one input. Otherwise its files are the inputs, except for recordings
         and models that consist of a folder.
     output : str
-        Folder of the outputs. If it lies in a searched folder, its files are not used as inputs,
+        Folder of the outputs. If it is in a searched folder, its files are not used as inputs,
         which matters when a batch is resumed.
 
     Raises
@@ -149,7 +149,7 @@ class _Search:
         if self._n_seen == before:
             raise ViewerError(
                 f"{printable(path, 300)}: no file in this folder has a suffix of a known format; "
-                "name others by a pattern"
+                f"use a pattern to select other files"
             )
 
     def add_list(self, name: str) -> None:
@@ -178,9 +178,7 @@ class _Search:
             text = counted(self._n_skipped, "file")
             notes.append(f"{text} in folders skipped: the suffix belongs to no format")
         if self._n_outputs:
-            notes.append(
-                f"{counted(self._n_outputs, 'file')} in the folder of the outputs left out"
-            )
+            notes.append(f"{counted(self._n_outputs, 'file')} in the folder of the outputs omitted")
         paths = sorted(self._found.values(), key=natural_key)
         return Inputs(tuple(paths), _common(self.roots), frozenset(self._folders), tuple(notes))
 
@@ -189,7 +187,7 @@ class _Search:
         return len(self._found) + self._n_repeated
 
     def _is_output(self, path: str) -> bool:
-        """Return whether a path lies in the output folder, if that is within the last root."""
+        """Return whether a path is in the output folder, if that folder is within the last root."""
         if not self.output or not self.output.startswith(os.path.join(self.roots[-1], "")):
             return False
         found = f"{os.path.abspath(path)}{os.sep}".startswith(f"{self.output}{os.sep}")
@@ -264,5 +262,5 @@ def _common(folders: Sequence[str]) -> str:
     """Return the deepest folder that contains all of some absolute folders."""
     try:
         return os.path.commonpath({*folders})
-    except ValueError:  # on several drives
+    except ValueError:  # the folders are on several drives
         return ""

@@ -67,7 +67,7 @@ def _digest(path: str) -> bytes:
             for name in sorted(files):
                 inner = os.path.join(folder, name)
                 total.update(os.fsencode(os.path.relpath(inner, path)) + b"\0")
-                # Pipes and devices may never end, and links may lead nowhere.
+                # Pipes and devices may never end, and links may be broken.
                 total.update(_digest(inner) if os.path.isfile(inner) else b"-")
         return total.digest()
     member = ""

@@ -6,6 +6,7 @@ import os
 import re
 import unicodedata
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from string import Formatter
 
@@ -15,7 +16,16 @@ from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import counted, listed, printable
 
-__all__ = ["FIELDS", "check_outputs", "check_summaries", "items_of", "output_folder", "template_of"]
+__all__ = [
+    "FIELDS",
+    "check_further_outputs",
+    "check_outputs",
+    "check_summaries",
+    "filled",
+    "items_of",
+    "output_folder",
+    "template_of",
+]
 
 FIELDS = {
     "parent": "the input's folder, relative to the folder that all inputs share",
@@ -27,9 +37,9 @@ FIELDS = {
 }
 """Fields of templates."""
 
-_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of numbers
-_LEFT = ("frame",)  # fields of the commands, for numbered images and meshes
-_LONGEST = 300  # characters of a name in a message
+_NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of ``{index}``
+_LEFT = ("frame",)  # fields that commands replace, for numbered images and meshes
+_LONGEST = 300  # maximum length of a name in a message, characters
 
 
 def template_of(output: str, suffix: str) -> str:
@@ -73,7 +83,7 @@ def output_folder(output: str) -> str:
     return os.path.dirname(output.partition("{")[0]) if _fields(output) else output
 
 
-def _fields(template: str) -> list[str]:
+def _fields(template: str, option: str = "-o") -> list[str]:
     """Return the fields of a template; raise ViewerError for unknown ones."""
     try:
         found = [
@@ -82,19 +92,19 @@ def _fields(template: str) -> list[str]:
             if name is not None
         ]
     except ValueError as problem:
-        raise ViewerError(f"-o {printable(template, _LONGEST)}: {problem}") from None
+        raise ViewerError(f"{option} {printable(template, _LONGEST)}: {problem}") from None
     for name, spec, conversion in found:
         if name not in (*FIELDS, *_LEFT):
-            near = did_you_mean(name, FIELDS) or f"there are {', '.join(FIELDS)}"
-            raise ViewerError(f"-o: no field is called {{{printable(name, 40)}}}; {near}")
+            near = did_you_mean(name, FIELDS) or f"available fields: {', '.join(FIELDS)}"
+            raise ViewerError(f"{option}: no field is called {{{printable(name, 40)}}}; {near}")
         if spec and name not in ("index", *_LEFT):
             raise ViewerError(
-                f"-o: expected {{{name}}} without a format, found {printable(spec, 40)}"
+                f"{option}: expected {{{name}}} without a format, found {printable(spec, 40)}"
             )
         if conversion or (name == "index" and not _NUMBER.fullmatch(spec)):
             form = f"!{conversion}" if conversion else f":{spec}"
             wanted = "{index} or {index:05}" if name == "index" else f"{{{name}}}"
-            raise ViewerError(f"-o: expected {wanted}, found {{{name}{printable(form, 40)}}}")
+            raise ViewerError(f"{option}: expected {wanted}, found {{{name}{printable(form, 40)}}}")
     return [name for name, _, _ in found]
 
 
@@ -153,6 +163,48 @@ def _filled(
     return os.path.normpath(text)
 
 
+def filled(template: str, item: Item) -> str:
+    """Return a template with its fields replaced for one item, such as for a second output."""
+    path = item.files[-1]
+    pieces = list(Formatter().parse(template))
+    return _filled(pieces, item.index, path, item.name, os.path.isdir(path))
+
+
+def check_further_outputs(
+    option: str, template: str, items: Sequence[Item], more_inputs: Iterable[str] = ()
+) -> list[Item]:
+    """Check the names of a second output of each item.
+
+    Parameters
+    ----------
+    option : str
+        The option that names it, for messages.
+    template : str
+        Template for its name.
+    items : sequence of Item
+        All items, including those of other shards.
+    more_inputs : iterable of str
+        Files that all items read.
+
+    Returns
+    -------
+    list of Item
+        The items, each with this file as its output.
+
+    Raises
+    ------
+    ViewerError
+        If a field is unknown, or a file would be written twice or replace an input.
+    """
+    _fields(template, option)
+    further = [replace(item, output=filled(template, item)) for item in items]
+    try:
+        check_outputs([*items, *further], more_inputs)
+    except ViewerError as problem:
+        raise ViewerError(f"{option}: {problem}") from None
+    return further
+
+
 def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> None:
     """Check that no two items have the same output and no output is an input.
 
@@ -162,7 +214,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     Parameters
     ----------
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -197,14 +249,14 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
 def check_summaries(
     files: Mapping[str, str], items: Sequence[Item], more_inputs: Iterable[str] = ()
 ) -> None:
-    """Check that files about the whole batch are neither inputs, outputs nor each other.
+    """Check that files about the whole batch differ from inputs, outputs and each other.
 
     Parameters
     ----------
     files : dict of str
         The file of each option, such as ``--table``; empty for none.
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -217,7 +269,7 @@ def check_summaries(
     given = {option: path for option, path in files.items() if path}
     if not given:
         return
-    # Resolving a million paths takes seconds, so only those of the same name are.
+    # Resolving a million paths takes seconds, so only paths with the same name are resolved.
     last = {os.path.basename(path).casefold() for path in given.values()}
 
     def is_near(path: str) -> bool:
@@ -234,7 +286,7 @@ def check_summaries(
         found = "an input" if real.of(path) in inputs else owners.get(_identity(here, path))
         if found is not None:
             raise ViewerError(
-                f"{option}: {_shown(path)}: expected a file of its own, found {_shown(found)}"
+                f"{option}: {_shown(path)}: expected a separate file, found {_shown(found)}"
             )
         owners[_identity(here, path)] = f"the file of {option}"
 

@@ -31,7 +31,7 @@ MEASURES = {
     "vertices": ("vertices", "surface, from the first", "surface, from the second"),
     "weights": ("weights",),
 }
-"""Groups of columns, and the measures of ``diff`` that they show the worst of."""
+"""Groups of columns, and the measures of ``diff`` whose largest values they contain."""
 
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 
@@ -101,7 +101,7 @@ def _safe(cell: Cell) -> Cell:
 
 
 def row_message(result: Result) -> str:
-    """Return why an item failed, in one line; empty if it did not."""
+    """Return the reason why an item failed, in one line; empty if it did not."""
     errors = [one.get("error") or "" for one in comparisons(result)]
     return "; ".join(filter(None, errors)) or result.message
 
@@ -156,7 +156,7 @@ def _diff_cells(result: Result) -> list[Cell]:
 
 
 def mismatches_of(result: Result) -> list[str]:
-    """Return the elements that only one of the two sides has."""
+    """Return the elements that only one of the two inputs has."""
     return [
         text
         for one in comparisons(result)

@@ -17,7 +17,7 @@ def name_worker(name: object) -> None:
 
 
 def worker_rank() -> int | None:
-    """Return the rank of this worker, by which graphics cards are assigned.
+    """Return the rank of this worker, which determines its graphics card.
 
     Returns
     -------

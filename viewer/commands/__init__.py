@@ -11,10 +11,11 @@ COMMANDS = {
     "batch": "run convert, render, rig, info, diff or lint for many files, in parallel",
     "rig": "transfer the rig of a figure to an unrigged mesh",
     "info": "describe the contents of files",
-    "diff": "compare figures or motions with a reference: how far apart, where, in which pose",
+    "diff": "compare figures or motions with a reference: how much they differ, where, and in "
+    "which pose",
     "lint": "check rigs and motions: what is wrong, where, and how to fix it",
     "models": "list body models: found, missing, where they are published, and their licences",
-    "doctor": "check this machine: packages, OpenGL, display, and how to fix what is missing",
+    "doctor": "check this machine: packages, OpenGL, display, and how to install missing parts",
     "help": "show a page of the manual",
     "completion": "print a script that completes commands and options in bash, zsh or tcsh",
 }

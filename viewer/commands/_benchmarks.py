@@ -9,10 +9,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.data_classes import dataclass
 from viewer.errors import RenderError
 from viewer.loading import bundled_body, bundled_files, load
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 __all__ = ["Measured", "measured"]
 
 _SIZE = 1280, 720
-_STARTS, _FRAMES = 5, 9  # repetitions; the median is used
+_STARTS, _FRAMES = 5, 9  # numbers of repetitions; the median is used
 _INSTANCES, _ROUNDS_OF_MANY = 100, 3
 # A minimal program that draws: it imports numpy and creates an OpenGL context.
 _LEAST = "from viewer.rendering.gpu.context import headless_context; headless_context()"
@@ -32,7 +32,7 @@ _LEAST = "from viewer.rendering.gpu.context import headless_context; headless_co
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """A duration, in milliseconds, and what it is compared with, if anything."""
+    """A duration in milliseconds, and the duration that it is compared with, if any."""
 
     subject: str
     milliseconds: float
@@ -144,7 +144,7 @@ def _drawn(
 
 
 def _crowd(scene: Scene) -> Scene:
-    """Return rows of ten of the first figure."""
+    """Return copies of the first figure, in rows of ten."""
     from viewer.rig.scene import Actor, Scene
 
     actors = [Actor(scene.actors[0].figure) for _ in range(_INSTANCES)]

@@ -60,8 +60,8 @@ def _add_feet(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--lock-feet",
         action="store_true",
-        help="hold feet in place while they stand; legs and, where they are too short, the body "
-        "follow",
+        help="hold feet in place while they touch the ground; legs follow, and so does the body if "
+        "they are too short",
     )
     group.add_argument(
         "--ground",

@@ -22,7 +22,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skinning import joint_matrices
 
-_FARTHEST = 1e9  # any unit
+_FARTHEST = 1e9  # largest coordinate, in any unit
 
 
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:

@@ -16,7 +16,7 @@ from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.scene import Actor, Scene
 
-_LISTED = 12  # names listed in a message
+_LISTED = 12  # maximum number of names listed in a message
 
 
 def is_named(text: str) -> bool:
@@ -46,7 +46,7 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
 
 
 def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
-    """Return the first actor that has all shapes named in a text, and a record that sets them.
+    """Return the first actor that has all shapes named in the text, and a record that sets them.
 
     Returns ``actor``: actor with a pose.
     Returns ``record``: sets the named shapes and keeps the others.

@@ -44,7 +44,8 @@ def animation_of_pose(
 ) -> tuple[SampledAnimation, str]:
     """Return an actor's current pose as a sampled animation, and its up axis, for an exporter.
 
-    The frame has the number that ``--frame`` uses; between two frames, the displayed one counts.
+    The frame has the number that ``--frame`` uses; between two frames, it is that of the displayed
+    frame.
     """
     frames = numbering_of(scene.actors, arguments.fps)
     time = frames.start if scene.time is None else scene.time

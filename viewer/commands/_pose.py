@@ -145,8 +145,8 @@ def _pose(text: str) -> tuple[PoseRecord, Source | None]:
     if _is_numbers(text):
         return PoseRecord(vector=_numbers("--pose", text)), None
     source = Source.open(text)
-    # A JSON list is detected as a list of people; read as a pose, it is rejected, not being an
-    # object.
+    # A JSON list is detected as a list of people; read as a pose, it is rejected because it is not
+    # an object.
     is_list = not source.is_folder and detect(source) == "easymocap"
     record = read_pose(source) if is_list else read(source)
     if not isinstance(record, PoseRecord):
@@ -161,7 +161,7 @@ def _is_numbers(text: str) -> bool:
 def _numbers(option: str, text: str | None) -> Floats | None:
     if text is None:
         return None
-    # A trailing comma is accepted; two in a row would shift the following numbers.
+    # A trailing comma is accepted; two consecutive commas would shift the following numbers.
     words = re.split(r"\s*,\s*|\s+", text.strip().removesuffix(",").rstrip())
     try:
         return np.array([number(word) for word in words])
@@ -211,7 +211,7 @@ def _apply_shape(scene: Scene, text: str) -> list[Diagnostic]:
         return apply_record(record, first.figure, first.require_pose())
     figure = next((actor.figure for actor in others if actor.figure.n_shapes), None)
     if figure is not None and figure.blend_shapes is not None:
-        # Given values are those of the sliders, which need not be 0 for the mean body.
+        # The option takes slider values, which need not be 0 for the mean body.
         rows = range(min(len(values), figure.n_shapes))
         values[: len(rows)] -= [figure.blend_shapes.origin(row) for row in rows]
     return _apply_record("--shape", PoseRecord(shape=values), scene)
@@ -325,7 +325,7 @@ def _find(scene: Scene, label: str) -> tuple[Actor, int, list[str]]:
 
 def _dof_value(setting: str, text: str, is_rotation: bool) -> float:
     found = re.fullmatch(r"(.*?)(rad|deg)?", text.strip())
-    assert found is not None  # the pattern matches everything
+    assert found is not None  # the pattern matches any text
     try:
         value = number(found[1])
     except (ValueError, argparse.ArgumentTypeError):

@@ -33,7 +33,7 @@ LAYOUTS = ("body19", "panoptic", "coco", "h36m")
 """Keypoint layouts with the same number of points as another one."""
 
 _DEFAULT = "the bundled figure"
-_MOST_MODELS = 12  # names in a message
+_MOST_MODELS = 12  # maximum number of names in a message
 _UNITS = {"k": 1 << 10, "m": 1 << 20, "g": 1 << 30}
 
 
@@ -74,7 +74,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "--max-size",
         default="2G",
         metavar="SIZE",
-        help="refuse larger files, with k, M or G (default: 2G)",
+        help="maximum size of a file, with suffix k, M or G (default: 2G)",
     )
     group.add_argument(
         "--no-cache",
@@ -127,8 +127,8 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         action="append",
         default=[],
         metavar="FILE",
-        help="a file whose motion or animation drives a figure, such as a glTF or FBX file with a "
-        "figure of its own; may be repeated",
+        help="a file whose motion or animation drives a figure, such as a glTF or FBX file that "
+        "contains another figure; may be repeated",
     )
     group.add_argument(
         "--source-rest",
@@ -143,7 +143,7 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         "--feet",
         choices=("on", "off"),
         default="on",
-        help="keep the feet of driven figures planted on the ground while those of the motion are "
+        help="plant the feet of driven figures while the feet of the motion are on the ground "
         "(default: on)",
     )
     group.add_argument(
@@ -160,14 +160,14 @@ def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--images",
         metavar="FOLDER",
-        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, beside "
+        help="folder of the cameras' images, as in FOLDER/01/000000.jpg (default: images, next to "
         "the capture); for a single camera also a folder of its numbered images",
     )
     group.add_argument(
         "--video",
         metavar="FILE",
-        help="video of a capture's camera, drawn behind the scene with --view; also gives the "
-        "frame rate of captures that have none (needs PyAV)",
+        help="video of a capture's camera, drawn behind the scene with --view; also sets the frame "
+        "rate of captures that have none (needs PyAV)",
     )
     group.add_argument(
         "--space",
@@ -194,7 +194,7 @@ def add_animation_argument(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--animation",
         metavar="NAME",
-        help="which of a file's animations is played: a name, a number from 1, or none; viewer "
+        help="animation of a file to play: a name, a number from 1, or none; viewer "
         "info lists them (default: the first)",
     )
 
@@ -249,9 +249,9 @@ def size_limit(arguments: argparse.Namespace) -> int:
 
 
 def parse_bytes(text: str, option: str = "--max-size") -> int:
-    """Return the number of bytes that an option gives, such as ``2G``.
+    """Return the number of bytes that an option specifies, such as ``2G``.
 
-    Raises ViewerError if the text is no such number.
+    Raises ViewerError if the text is not such a number.
     """
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
@@ -275,7 +275,7 @@ def open_scene(arguments: argparse.Namespace) -> Scene:
         finish(builder, scene)
     if not changes.is_empty:
         clean(scene, changes, getattr(arguments, "output", None))
-        arguments.fps = changes.rate or arguments.fps  # the rate of the frames
+        arguments.fps = changes.rate or arguments.fps  # frames have this rate from now on
     print_warnings(apply_pose(scene, arguments))
     return scene
 
@@ -300,7 +300,7 @@ def finish(builder: Builder, scene: Scene) -> None:
             scene.actors += new
             notes += said
             progress.show(builder.n_read)
-    scene.diagnostics = (*scene.diagnostics, *notes)  # shown in the window too
+    scene.diagnostics = (*scene.diagnostics, *notes)  # the window shows them too
     print_warnings(notes)
 
 
@@ -341,7 +341,11 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 
 
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
-    """Print one line per warning to the error stream, unless the run is recorded."""
+    """Print one line per warning or note to the error stream, unless the run is recorded.
+
+    Plain strings are warnings, as are errors in a file that was opened nevertheless.
+    """
     for warning in warnings:
         if not note_found(warning):
-            print(f"warning: {warning}", file=sys.stderr)
+            is_note = isinstance(warning, Diagnostic) and warning.severity == "note"
+            print(f"{'note' if is_note else 'warning'}: {warning}", file=sys.stderr)

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from _typeshed import SupportsWrite
 
 _NUMBER = re.compile(r"-\.?\d")  # start of a value or file name, not of an option
-_WORD = re.compile(r"[^\W\d_]+")  # looks like a command; most files have a suffix or a folder
-_LONGEST = 60  # characters of a name in a message
+_WORD = re.compile(r"[^\W\d_]+")  # a possible command; most files have a suffix or a folder
+_LONGEST = 60  # maximum length of a name in a message, characters
 
 
 class Parser(argparse.ArgumentParser):

@@ -1,4 +1,4 @@
-"""Many files through one command: workers, report, resumption, shards."""
+"""Batches: one command for many files, with workers, a report, resumption and shards."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "parser_of", "run"]
 
-_FAILED = 1  # exit code
+_FAILED = 1  # exit code if an item failed or has findings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -49,14 +49,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     add_batch_arguments(parser)
-    add_result_arguments(parser, "diff")  # which has all of them
+    add_result_arguments(parser, "diff")  # diff has all of these options
 
 
 def parser_of(words: Sequence[str]) -> Parser | None:
     """Return the parser of a job with the options of its command; None if no job is named.
 
     ``words``: the arguments.
-    Raises ViewerError for a word that is no job.
+    Raises ViewerError for a word that is not a job.
     """
     word = next(iter(words), "-")
     if word in JOBS:

@@ -1,4 +1,4 @@
-"""Converts figures, poses and motions to other formats."""
+"""Conversion of figures, poses and motions to other formats."""
 
 from __future__ import annotations
 
@@ -29,19 +29,25 @@ from viewer.commands._writing.motion_export import (
     check_kind,
     check_numbered,
     is_motion,
-    left_out_notes,
-    pose_or_point_actors,
     write_motions,
     writes_keys,
 )
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
+from viewer.commands._writing.written_actors import left_out_notes, pose_or_point_actors
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
-from viewer.export import EXPORTERS, export, export_figures, exporter_for, files_written
-from viewer.export._motion_paths import motion_paths
+from viewer.export import (
+    EXPORTERS,
+    export,
+    export_clips,
+    export_figures,
+    exporter_for,
+    files_written,
+)
+from viewer.export._motion_paths import PERSON, motion_paths
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.interrupts import raising
 from viewer.phrases import printable
@@ -67,12 +73,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         required=True,
         metavar="FILE",
-        help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes",
+        help=f"one of {_known_suffixes()}; walk_{{frame:05}}.obj for numbered meshes, "
+        "walk_{person}.glb for a file per person",
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     add_joint_map_argument(group)
     add_motion_arguments(parser)
-    add_vrm_arguments(parser)
+    add_vrm_arguments(parser, upgrades=True)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
@@ -130,7 +137,7 @@ def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
     check_kind(arguments, output)
     check_numbered(arguments, output)
     if suffix == "/" or "{frame" in output.name:
-        return  # the files are known only when the motion has been read
+        return  # the files are unknown until the motion has been read
     is_pose = all(kind.writes_pose for kind in kinds)
     files = files_written(output) if is_pose else [output]
     check_targets(files, inputs_of(arguments), arguments.force)
@@ -167,12 +174,13 @@ def _write_actors(
     shown = pose_or_point_actors(scene)
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("nobody is present at that time: there is nothing to write")
-    if EXPORTERS[exporter_for(output)].writes_several:
+        raise RigError("no person is present at that time: there is nothing to write")
+    if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
         notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
     else:
         places = dict(zip(shown, motion_paths(output, shown), strict=True))
-        notes = _write_apart(arguments, scene, skinning, {each: places[each] for each in actors})
+        found = {each: places[each] for each in actors}
+        notes = _write_apart(arguments, scene, skinning, found, clips_of)
     away = [actor.name for actor in shown if not actor.is_present]
     notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
     return notes + left_out_notes(scene, shown)
@@ -199,9 +207,13 @@ def _write_together(
 
 
 def _write_apart(
-    arguments: argparse.Namespace, scene: Scene, skinning: Skinning, places: Mapping[Actor, Path]
+    arguments: argparse.Namespace,
+    scene: Scene,
+    skinning: Skinning,
+    places: Mapping[Actor, Path],
+    clips_of: Callable[[Actor], Sequence[TransformClip] | None],
 ) -> list[Diagnostic]:
-    """Write each actor to a file of its own."""
+    """Write each actor to a separate file."""
     optimizes, meta = bool(arguments.optimize), vrm_meta(arguments, next(iter(places.values())))
     files = [file for path in places.values() for file in files_written(path)]
     check_targets(files, inputs_of(arguments, scene), arguments.force)
@@ -209,7 +221,12 @@ def _write_apart(
     with all_or_none(files):
         for actor, path in places.items():
             with raising():
-                notes += export(upright_actor(scene, actor), path, skinning, optimizes, meta)
+                upright = upright_actor(scene, actor)
+                clips = clips_of(upright)
+                if clips is None:
+                    notes += export(upright, path, skinning, optimizes, meta)
+                else:
+                    notes += export_clips(upright, path, skinning, clips, optimizes)
     return notes
 
 

@@ -8,12 +8,12 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 import viewer
 from viewer.commands._printing import print_line
+from viewer.data_classes import dataclass
 from viewer.errors import RenderError
 from viewer.phrases import counted, printable
 
@@ -35,7 +35,7 @@ _EXTRAS = {
     "ufbx": "reading .fbx files",
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
-    "isal": "PNG images in less time",
+    "isal": "faster PNG encoding",
     "scipy": "viewer rig, comparing different meshes",
     "pebble": "worker processes of viewer batch",
     "dask": "viewer batch on clusters",
@@ -74,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_line((f"{finding.state:<8}", _STYLES[finding.state]), found)
         if finding.cure:
             print_line(f"{'':<20}-> {printable(finding.cure, 400)}")
-        sys.stdout.flush()  # the next finding may take seconds
+        sys.stdout.flush()  # the next check may take seconds
         if finding.is_vital and finding.state == "missing":
             code = RenderError.exit_code
     if arguments.bench and not code:
@@ -92,7 +92,7 @@ def _print_measurements() -> None:
 
 
 def examine() -> Iterator[Finding]:
-    """Yield findings as they are made, quick ones first."""
+    """Yield findings as the checks complete, quick ones first."""
     system = f"{platform.system()} {platform.release()} {platform.machine()}"
     yield Finding(
         "viewer", "ok", f"{viewer.__version__}, Python {sys.version.split()[0]}, {system}"
@@ -120,7 +120,7 @@ def _examine_packages() -> Iterator[Finding]:
 
 
 def _examine_extras() -> Iterator[Finding]:
-    """Report optional packages, and what each of the missing ones is for."""
+    """Report optional packages, and the uses of each missing one."""
     found, missing = [], {}
     for name, purpose in _EXTRAS.items():
         try:

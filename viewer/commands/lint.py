@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: what is wrong, where, and how to fix it."""
+"""Checks of rigs and motions: errors, their locations, and remedies."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from viewer.phrases import printable
 
 __all__ = ["add_arguments", "run"]
 
-_FOUND = 1  # exit code
+_FOUND = 1  # exit code if there are findings
 _STYLES = {"error": "red", "warning": "yellow"}
 
 

@@ -1,4 +1,4 @@
-"""List of body models: found, missing, where they are published, and their licences."""
+"""List of body models: found and missing ones, their publishers and licences."""
 
 from __future__ import annotations
 

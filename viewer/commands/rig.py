@@ -44,7 +44,7 @@ from viewer.streams import require_stdout, summary_stream
 __all__ = ["add_arguments", "run"]
 
 _BUNDLED = ("body", "fox")
-_SMOOTHING = 10  # iterations if --smooth has no value
+_SMOOTHING = 10  # number of iterations if --smooth has no value
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument(
-        "--rig", metavar="NAME", help="which of the template's rigs, for Anny (default: default)"
+        "--rig", metavar="NAME", help="rig of the template, for Anny (default: default)"
     )
     add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open the result in a window")
@@ -89,7 +89,7 @@ def _add_template_pose_arguments(parser: argparse.ArgumentParser) -> None:
         "--template-pose",
         dest="pose",
         metavar="FILE|A,B,…",
-        help="the template's pose, roughly that of the target, given as for --pose",
+        help="the template's pose, similar to the target's pose, given as for --pose",
     )
     parser.add_argument(
         "--template-frame",
@@ -178,7 +178,7 @@ def run(arguments: argparse.Namespace) -> int:
         check_targets(files_of(output), inputs, arguments.force)
     target = _target(arguments, inputs)
     if output is not None and output.suffix.lower() == ".vrm":
-        checked_meta(meta, target.name)  # before the rig transfer, which takes long
+        checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     template = _template(arguments, inputs)
     settings = _settings(arguments, template, output)
     clips = read_clips(arguments, _files(arguments), template.figure)

@@ -1,4 +1,4 @@
-"""Shows files in a window, or renders an image if there is no display."""
+"""Display of files in a window, or in an image if there is no display."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.usage = "%(prog)s [FILES ...] [options]"
     add_file_arguments(parser)
     group = parser.add_argument_group("window")
-    group.add_argument("--play", action="store_true", help="play motions at once")
+    group.add_argument("--play", action="store_true", help="play motions immediately")
     group.add_argument(
         "--scale", type=_scale, metavar="S", help="scale of the interface, such as 1.5"
     )
@@ -76,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     changes = clean_up_of(arguments)
     if arguments.time is not None or arguments.frame is not None or not changes.is_empty:
         for builder in builders:
-            finish(builder, scene)  # only now is it known who is present at that time
+            finish(builder, scene)  # determines who is present at that time
     clean(scene, changes)
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 from viewer.diagnostics.diagnostic import Diagnostic
 
-_MOST = 100  # warnings kept per file, as nobody reads more
+# Maximum number of warnings per file: users do not read longer lists.
+_MOST = 100
 
 
 class Collector:
@@ -37,7 +38,7 @@ class Collector:
         if found.is_refusal:
             self._found.append(found)
             return
-        # Whoever looks for all errors wants each element that has one.
+        # A search for all errors has to list each faulty element, even if the messages are equal.
         message = f"{found.pointer} {found.message}" if self.keeps_errors else found.message
         if message in self._warned or len(self._warned) > _MOST:
             return

@@ -15,7 +15,8 @@ from viewer.phrases import printable
 
 __all__ = ["described", "plain"]
 
-_LISTED = 100  # indices and names listed per diagnostic; their total is always given
+# Maximum number of indices and names per diagnostic; the total is always included.
+_LISTED = 100
 
 
 def described(found: Diagnostic) -> dict[str, Any]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from viewer.data_classes import dataclass
 from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:
@@ -40,8 +41,8 @@ class Diagnostic:
     line : int or None
         Line in that file, from 1.
     part : str
-        Part of the figure or motion that ``places`` indexes. Readers replace faulty data with
-        neutral values.
+        Part of the figure or motion that ``places`` indexes. Readers replace the faulty elements
+        with neutral values.
     places : (N,) int32 or None
         Indices, ascending: vertices (positions, weights), triangles, joints (bindings, joints, and
         items: boxes, limits and poses), channels of a clip, or rows of frames.
@@ -55,7 +56,7 @@ class Diagnostic:
     is_refusal : bool
         Whether ``load`` refuses the file because of it.
     is_final : bool
-        Whether it stopped parsing of the file.
+        Whether parsing of the file stopped there.
     pointer : str
         JSON pointer (RFC 6901) to the element of that file, as in ``"/skins/0/joints/3"``.
     """

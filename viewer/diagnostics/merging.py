@@ -1,4 +1,4 @@
-"""Merges diagnostics that differ only in their locations."""
+"""Merging of diagnostics that differ only in their locations."""
 
 from __future__ import annotations
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic
 from viewer.phrases import printable
@@ -17,13 +18,13 @@ __all__ = ["Record", "is_recorded", "note_found", "note_output", "note_values", 
 
 @dataclass
 class Record:
-    """Data of a run that its printed text lacks.
+    """Data of a run that is not in its printed text.
 
     Attributes
     ----------
     diagnostics : list of dict
-        Warnings and notes as returned by ``described``; plain texts have only ``severity`` and
-        ``message``.
+        Warnings and notes as returned by ``described``; entries that are only text have just
+        ``severity`` and ``message``.
     values : dict
         Results as JSON data.
     outputs : dict of str

@@ -6,7 +6,7 @@
 ``{name}``             number unchanged, text with control characters escaped
 ``{name:text}``        the same, at most 200 characters
 ``{name:name}``        a name in a file, at most 60 characters; undecodable bytes as �
-``{names:list}``       the first six and how many more, or ``none``; ``list12`` for twelve
+``{names:list}``       the first six and the number of others, or ``none``; ``list12``: twelve
 ``{names:all}``        every name
 ``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any size
 ``{names:or}``         alternatives
@@ -28,9 +28,9 @@ from typing import Any
 
 from viewer.phrases import counted, listed, one_of, printable, quoted
 
-_SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # a number with its sign
+_SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # specification of a signed number
 _PLACE = "\0"  # placeholder of a value inside its own specification
-_LONGEST = 1000  # characters of a value that is text
+_LONGEST = 1000  # maximum number of characters of a text value
 _LONGEST_NAME = 60
 _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
@@ -46,7 +46,8 @@ def fields(template: str) -> dict[str, str]:
     for _, name, spec, _ in Formatter().parse(template):
         if name:
             found[name] = spec or ""
-            found |= dict.fromkeys(fields(found[name]), "d")  # totals that counts refer to
+            # Totals are fields inside the specification: ``{n:#frame/{all}}``.
+            found |= dict.fromkeys(fields(found[name]), "d")
     return found
 
 

@@ -11,7 +11,7 @@ from viewer.rig.hierarchy import depth_first
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton, joint_label
 
-_CUBE = 0.01  # half the side of default boxes, relative to the skeleton's size
+_CUBE = 0.01  # half the edge length of default boxes, relative to the skeleton's size
 
 
 def course_skeleton(skeleton: Skeleton, pose: Pose) -> tuple[Skeleton, Ints]:

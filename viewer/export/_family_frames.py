@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
@@ -22,7 +21,7 @@ from viewer.rig.smpl_family import FAMILY, Member
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered
-_NEGLIGIBLE = 1e-6  # metres, and relative deviation of a scale from 1
+_NEGLIGIBLE = 1e-6  # in metres; also the relative deviation of a scale from 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +78,7 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
         titles = [kind.title for kind in FAMILY.values() if kind.names[0] in roots]
         raise RigError(
             f"{figure.name} cannot be written as {what}: expected the joints of "
-            f"{', '.join(titles[:-1])} or {titles[-1]}, found others"
+            f"{', '.join(titles[:-1])} or {titles[-1]}, found different ones"
         )
     if figure.unit not in METRES:
         raise RigError(
@@ -184,7 +183,7 @@ def _own_shapes(figure: Figure) -> list[Diagnostic]:
 
 
 def _bare_skeleton(figure: Figure, root: Floats) -> list[Diagnostic]:
-    """Return notes about a skeleton's unit, and a rest root unlike the model's."""
+    """Return notes about a skeleton's unit, and about a root with a different rest position."""
     notes = []
     if figure.unit != "m":
         unit = UNIT_NAMES[figure.unit]

@@ -26,7 +26,7 @@ def runs(flags: Bools) -> list[tuple[int, int]]:
 
 
 def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> list[Diagnostic]:
-    """Return a note about missing frames and what is written in their place, if there are any.
+    """Return a note about missing frames and their replacements, if there are any.
 
     ``present`` (F,): whether each frame is present.
     ``first_frame``: number of the first frame.

@@ -12,7 +12,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
-_NEGLIGIBLE = 1e-4  # files round constant scales by less
+_NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
 
 
 def extra_parts(figure: Figure) -> list[Phrase]:

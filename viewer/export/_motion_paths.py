@@ -16,25 +16,41 @@ from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
 
+PERSON = "{person}"
+"""Placeholder in file names for the number of a person or actor."""
+
 _WITHOUT_SPLITS = ("npz",)  # exporters that write one file despite gaps
 
 
 def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
     """Return the file of each actor: people by number, other actors numbered from the second.
 
-    ``output``: the requested file; its suffix is kept. A single actor gets this file.
+    ``output``: the requested file; its suffix is kept. A single actor gets this file. ``{person}``
+      in the name is replaced by the person's number, or the number of the actor from 1.
     ``actors``: actors in the order of the scene.
     Returns: one path per actor, all different.
     """
+    persons = [actor.person for actor in actors]
+    known = [person_name(person).replace(" ", "-") for person in persons if person is not None]
+    has_numbers = len(set(known)) == len(persons)
+    if PERSON in output.name:
+        own = known if has_numbers else [str(number) for number, _ in enumerate(actors, 1)]
+        return [output.with_name(output.name.replace(PERSON, name)) for name in own]
     if len(actors) == 1:
         return [output]
-    persons = [actor.person for actor in actors]
-    known = [person for person in persons if person is not None]
-    if len(set(known)) == len(persons):
-        names = [f"-{person_name(person).replace(' ', '-')}" for person in known]
+    if has_numbers:
+        names = [f"-{name}" for name in known]
     else:
         names = [f"-{number}" if number > 1 else "" for number, _ in enumerate(persons, 1)]
     return [output.with_name(f"{output.stem}{name}{output.suffix}") for name in names]
+
+
+def is_together(output: Path, options: MotionOptions) -> bool:
+    """Return whether a format that holds several figures gets one file for all of them.
+
+    This is not the case if the name has ``{person}``, or if motions are split at their gaps.
+    """
+    return PERSON not in output.name and options.closing != "split"
 
 
 def split_paths(path: Path, count: int) -> list[Path]:

@@ -36,7 +36,7 @@ def material_library(mesh: Mesh, path: Path) -> dict[Path, bytes]:
     materials = mesh.materials if any(map(_has_look, mesh.materials)) else ()
     files: dict[Path, bytes] = {}
     parts = [f"newmtl {PLAIN}\nKd 1 1 1\n"]
-    stem = path.stem[:80]  # longer names would be truncated after the number
+    stem = path.stem[:80]  # leaves room for the number, which must not be truncated
     # Some programs do not support options before the name, so only necessary ones are written.
     clamps = bool(((uvs < 0.0) | (uvs > 1.0)).any())
     for index, material in enumerate(materials):

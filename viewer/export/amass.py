@@ -42,7 +42,7 @@ __all__ = ["export_animation", "padded", "write_layout"]
 
 Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
 
-_FEWEST = 16  # shape coefficients that readers of AMASS require
+_FEWEST = 16  # minimum number of shape coefficients, as readers of AMASS require
 _CLOSED = {
     "hold": "pose-held-and-marked",
     "interpolate": "interpolated-and-marked",

@@ -31,7 +31,7 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["export_animation"]
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
-_BLOCK = 4096  # frames measured at a time
+_BLOCK = 4096  # frames measured per block
 _SAME = 1e-9  # tolerance, in frames or length units
 
 
@@ -131,7 +131,7 @@ def _losses(
     Between frames, captures are compared at the midpoints and on their own frames.
     """
     clip, path = read(source), source.path
-    assert isinstance(clip, Clip)  # the file was written from one
+    assert isinstance(clip, Clip)  # the file was written from a clip
     figure, how, part = animation.figure, options.skinning, slice(*span)
     times = animation.frames.times[part]
     on_frames = frames_of(figure, clip, times)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._bvh.angles import unrolled
@@ -43,7 +44,7 @@ __all__ = [
 ]
 
 _DEFAULT_UNIT = "cm"
-_SHORTEST_END = 2e-3  # Blender invents a direction for bones below 1e-3
+_SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
 _MOST_DIGITS = 15
 
 

@@ -17,11 +17,12 @@ import re
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError, RigError
@@ -51,7 +52,7 @@ __all__ = ["export_animation", "export_animations"]
 
 _FOLDER = "smpl"
 _FRAME = re.compile(r"[0-9]+\.json")
-_BLOCK = 256  # frames whose numbers are formatted at once
+_BLOCK = 256  # number of frames formatted together
 _DIGITS = 7  # decimals, as in EasyMocap's newer writer
 _SHAPES = 10  # minimum number of coefficients, as in EasyMocap's layers
 
@@ -140,7 +141,7 @@ def _of_person(person: int, note: Diagnostic) -> Diagnostic:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Person:
-    """One written person: original animation, animation with filled gaps, records, read-back."""
+    """One written person: original animation, animation without gaps, records, data read back."""
 
     original: SampledAnimation
     animation: SampledAnimation
@@ -181,7 +182,7 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
     for animation in animations:
         if animation.first_frame < 0:
             raise RigError(
-                f"{animation.name}: expected frames from 0 on, found {animation.first_frame}"
+                f"{animation.name}: expected frame numbers from 0, found {animation.first_frame}"
             )
         if not animation.frames.present.any():
             raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
@@ -236,7 +237,7 @@ def _used(rows: Floats, count: int) -> Floats:
 @contextlib.contextmanager
 def _new_folder(path: Path) -> Iterator[Path]:
     """Yield a temporary folder next to ``path/smpl``, and move it there if the block succeeds."""
-    hold()  # also protects the temporary folder, which must not be left behind
+    hold()  # signals must not leave the temporary folder behind
     target = path / _FOLDER
     made = None
     try:

@@ -7,7 +7,7 @@ it if it is in another unit.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,34 +15,39 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
-from viewer.errors import RigError
-from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
-from viewer.export._gltf.body import Body, Built, add_body, body_of
+from viewer.export._gaps import frames_phrase, runs
+from viewer.export._gltf.body import Body, Built
 from viewer.export._gltf.cameras import add_cameras
 from viewer.export._gltf.document import Document
 from viewer.export._gltf.figures import Added, add_figure, figure_losses, place_figures
 from viewer.export._gltf.keyed import Clips
-from viewer.export._gltf.losses import Written, gltf_losses, not_held
+from viewer.export._gltf.losses import Written, not_held
 from viewer.export._gltf.materials import material_losses
-from viewer.export._gltf.motion import add_animation, moving, still_locals
-from viewer.export._gltf.nodes import locals_of, to_metres
-from viewer.export._gltf.reading import parsed
-from viewer.export._gltf.shape import shape_of
+from viewer.export._gltf.nodes import to_metres
+from viewer.export._gltf.reading import GltfFile, parsed
+from viewer.export._gltf.sampled import (
+    PlacedMotion,
+    add_sampled,
+    common_name,
+    motion_remarks,
+    placed_actor,
+    sampled_losses,
+    sampled_of,
+    written_part,
+)
 from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
-from viewer.export._options import GAPS, MotionOptions
+from viewer.export._options import MotionOptions
 from viewer.formats import all_or_none, save_bytes
 from viewer.rig.figure import Figure
-from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, Scene, figure_pose
-from viewer.rig.skeleton import joint_label
+from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export", "export_animation", "export_clips", "export_figures"]
+__all__ = ["export", "export_animation", "export_animations", "export_clips", "export_figures"]
 
 Extend = Callable[[Document, Body, Built], list[Diagnostic]]
 
@@ -83,7 +88,7 @@ def export_figures(
 ) -> list[Diagnostic]:
     """Write figures and cameras to one file; see ``viewer.export.export_figures``.
 
-    Several figures are placed as in their scene; the placement of a single one is omitted.
+    Several figures are placed as in their scene; the placement of a single figure is omitted.
     ``extend``: as for ``export``.
     """
     document = Document(actors[0].figure.name)
@@ -97,20 +102,16 @@ def export_figures(
     to_file = to_metres(up, first.figure.unit)
     if len(actors) == 1:
         to_file = to_file @ np.linalg.inv(first.placement)
-    placing = place_figures(document, actors, added, to_file) if len(actors) > 1 else []
+    built = [each.built for each in added]
+    placing = place_figures(document, actors, built, to_file) if len(actors) > 1 else []
     lenses = add_cameras(document, views, to_file)
     extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
     notes += _beside(data, path)
-    file = parsed([*data.values()])
-    for node in placing:
-        # Errors are measured in the space of each figure.
-        del file.root["nodes"][node]["matrix"]
+    file = _unplaced(data, placing)
     for actor, each in zip(actors, added, strict=True):
-        own_notes = _quantization(path, each.built, actor.figure)
-        own_notes += _remarks(each.body, actor.figure.up)
-        own_notes += figure_losses(each, path, file, skinning, is_vrm=extend is not None)
+        own_notes = _figure_notes(path, actor, each, file, skinning, extend is not None)
         several = len(actors) > 1
         notes += [_of_figure(actor, note) for note in own_notes] if several else own_notes
     return notes + lenses
@@ -165,98 +166,134 @@ def export_animation(
     OutputError
         If a file cannot be written.
     """
-    _check(animation, options)
-    present = animation.frames.present
-    frames = filled(animation.frames, options.closing == "interpolate")
-    reference = int(present.argmax())
-    shape = shape_of(animation.figure, frames.shape_weights, reference)
-    body = body_of(animation.figure, shape, options.skinning)
-    spans = [(0, frames.n_frames)]
+    sampled = sampled_of(animation, options)
+    present, spans = animation.frames.present, [(0, animation.frames.n_frames)]
     if options.closing == "split" and not present.all():
         spans = runs(present)
     paths = split_paths(path, len(spans))
     documents, built = [], []
-    for start, stop in spans:
+    for span in spans:
         document = Document(animation.name)
-        built.append(_add_animation(document, animation, body, frames, (start, stop), options))
+        built.append(add_sampled(document, sampled, options, span)[0])
         documents.append(document)
     notes, lost = list[Diagnostic](), list[Diagnostic]()
     saved = _files(list(zip(paths, documents, strict=True)))
-    for file, (start, stop), data, made in zip(paths, spans, saved, built, strict=True):
+    for file, span, data, made in zip(paths, spans, saved, built, strict=True):
         values = {
             "counts": made.counts,
-            "frames": frames_phrase(animation.first_frame + start, stop - start),
+            "frames": frames_phrase(animation.first_frame + span[0], span[1] - span[0]),
             "rate": animation.frame_rate,
             "size": len(data[file]),
         }
         notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
         notes += _quantization(file, made, animation.figure)
-        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, start)
-        rows = start + np.flatnonzero(present[start:stop])
-        lost += gltf_losses(
-            written,
-            animation.figure,
-            frames,
-            rows,
-            options.skinning,
-            shape,
-            body.influences,
-            animation.first_frame,
-        )
-    notes += _remarks(body, options.world_up) + _motion_remarks(animation, body, frames, options)
+        written = Written(file, parsed([*data.values()]), made.tree, made.meshes, span[0])
+        lost += sampled_losses(written, sampled, options, span)
+    notes += _remarks(sampled.body, sampled.up) + motion_remarks(sampled, options)
     lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + not_held(animation.figure, shape)
+    return notes + lost + not_held(animation.figure, sampled.body.shape)
 
 
-def _check(animation: SampledAnimation, options: MotionOptions) -> None:
-    for what, value, known in (
-        ("unit", options.unit, ("", "m")),
-        ("up axis", options.up, ("", "y")),
-        ("up axis of the scene", options.world_up, ("y", "z")),
-        ("handling of gaps", options.closing, tuple(GAPS)),
-    ):
-        if value not in known:
-            listed = ", ".join(filter(None, known))
-            one = "one of " * (len(list(filter(None, known))) > 1)
-            raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
-    if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
-
-
-def _add_animation(
-    document: Document,
-    animation: SampledAnimation,
-    body: Body,
-    frames: Frames,
-    span: tuple[int, int],
+def export_animations(
+    motions: Sequence[tuple[Actor, SampledAnimation, str]],
+    path: Path,
     options: MotionOptions,
-) -> Built:
-    """Add a figure at rest, and a range of frames as an animation."""
-    skeleton = body.figure.require_skeleton()
-    part = frames_between(frames, slice(*span))
-    pose = figure_pose(animation.figure)
-    rest = locals_of(skeleton, pose)
-    pose.figure_translation = part.figure_translations[0]
-    pose.figure_scale = float(part.figure_scales[0])
-    weights = body.shape.weights
-    if len(weights) > 1:
-        weights = weights[slice(*span)]
-        body = replace(body, shape=replace(body.shape, weights=weights))
-    is_still = not np.ptp(part.figure_translations, axis=0).any() and not np.ptp(part.figure_scales)
-    locals_ = still_locals(skeleton, rest, part)
-    built = add_body(
-        *(document, body, options.world_up, pose, locals_),
-        is_still=is_still,
-        optimizes=options.optimizes,
-    )
-    morphs = [
-        (placed.node, own)
-        for placed in built.meshes
-        if np.ptp(own := weights[:, placed.part.targets], axis=0).any()
+    scene: Scene,
+    still: Sequence[Actor] = (),
+) -> list[Diagnostic]:
+    """Write figures to one file, placed as in their scene, with one animation that moves them all.
+
+    Frames of different figures keep their relative times; the earliest frame is at 0.
+
+    Parameters
+    ----------
+    motions : sequence of (Actor, SampledAnimation, str)
+        The moving figures, and what ``animation_for`` returns for each: frames, at least one of
+        which is present, and their up axis.
+    path : Path
+        The file.
+    options : MotionOptions
+        Skinning, and handling of gaps except ``split``.
+    scene : Scene
+        Provides the up axis of the placements, and cameras.
+    still : sequence of Actor
+        Further figures, written in their current pose.
+
+    Returns
+    -------
+    list of Diagnostic
+        As for ``export_animation``, each with its figure.
+
+    Raises
+    ------
+    RigError, OutputError
+        As for ``export_animation``.
+    """
+    parts = [PlacedMotion(placed_actor(scene, who), each, up) for who, each, up in motions]
+    others = [placed_actor(scene, actor) for actor in still]
+    document, actors = Document(path.stem), [*(part.actor for part in parts), *others]
+    found = [
+        sampled_of(each.animation, replace(options, world_up=each.up), each.actor.color)
+        for each in parts
     ]
-    name = animation.motion.name or animation.name
-    add_animation(document, name, animation.frame_rate, skeleton, part, built.tree, morphs)
-    return built
+    begin, name, index = min(each.start for each in parts), common_name(parts, path.stem), -1
+    built = []
+    for part, sampled in zip(parts, found, strict=True):
+        delay = part.start - begin
+        made, index = add_sampled(document, sampled, options, None, delay, name, index)
+        built.append(made)
+    together, how = Clips(document), options.skinning
+    added = [
+        add_figure(document, actor, how, None, together, options.optimizes) for actor in others
+    ]
+    to_file = to_metres(scene.up, actors[0].figure.unit)
+    placing = place_figures(document, actors, [*built, *(each.built for each in added)], to_file)
+    lenses = add_cameras(document, scene.views, to_file)
+    (data,) = _files([(path, document)])
+    seconds = max(each.start + each.seconds for each in parts) - begin
+    notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
+    notes += _beside(data, path)
+    file = _unplaced(data, placing)
+    for part, sampled, made in zip(parts, found, built, strict=True):
+        own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
+        own += motion_remarks(sampled, options)
+        own += sampled_losses(written_part(path, file, made), sampled, options)
+        own += resampling_losses(path, sampled.animation, how)
+        own += not_held(sampled.animation.figure, sampled.body.shape)
+        notes += [_of_figure(part.actor, note) for note in own]
+    for actor, each in zip(others, added, strict=True):
+        notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]
+    return notes + lenses
+
+
+def _motions_written(
+    path: Path, actors: Sequence[Actor], seconds: float, n_views: int, size: int
+) -> Diagnostic:
+    """Return the note about a file of several moving figures."""
+    values = {
+        "n_figures": len(actors),
+        "figures": [actor.name for actor in actors],
+        "seconds": seconds,
+        "others": [Phrase("written-cameras", n=n_views)] if n_views else [],
+        "size": size,
+    }
+    return Diagnostic("X001.gltf-motions", path, values=values)
+
+
+def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
+    """Return a written file without placements, because errors are measured in figure space."""
+    file = parsed([*data.values()])
+    for node in placing:
+        del file.root["nodes"][node]["matrix"]
+    return file
+
+
+def _figure_notes(
+    path: Path, actor: Actor, added: Added, file: GltfFile, how: Skinning, is_vrm: bool = False
+) -> list[Diagnostic]:
+    """Return the notes about a figure in its pose or with its own animations."""
+    notes = _quantization(path, added.built, actor.figure) + _remarks(added.body, actor.figure.up)
+    return notes + figure_losses(added, path, file, how, is_vrm=is_vrm)
 
 
 def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
@@ -323,19 +360,4 @@ def _remarks(body: Body, up: str) -> list[Diagnostic]:
     if body.influences is not None and body.influences.n_fixed:
         unbound = int(body.influences.n_fixed)
         notes.append(Diagnostic("X005.no-influence", values={"n": unbound}))
-    return notes
-
-
-def _motion_remarks(
-    animation: SampledAnimation, body: Body, frames: Frames, options: MotionOptions
-) -> list[Diagnostic]:
-    """Return notes about gaps, and about joints with translations."""
-    skeleton = animation.figure.require_skeleton()
-    notes = gaps_note(animation.frames.present, animation.first_frame, options.closing)
-    own = body.figure.require_skeleton()
-    moves = np.flatnonzero(moving(own, frames) & (skeleton.parents >= 0))
-    if len(moves):
-        names = [joint_label(skeleton, int(joint)) for joint in moves]
-        values = {"n": len(names), "names": names}
-        notes.append(Diagnostic("X005.joints-translate", values=values))
     return notes

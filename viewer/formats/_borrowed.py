@@ -1,4 +1,4 @@
-"""Modules of the names that this package re-exports, imported on first use."""
+"""Modules of the names that the package re-exports, imported on first use."""
 
 from __future__ import annotations
 

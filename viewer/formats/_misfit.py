@@ -1,4 +1,4 @@
-"""Errors in code that does not know the file, and notes derived from errors."""
+"""Errors in code that has no reference to the file, and notes derived from errors."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def neutral_positions(positions: Floats, triangles: Ints) -> Floats:
         the mean of all valid vertices.
     """
     if not np.isnan(positions.sum()):
-        # The common case, so it must be cheap.
+        # Most files have no invalid positions, so this test must be cheap.
         return positions
     bad: Bools = np.isnan(positions.sum(axis=1))
     known = positions[~bad]

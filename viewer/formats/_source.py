@@ -24,7 +24,7 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-# Binary data follows, which may end with any byte.
+# Files with these first bytes are binary and may end with any byte.
 _ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
@@ -41,7 +41,7 @@ _MAGIC = (
     (b"\xfe\xff", "UTF-16 text"),
     (b"\x93NUMPY", "a numpy array"),
 )
-_LOOK = 4096  # bytes that identify a file
+_LOOK = 4096  # number of bytes that identify a file
 
 
 class Source:
@@ -63,7 +63,7 @@ class Source:
         Options that select among the contents of a file: ``"rig"`` for Anny, ``"lod"`` (level of
         detail) for MHR.
     used_options : set of str
-        Those that its reader has used.
+        Options that its reader has used.
     """
 
     def __init__(
@@ -91,7 +91,7 @@ class Source:
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Open a file or folder; raises as ``read_bytes`` does."""
+        """Open a file or folder; errors as of ``read_bytes``."""
         source = cls(path, max_size=max_size, diagnostics=diagnostics)
         kind = kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
@@ -120,11 +120,11 @@ class Source:
         return self.options.get(name, "")
 
     def peek(self, size: int) -> bytes:
-        """Return the first bytes; the rest is not read unless it has already been read."""
+        """Return the first bytes of the file; no more is read."""
         return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def once(self, opened: Callable[[Source], Content]) -> Content:
-        """Return the result of a function of this file, which is called only on first use."""
+        """Return the cached result of a function of this file, which is called on first use."""
         if opened not in self._opened:
             self._opened[opened] = opened(self)
         return cast("Content", self._opened[opened])
@@ -145,7 +145,7 @@ class Source:
         return source
 
     def words(self, start: int = 0, end: int | None = None) -> Iterator[re.Match[bytes]]:
-        """Yield words and braces as matches; a brace is always a word of its own."""
+        """Yield words and braces as matches; a brace is always a separate word."""
         return _WORD.finditer(self.data, start, len(self.data) if end is None else end)
 
     def next_word(self, start: int) -> re.Match[bytes] | None:
@@ -226,7 +226,7 @@ class Source:
         Raises
         ------
         FormatError
-            Immediately, if the collector does not keep errors.
+            Immediately, if the collector does not collect errors.
         """
         found = self._diagnostic(key, offset, values, count, part, places)
         found = replace(found, is_refusal=True)
@@ -300,7 +300,7 @@ class Source:
         skeleton : Skeleton
             Identifies the figure, as a file may have several.
         pointer_of : callable
-            Takes a kind, as for ``remember``, and an index; returns an empty text if there is no
+            Takes a kind, as for ``remember``, and an index; returns an empty string if there is no
             such element.
         """
         self._pointers[id(skeleton)] = skeleton, pointer_of
@@ -327,7 +327,7 @@ class Source:
         return b"" if first is None else self.data[first.start() : first.start() + size]
 
     def looks_like(self) -> str | None:
-        """Return the apparent type of a file in no supported text format, e.g. ``"gzip data"``."""
+        """Return the apparent type of a file in an unsupported format, e.g. ``"gzip data"``."""
         head = self.head(_LOOK)
         if not head:
             return "only white space" if self.data else "an empty file"

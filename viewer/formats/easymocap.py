@@ -33,7 +33,7 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_capture", "read"]
 
-_LEVELS = 3  # folders that may contain the cameras, from the folder of the frames upwards
+_LEVELS = 3  # number of folders that may contain the cameras, from the folder of the frames upwards
 
 
 def read(source: Source) -> Capture:
@@ -127,7 +127,7 @@ def open_capture(
 
 
 def _name(source: Source) -> str:
-    """Return a recording's name, but not that of its ``smpl`` folder, which is always the same."""
+    """Return a recording's name, ignoring its ``smpl`` folder, whose name is always the same."""
     return folder_name(source.path) if source.is_folder else source.path.stem
 
 

@@ -1,6 +1,6 @@
 """Reader of MHR (Momentum Human Rig) in its portable files, written by ``convert_assets.py``.
 
-A folder, its ``rig.npz``, or one level of detail beside it; no pickled objects::
+A folder, its ``rig.npz``, or one level of detail next to it; no pickled objects::
 
     rig.npz     joint_names parents offsets prerotations   (J,) (J,) (J, 3) (J, 4), quaternions xyzw
                 parameter_transform (7 J, P + S)           parameter_names
@@ -35,9 +35,9 @@ __all__ = ["read"]
 
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")
-_USUAL = 1  # level of detail of MHR's own loader, and of SAM 3D Body
-_N_IDENTITY = 45  # shapes of the identity; the others are expressions
-_SMALLEST = 1e-5  # MHR's skinning leaves out smaller weights
+_USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
+_N_IDENTITY = 45  # number of shapes of the identity; the others are expressions
+_SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
     "joint_parents joint_names inverse_bind_pose"
@@ -109,7 +109,7 @@ def _files(source: Source) -> tuple[Source, Source]:
 
 
 def _names(folder: Path) -> list[str]:
-    """Return the names of the files in a folder; raises FormatError if it cannot be listed."""
+    """Return the names of the files in a folder; raise FormatError if it cannot be listed."""
     try:
         return [path.name for path in folder.iterdir()]
     except OSError as problem:
@@ -183,7 +183,7 @@ def _correctives(
     def load() -> Floats:
         values = array.values()
         for row in values:
-            if not np.isfinite(row).all():  # without the conversion to double precision
+            if not np.isfinite(row).all():  # checked without conversion to double precision
                 finite(lod, "corrective_blendshapes", row)
         return values
 

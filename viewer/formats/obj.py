@@ -34,7 +34,7 @@ from viewer.rig.mesh import Mesh
 __all__ = ["read"]
 
 _HEAD = 4096  # number of bytes within which files written by this program state the up axis
-_SHORTEST = 1e-9  # length of a mean of unit normals that cancel each other
+_SHORTEST = 1e-9  # length of the mean below which unit normals cancel each other out
 
 
 def read(source: Source) -> Figure:
@@ -82,7 +82,7 @@ def read(source: Source) -> Figure:
         triangle_materials=of_face[owners],
         parts=names,
         triangle_parts=part_of_face[owners],
-        # Scans have the colours of their texture at the vertices, too.
+        # Scans also have the colours of their texture at the vertices.
         colors=None if any(one.image is not None for one in materials) else parts.colors,
     )
     if mesh.n_triangles == 0:
@@ -145,7 +145,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     vertices, indices = parts.corners[:, 0], parts.corners[:, 2]
     if not used.all():
         vertices, indices = vertices[used], indices[used]
-    # Most vertices have the same normal in all corners, so that few need to be compared.
+    # Most vertices have the same normal at all corners, so only few need to be compared.
     chosen = np.full(n_vertices, -1, dtype=indices.dtype)
     chosen[vertices] = indices
     others = np.flatnonzero(chosen[vertices] != indices)
@@ -169,7 +169,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
 
 def _means(n_vertices: int, vertices: Picks, indices: Picks, listed: Floats) -> Floats:
     """Return the mean of each vertex's distinct normals: (V, 3)."""
-    # Products of 32-bit indices of a large mesh would overflow.
+    # Products of two counts exceed 32 bits in files of some 50,000 vertices.
     pairs = np.unique(vertices.astype(np.int64) * len(listed) + indices)
     owners, normals = pairs // len(listed), listed[pairs % len(listed)]
     sums = np.stack(
@@ -197,7 +197,7 @@ def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], I
 
 
 def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints]:
-    """Return the distinct names of runs of faces, and the index of each face's, or -1."""
+    """Return the distinct names of runs of faces, and the index of the name of each face, or -1."""
     names = list(dict.fromkeys(name for _, name in runs))
     numbers = {name: index for index, name in enumerate(names)}
     of_run = np.array([-1, *(numbers[name] for _, name in runs)], dtype=np.int32)

@@ -44,7 +44,7 @@ __all__ = ["read"]
 Indices = NDArray[np.int64]
 
 _JOINT, _VERTEX = "noun-joint", "noun-vertex"  # keys of phrases
-_ODD_SUM = 0.01  # well above the rounding error of the authors' files
+_ODD_SUM = 0.01  # tolerance of sums, well above the rounding error of the authors' files
 
 
 def read(source: Source) -> Figure:
@@ -101,7 +101,7 @@ def read(source: Source) -> Figure:
 
 
 def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error for a part whose number of rows differs from another part's."""
+    """Return the error for a part whose number of rows differs from that of another part."""
     return part.source.fault(
         "F002.pig-rows-as",
         part.odd_offset(wanted),
@@ -173,7 +173,7 @@ def _parents(part: Part) -> Ints:
     for joint, parent in enumerate(parents.tolist()):
         if 0 <= parent < joint and parent == int(parent) if joint else parent == -1.0:
             continue
-        if not np.isnan(parent):  # NaN was recorded with its row
+        if not np.isnan(parent):  # NaN has already been recorded with its row
             _refuse_parent(part, parents, joint)
         result[joint] = 0.0 if joint else -1.0
     return result.astype(np.int32)

@@ -77,7 +77,7 @@ def read(source: Source) -> Figure:
     normals = _columns(source, vertices, ("nx", "ny", "nz"))
     uvs, uv_triangles = _uvs(source, vertices, uv_corners, picks)
     materials = _materials(source, header, uvs is not None)
-    # Scans have the colours of their texture at the vertices, too.
+    # Scans also have the colours of their texture at the vertices.
     is_painted = any(material.image is not None for material in materials)
     colors = None if is_painted else _colors(source, vertices)
     vertices.columns.clear()  # the values of the file, which take more memory than the mesh
@@ -136,7 +136,7 @@ def _vertices(source: Source, header: Header, tables: dict[str, Table]) -> tuple
 def _columns(source: Source, table: Table, names: tuple[str, ...]) -> Floats | None:
     """Return properties side by side, (N, len(names)); None if one is missing.
 
-    Invalid rows are recorded as errors and become NaN; in a text file they are NaN already.
+    Invalid rows are recorded as errors and become NaN; in a text file they are already NaN.
     """
     if any(name not in table.columns for name in names):
         return None
@@ -207,7 +207,7 @@ def _corners(
     if not is_wrong.any():
         return corners
     owners = np.repeat(np.arange(len(counts)), counts)
-    # Words of a text that are not numbers are recorded already.
+    # Words of a text that are not numbers have already been recorded.
     wrong = np.flatnonzero(
         is_wrong & ~np.isnan(values) if faces.offset_of is not None else is_wrong
     )

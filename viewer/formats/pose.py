@@ -67,7 +67,7 @@ _BESIDES = (
     "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
-_NOT_NEEDED = _BESIDES.split()  # keys of pose and motion files that posing does not need
+_NOT_NEEDED = _BESIDES.split()  # keys in pose and motion files that are not needed for a pose
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
@@ -299,7 +299,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     Returns
     -------
     list of Diagnostic
-        Empty: the formats hold all that they are given for.
+        Empty: the formats store everything that is written to them.
 
     Raises
     ------

@@ -52,7 +52,7 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["lost_parts", "read", "write"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
 
 
 def read(source: Source) -> Figure:
@@ -249,7 +249,7 @@ def _table(name: str, rows: Floats) -> list[Iterable[bytes]]:
 
 
 def _section(name: str, count: int, lines: Iterable[bytes]) -> list[Iterable[bytes]]:
-    """Return the text of a section in parts, which are composed only when they are written."""
+    """Return the text of a section in parts, which are composed when they are written."""
     return [[f"{name} {count} {{\n".encode()], lines, [b"}\n"]]
 
 
@@ -297,7 +297,7 @@ def _as_rest_of_line(texture: str | None) -> str | None:
 
 
 def _bindings_text(skin: Skin) -> bytes:
-    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # +0.0 turns -0.0 into 0.0
+    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # adding 0.0 replaces -0.0 by 0.0
     # The rows of the text are the matrix's columns.
     blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
     return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n".encode()
@@ -312,7 +312,7 @@ def _save_texture(material: Material, folder: Path) -> None:
     """Save an image under its name in the file, unless the same image is already there."""
     if material.texture is None or material.image is None:
         return
-    name = Path(material.texture.replace("\\", "/"))  # as the reader interprets it
+    name = Path(material.texture.replace("\\", "/"))  # interpreted in the same way as by the reader
     path = folder / name
     if path.exists():
         there = load_image(Source(folder / "x.skin", b""), material.texture, 0)

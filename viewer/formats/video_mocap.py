@@ -1,7 +1,7 @@
 """Reader of results of video motion capture: people reconstructed from a video.
 
-Each tool writes files of its own: see the modules in ``_video_mocap/``. They are recognised by
-their contents. People keep their IDs and the frames in which they are visible.
+Each tool writes a different kind of files: see the modules in ``_video_mocap/``. They are
+recognised by their contents. People keep their IDs and the frames in which they are visible.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["open_results", "read"]
 
-_LISTED = 12  # keys named in a message
+_LISTED = 12  # maximum number of keys listed in a message
 
 
 def read(source: Source) -> Capture:
@@ -53,7 +53,7 @@ def open_results(
     Returns
     -------
     Capture
-        The people, and the camera as far as the file determines it.
+        The people, and the camera if the file determines it.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Checks of rigs and motions: every finding has a code, a location and a suggested remedy."""
+"""Checks of rigs and motions, whose findings have a code, a location and a suggested remedy."""
 
 from __future__ import annotations
 
@@ -55,8 +55,8 @@ def lint_files(
 ) -> tuple[Scene, list[Finding]]:
     """Open files together and run all checks; files that cannot be opened become findings too.
 
-    All errors for which the viewer would reject a file are recorded, and the rest of the file is
-    checked as far as possible.
+    All errors for which the viewer would reject a file are recorded, and everything else in the
+    file is checked if possible.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate, time_span
@@ -14,7 +13,7 @@ from viewer.rig.scene import Scene
 
 __all__ = ["Counting", "counting_of"]
 
-_ON_FRAME = 1e-6  # fraction of a frame: times closer than this to a frame count as that frame
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, within which a time counts as that frame's
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +41,7 @@ class Counting:
 
 
 def counting_of(scene: Scene, keyed_rate: float) -> Counting:
-    """Return a scene's frame numbering: that of its longest capture, or from the earliest start.
+    """Return a scene's frame numbering: its longest capture's, or from the earliest start.
 
     Parameters
     ----------

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.lint._counting import Counting
 from viewer.lint._track import Track
@@ -30,7 +31,7 @@ MAX_ROTATION = 3400.0
 _NONE: Ints = np.zeros(0, dtype=np.int32)
 _NO_TIMES: Floats = np.zeros(0)
 _STRAYS = 0.02  # maximum fraction of stray vertices at each end of an axis
-_FAR = 10.0  # ratio of bounding boxes, with strays to without, above which strays are ignored
+_FAR = 10.0  # strays are ignored if they enlarge the bounding box by more than this factor
 
 Indices = NDArray[np.int64] | Ints | list[int]
 

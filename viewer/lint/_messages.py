@@ -1,4 +1,4 @@
-"""Converts diagnostics of readers and loaders to findings."""
+"""Conversion of the diagnostics of readers and loaders to findings."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
 def of_error(problem: ViewerError, path: Path | None = None) -> Finding:
     """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
     found = problem.diagnostic
-    if found is None:  # parts that do not match, as reported by the figure's classes
+    if found is None:  # the figure's classes reported parts that do not match
         found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
     return of_diagnostic(found)
 

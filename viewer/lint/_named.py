@@ -1,4 +1,4 @@
-"""Locates the elements named by a reader's diagnostic in an actor."""
+"""Locations, in an actor, of the elements named by a reader's diagnostic."""
 
 from __future__ import annotations
 

@@ -1,14 +1,15 @@
-"""Opens files for checks: files that fail become findings, the rest are assembled."""
+"""Opening of files for checks: failures become findings, and the other files are assembled."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError
@@ -91,7 +92,7 @@ def open_files(
     opened = Opened()
     known = {_resolved(Path(path)): Path(path) for path in reversed(paths)}
     queue = list(reversed(known.values()))
-    for number, path in enumerate(queue):  # grows during iteration: a .rig refers to files
+    for number, path in enumerate(queue):  # the list grows during iteration: a .rig refers to files
         if progress is not None:
             progress(number, len(queue), f"reading {printable(path, 60)}")
         named = _read(opened, path, settings or MotionSettings(), max_size)
@@ -107,7 +108,7 @@ def _resolved(path: Path) -> Path:
     """Return a path that identifies a file; invalid paths are reported by reading them."""
     try:
         return path.resolve()
-    except (OSError, RuntimeError, ValueError):  # a cycle of links, or a NUL character in the name
+    except (OSError, RuntimeError, ValueError):  # a cycle of links, or NUL in the name
         return path
 
 
@@ -200,7 +201,7 @@ def _read_on(
     """Read captures completely; return the error that stopped one of them."""
     for builder in builders:
         while not builder.is_done:
-            if progress is not None:  # an exception from it is not a file error
+            if progress is not None:  # an exception raised by it is not a file error
                 progress(builder.n_read, builder.capture.n_frames, "reading frames")
             try:
                 new, notes = builder.read_some()
@@ -225,7 +226,7 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
     """Return the file that an error is about, or the last file read if the error has none.
 
-    None if the file was not read here.
+    The result is None if the file was not read here.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
     found = problem.diagnostic
@@ -247,7 +248,7 @@ def with_files(
     findings: list[Finding],
     looked_at: tuple[Scene, Sequence[Owners]] | None = None,
 ) -> list[Finding]:
-    """Return all findings, those of the scene with their files, without duplicate messages.
+    """Return all findings without duplicate messages, and with files for those about the scene.
 
     Parameters
     ----------

@@ -13,8 +13,8 @@ from viewer.rig.skeleton import FIRST_ROTATION, clamp_dofs
 __all__ = ["some_poses"]
 
 _COUNT = 4  # number of poses in addition to the rest pose and the current pose
-_SWING = 0.6  # radians: about the largest rotation of most joints in a walk
-_SEED = 5  # fixed, so that the same file gives the same results
+_SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
+_SEED = 5  # fixed, so that results are reproducible
 
 
 def some_poses(actor: Actor) -> list[Pose]:

@@ -16,7 +16,7 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["describe", "finding_text", "summary", "worst_first"]
 
-_LISTED = 100  # maximum number of locations of a finding in JSON; the total is always given
+_LISTED = 100  # maximum number of locations of a finding in JSON; the total is always included
 
 
 def worst_first(findings: Sequence[Finding]) -> list[Finding]:
@@ -33,7 +33,7 @@ def finding_text(finding: Finding) -> str:
     place, names = "", [finding.motion]
     if finding.file is not None and finding.file != Path():
         place = finding.place()
-        # A folder's figure has the folder's name, whereas its findings name the file inside.
+        # The figure of a folder has the folder's name, but its findings name a file inside it.
         folders = finding.file.parent.name, folder_name(finding.file.parent)
         if finding.name not in (finding.file.stem, finding.file.name, *folders):
             names = [finding.name, finding.motion]
@@ -42,7 +42,7 @@ def finding_text(finding: Finding) -> str:
     who = "".join(f"{printable(name, 100)}: " for name in names if name)
     head = f"{place}: " if place else ""
     text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
-    return f"{head}{text}\n    {finding.title}: {finding.hint}"
+    return f"{head}{text}\n    {finding.title}; remedy: {finding.hint}"
 
 
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:

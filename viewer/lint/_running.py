@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.lint._counting import counting_of
 from viewer.lint._finding import Finding, LintOptions, Subject
@@ -79,8 +80,8 @@ def lint_scene(
     Returns
     -------
     list of Finding
-        Findings by actor, in the order of ``CHECKS``, then those of its figure's other animations;
-        each has its actor and locations.
+        Findings by actor, in the order of ``CHECKS``, then findings about its figure's other
+        animations; each has its actor and locations.
     """
     chosen = options or LintOptions()
     rate = scene_rate(scene.actors)
@@ -90,7 +91,7 @@ def lint_scene(
     for index, actor in enumerate(scene.actors):
         lost = invalid[index] if index < len(invalid) else {}
         subjects.append(Subject(actor, index, scene.up, chosen, counting, lost, people))
-    # The rate of the playing animation's keys is no choice for the frames of others.
+    # The key rate of the animation that plays does not apply to the frames of others.
     others = replace(chosen, frame_rate=None) if chosen.frame_rate == rate else chosen
     steps = [(subject, name) for subject, names in _checked(subjects, others) for name in names]
     findings: list[Finding] = []
@@ -101,7 +102,7 @@ def lint_scene(
         with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
             findings += import_module(f"viewer.lint.{name}").check(subject)
         if number + 1 == len(steps) or steps[number + 1][0] is not subject:
-            subject.tracks.clear()  # a long track takes a lot of memory, and is not needed again
+            subject.tracks.clear()  # a long track uses much memory, and is not needed again
     return findings
 
 
@@ -137,6 +138,6 @@ def _playing(actor: Actor, animation: int) -> Actor | None:
     other = actor.copy()
     try:
         play_animation(other, animation)
-    except FormatError:  # lint of files reports it when it reads all animations
+    except FormatError:  # reported when lint reads all animations of the file
         return None
     return other

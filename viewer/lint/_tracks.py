@@ -29,10 +29,10 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["frame_numbers", "key_times", "track_of"]
 
-_TOGETHER = 1000  # frames per batch, to limit the memory for their matrices
+_TOGETHER = 1000  # frames per batch, which limits the memory for their matrices
 _MOST = 200_000  # maximum number of sampling times of a keyed clip
-_PROP = 0.1  # size of a skeleton relative to its mesh, below which the mesh determines the size
-_ON_STEP = 1e-6  # fraction of a step
+_PROP = 0.1  # relative size of a skeleton below which its mesh determines the size
+_ON_STEP = 1e-6  # tolerance, as a fraction of a step
 
 
 def track_of(subject: Subject) -> Track | None:

@@ -14,9 +14,10 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["are_singular", "check"]
 
-_SINGULAR = 1e-12  # determinant relative to the product of the column lengths
-_NEARLY = 1e6  # condition number
-_AFFINE = 1e-6  # absolute error of the last row
+# Maximum determinant of a singular matrix, relative to the product of its column lengths.
+_SINGULAR = 1e-12
+_NEARLY = 1e6  # minimum condition number of an ill-conditioned matrix
+_AFFINE = 1e-6  # maximum absolute error of the last row
 # Fraction of the figure's size: smaller differences are rounding errors of old files.
 _ELSEWHERE = 0.01
 
@@ -94,7 +95,7 @@ def _elsewhere(subject: Subject, figure: Figure, usable: Bools) -> list[Finding]
     skin, skeleton = figure.skin, figure.skeleton
     if skin is None or figure.mesh is None or skeleton is None:
         return []
-    # If the position of a joint is unknown, so are those of the joints below it.
+    # If the position of a joint is unknown, so are the positions of the joints below it.
     known = subject.valid("joints", skeleton.n_joints)
     for joint, parent in enumerate(skeleton.parents.tolist()):
         known[joint] &= parent < 0 or bool(known[parent])

@@ -65,7 +65,7 @@ def _confidence(subject: Subject, clip: PointClip, names: list[str]) -> list[Fin
 def _low(
     subject: Subject, clip: PointClip, names: list[str], numbers: Indices, confidence: Floats
 ) -> list[Finding]:
-    """Report low-confidence keypoints individually, worst first; the rest together.
+    """Report low-confidence keypoints individually, worst first; the remaining ones together.
 
     Parameters
     ----------

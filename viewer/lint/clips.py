@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices, Track
@@ -42,7 +42,7 @@ def check(subject: Subject) -> list[Finding]:
     if clip.end - clip.start <= SHORTEST:
         return [*findings, subject.found("C010.one-time", time=float(clip.start), part="clip")]
     track = track_of(subject)
-    assert track is not None  # there is a clip and a skeleton
+    assert track is not None  # the actor has a clip and a skeleton
     return findings + _jumps(subject, track, skeleton) + _fast_rotations(subject, track, skeleton)
 
 
@@ -52,7 +52,7 @@ def missing_frames(subject: Subject, timing: Timing) -> list[Finding]:
     there = np.flatnonzero(present)
     if len(there) == 0:
         return []
-    # Appearing later or leaving earlier than others is not an error.
+    # People may appear later or leave earlier than others.
     gaps = np.flatnonzero(~present[there[0] : there[-1]]) + there[0]
     if len(gaps) == 0:
         return []

@@ -1,4 +1,4 @@
-"""Checks of a body's feet: sliding while they stand, sinking into the ground, and floating."""
+"""Checks of a body's feet: sliding during ground contact, sinking into the ground, and floating."""
 
 from __future__ import annotations
 
@@ -19,14 +19,15 @@ __all__ = ["check"]
 # Depth below the ground relative to the height at rest: 17 mm for a person, 51 mm if it is a guess.
 _SINKS, _SINKS_OF_GUESS = 0.01, 0.03
 _FLOATS = 0.03  # height above the ground relative to the height at rest: 51 mm for a person
-_STEPS = 0.06  # 100 mm for a person: higher, it may stand on a step unless the ground is given
-_RESTS = 0.3  # seconds for which the lower foot rests there: at the top of a jump, it is 0.1
-_FACTOR = 3.0  # at this multiple of the limit even a single frame is reported
+# 100 mm for a person: above this, the foot may be on a step unless the ground is given.
+_STEPS = 0.06
+_RESTS = 0.3  # minimum seconds for which the lower foot rests: at the top of a jump, it is 0.1
+_FACTOR = 3.0  # multiple of the limit above which even a single frame is reported
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
-_TOUCHES = 0.02  # above the ground
-_SLIDES = 0.15  # per second
-_SWINGS = 1.0  # per second: a faster foot swings just above the ground
-_FAR = 0.03  # total distance while one foot stands
+_TOUCHES = 0.02  # maximum height of a foot that touches the ground
+_SLIDES = 0.15  # minimum speed that counts as sliding, per second
+_SWINGS = 1.0  # maximum speed, per second: a faster foot swings just above the ground
+_FAR = 0.03  # minimum total distance during one contact
 _WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
 
 
@@ -165,7 +166,7 @@ def _slipped(
     heights: Floats,
     up: int,
 ) -> list[Finding]:
-    """Report a foot that slides along the ground while it stands."""
+    """Report a foot that slides along the ground during contact."""
     stands = (np.abs(heights) < _TOUCHES * track.size) & track.present[:, None]
     step = float(track.times[1] - track.times[0])
     width = max(1, round(_WINDOW / step))
@@ -210,14 +211,14 @@ def _path(along: Floats, slides: Bools, width: int) -> float:
     edges = np.diff(slides.astype(np.int8), prepend=0, append=0)
     total = 0.0
     for first, last in zip(np.flatnonzero(edges > 0), np.flatnonzero(edges < 0), strict=True):
-        end = last - 1 + width  # the frame that ends the run's last window
+        end = last - 1 + width  # the last frame of the run's last window
         knots = np.append(np.arange(first, end, width), end)
         total += float(np.linalg.norm(np.diff(along[knots], axis=0), axis=1).sum())
     return total
 
 
 def _held(stands: Bools, width: int) -> Bools:
-    """Return the frames in which a foot stands for a window and one more frame at each end."""
+    """Return the frames around which a foot is in contact for a window plus a frame at each end."""
     sums = np.concatenate([np.zeros((1, stands.shape[1]), int), np.cumsum(stands, axis=0)])
     count = len(stands) - width
     first = np.maximum(np.arange(count) - 1, 0)

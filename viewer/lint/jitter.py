@@ -16,12 +16,12 @@ from viewer.rig.skeleton import joint_labels
 
 __all__ = ["check", "noise_of"]
 
-_LIMIT = 0.005  # relative to the size at rest: 10 mm for a person with spread arms
-_POINT_LIMIT = 0.02  # relative to the median size: triangulated points are noisier
+_LIMIT = 0.005  # noise relative to the size at rest: 10 mm for a person with spread arms
+_POINT_LIMIT = 0.02  # noise relative to the median size: triangulated points are noisier
 _WINDOW = 0.5  # seconds over which noise is averaged: a jump is not jitter
-_SLOWEST = 24.0  # frames per second; below, people move too far between frames
+_SLOWEST = 24.0  # minimum frame rate: with less, people move too far between frames
 _STENCIL = np.array([1.0, -4.0, 6.0, -4.0, 1.0])
-_FRACTION = 0.3  # of the window: with fewer, steps and other events would count as noise
+_FRACTION = 0.3  # quantile in a window, low enough to ignore steps and other events
 # The fourth difference of white noise has 70 times its variance. 30 % of the vectors of three
 # normal numbers are shorter than 1.193; their quadratic mean is sqrt(3), for a deviation of 1.
 _RMS = np.sqrt(3.0) / (np.sqrt(70.0) * 1.1932)

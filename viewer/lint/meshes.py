@@ -15,18 +15,18 @@ __all__ = ["check"]
 
 Indices = NDArray[np.int64]
 
-_FLAT = 1e-7  # height of a triangle relative to the mesh: float32 rounding
+_FLAT = 1e-7  # height of a triangle within float32 rounding, relative to the mesh
 _UNIT = 0.01  # deviation of a normal's length from 1
-_ZERO = 1e-12  # a normal of this length counts as zero
+_ZERO = 1e-12  # maximum length of a zero normal
 _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are smoothed over an edge
 # Squared number of border edges per triangle: with smaller holes, the sign of the volume is
 # reliable.
 _CLOSED = 0.25
-_HOLLOW = 1e-6  # volume relative to area^1.5 that is rounding: of two caps that lie on each other
+_HOLLOW = 1e-6  # volume within rounding, relative to area^1.5, as of two coincident caps
 # Multiple of the median distance of vertices from their median: feet are at 16 times that distance
 # in models with half of their vertices in the face.
 _FAR = 40.0
-_SAMPLE = 4096  # vertices sampled for the median
+_SAMPLE = 4096  # number of vertices sampled for the median
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -41,7 +41,7 @@ def check(subject: Subject) -> list[Finding]:
     known = subject.valid("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
     flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
     valid = np.flatnonzero(~flat & whole)
-    # Degenerate triangles have no neighbours and no sides.
+    # Degenerate triangles have neither neighbours nor an orientation.
     corners = welded(mesh.positions, mesh.triangles)[valid]
     return [
         *findings,
@@ -240,7 +240,7 @@ def _inside_out(
 def _open_edges(component: Indices, is_known: Bools, edges: Edges) -> Indices:
     """Return each component's number of edges with a single valid triangle: (T,).
 
-    Missing triangles do not close a surface: it may have ended there.
+    Missing triangles do not close a surface, because it may have had a border there.
     """
     alone = np.flatnonzero(np.repeat(is_known, 3) & (edges.counts == 1)) // 3
     beside = edges.pairs[is_known[edges.pairs].sum(axis=1) == 1, 0]
@@ -281,8 +281,8 @@ def _normals(subject: Subject, mesh: Mesh) -> list[Finding]:
 def _against(subject: Subject, mesh: Mesh, valid: Indices) -> list[Finding]:
     """Report normals that point to the opposite side of all triangles at their vertex.
 
-    Degenerate triangles have no sides. The two sides of a thin sheet have separate vertices, or
-    shared ones, whose normals agree with one side each.
+    Degenerate triangles have no orientation. The sides of a thin sheet may have separate or shared
+    vertices, whose normals agree with one of the sides.
     """
     corners = mesh.triangles[valid]
     a, b, c = (mesh.positions[corners[:, k]] for k in range(3))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices
 from viewer.rig.arrays import Bools, Floats
@@ -21,10 +20,10 @@ from viewer.rig.shape import rest_joints
 __all__ = ["check"]
 
 # Lengths are relative to the size of the body.
-_JUMPS = 0.15  # smallest jump of both people between two frames: 0.3 m for a person
-_BETTER = 0.5  # largest ratio of the steps with exchanged numbers to those without
-_NEAR = 0.25  # largest distance between the end of one track and the start of another
-_LATER = 1.0  # seconds: longest pause between them
+_JUMPS = 0.15  # minimum jump of both people between two frames: 0.3 m for an adult
+_BETTER = 0.5  # maximum ratio of the steps after swapping the IDs to the steps before
+_NEAR = 0.25  # maximum distance between the end of one track and the start of another
+_LATER = 1.0  # maximum time between them, seconds
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,7 +87,7 @@ def _are_alike(one: Actor, other: Actor) -> bool:
 
 
 def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[Finding]:
-    """Report frames in which two people jump to each other's places."""
+    """Report frames in which two people swap positions."""
     both = np.flatnonzero(one.present & two.present)
     if len(both) < 2:
         return []
@@ -126,7 +125,7 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[F
 
 
 def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[Finding]:
-    """Report a person who appears where another one has just disappeared for good."""
+    """Report a person who appears where another one has just disappeared permanently."""
     first, last = int(np.flatnonzero(own.present)[0]), int(np.flatnonzero(path.present)[-1])
     pause = first - last
     if not 0 < pause <= _LATER * own.timing.frame_rate:

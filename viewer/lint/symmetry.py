@@ -14,9 +14,9 @@ from viewer.rig.skin import Skin, normalized, owners, row_norms
 
 __all__ = ["check"]
 
-_MOVED = 1e-3  # fraction of the figure's size: reported as a note
-_ASKEW = 1e-2  # fraction of the figure's size: visible
-_SHIFTED = 0.02  # total difference of a vertex's weights
+_MOVED = 1e-3  # minimum displacement that is reported as a note, as a fraction of the figure's size
+_ASKEW = 1e-2  # minimum visible displacement, as a fraction of the figure's size
+_SHIFTED = 0.02  # minimum total difference of a vertex's weights
 _UNEQUAL = 0.2
 
 

@@ -26,8 +26,8 @@ from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["check"]
 
-_NOTED = 1e-3  # deviation of a sum from 1: files round to three digits
-_WRONG = 5e-3  # four influences of three digits, each off by half of the last digit, with a margin
+_NOTED = 1e-3  # minimum deviation of a sum from 1: files round to three digits
+_WRONG = 5e-3  # four influences with three digits, each with an error of half a digit, and a margin
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -100,7 +100,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
     corners = welded(mesh.positions, mesh.triangles)
     pairs = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
     islands = components(mesh.n_vertices, pairs)[corners[:, 0]]
-    # Only triangles form islands: a loose vertex is not an island.
+    # Islands consist of triangles; a loose vertex is not an island.
     held = np.bincount(islands, moved[mesh.triangles].any(axis=1), minlength=mesh.n_vertices)
     lost = held[islands] == 0
     if lost.any():
@@ -136,7 +136,7 @@ def _bare(subject: Subject, skin: Skin, mesh: Mesh, moved: Bools) -> list[Findin
 def _idle_joints(subject: Subject, figure: Figure, skin: Skin) -> list[Finding]:
     idle = idle_joints(skin, figure.skeleton)
     if len(idle) == 0 or len(subject.invalid.get("weights", ())):
-        return []  # missing weights may have belonged to these joints
+        return []  # the missing weights may refer to these joints
     labels = [_label(subject, int(joint)) for joint in idle]
     at = ("bindings", int(idle[0]))
     return [subject.found("W006.joints", n=len(idle), names=labels, joints=idle, at=at)]

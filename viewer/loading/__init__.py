@@ -1,4 +1,4 @@
-"""Loads files as one scene: figures with their motions, poses and images."""
+"""Loading of files as one scene: figures with their motions, poses and images."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Applies poses and texture images to an actor."""
+"""Application of poses and texture images to an actor."""
 
 from __future__ import annotations
 

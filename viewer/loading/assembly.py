@@ -120,7 +120,7 @@ def _assembled_in(
         for path, capture in contents.captures
     ]
     scene = assemble(replace(contents, captures=captures), settings)
-    # Only now: if the switch fails, the old scene is read to its end.
+    # Done last: if the switch fails, the old scene is read to its end.
     for builder in builders:
         builder.is_cut = True
     return scene
@@ -183,7 +183,7 @@ def _switch_on_springs(cast: Cast, up: str) -> None:
 
 
 def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
-    """Pair skeletons with skins: by joint count and name, then by joint count, then the rest."""
+    """Pair skeletons with skins: by joint count and name, then by joint count, then in order."""
     complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
     parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
     skeletons = [index for index, figure in parts if figure.skeleton is not None]
@@ -279,7 +279,7 @@ def _join(parts: list[tuple[Path, Figure]]) -> Figure:
         return parts[0][1]
     paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
     skeleton, skin = figures[0].skeleton, figures[1].skin
-    assert skeleton is not None  # pairs start with the skeleton
+    assert skeleton is not None  # the first figure of a pair is the skeleton
     if skin is None:
         values = {"n": skeleton.n_joints, "skeleton": paths[0]}
         raise FormatError(Diagnostic("F004.skin", paths[1], values=values))

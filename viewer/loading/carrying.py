@@ -12,7 +12,7 @@ from viewer.rig.retargeting.joint_map import JointMap
 
 __all__ = ["carrying_drive", "has_joints"]
 
-_ENOUGH = 0.5  # fraction of the joint names that a body model has
+_ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 
 
 def has_joints(figure: Figure, names: Sequence[str]) -> bool:
@@ -49,7 +49,7 @@ def carrying_drive(
     joint_map : JointMap, optional
         The requested match of joints.
     plants_feet : bool
-        Whether feet stay planted while those of the body stand.
+        Whether feet stay planted while the feet of the body are in contact with the ground.
     """
     moving = Figure(clip.name, skeleton=body.skeleton, up="z" if up.endswith("z") else "y")
     return Drive(

@@ -11,5 +11,6 @@ __all__ = ["reader_options"]
 
 
 def reader_options(settings: MotionSettings) -> dict[str, str]:
-    """Return the options that select among the contents of a file; see ``Source.options``."""
-    return {"rig": settings.rig, "lod": settings.lod}
+    """Return the options that readers consider; see ``Source.options``."""
+    rate = settings.frame_rate
+    return {"rig": settings.rig, "lod": settings.lod, "fps": "" if rate is None else f"{rate!r}"}

@@ -35,7 +35,7 @@ __all__ = ["CleanUp", "clean_up"]
 
 Smoothing = OneEuro | SavitzkyGolay
 
-_ROUNDING = 1e-9  # scene or figure units
+_ROUNDING = 1e-9  # tolerance, scene or figure units
 
 
 def clean_up(scene: Scene, wanted: CleanUp) -> list[Diagnostic]:
@@ -132,7 +132,7 @@ def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured
 
 
 def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
-    """Return a motion whose feet do not slide while they stand."""
+    """Return a motion whose feet do not slide during ground contact."""
     figure = actor.figure
     if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
         return clip, Diagnostic("X006.no-legs", values={"figure": actor.name})

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from viewer.data_classes import dataclass
 
 if TYPE_CHECKING:
     from viewer.rig.cleanup.one_euro import OneEuro
@@ -27,7 +28,7 @@ class CleanUp:
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
     locks_feet : bool
-        Whether standing feet are held in place.
+        Whether feet are held in place during ground contact.
     grounds : bool
         Whether people are moved up or down until their feet rest at height 0.
     frames : (int or None, int or None) or None

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["Contents", "read_files", "read_source"]
 
 
-_PEEK = 16  # bytes that identify an image
+_PEEK = 16  # number of bytes that identify an image
 
 
 @dataclass(slots=True)
@@ -39,9 +40,9 @@ class Contents:
     Attributes
     ----------
     figures : list of (Path, Figure)
-        All figures, those of groups included.
+        All figures, including the figures of groups.
     groups : list of FigureGroup
-        Figures of one file, which keep their places relative to each other and to their cameras.
+        Figures of one file, which keep their positions relative to each other and to their cameras.
     called : dict
         Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic
@@ -103,7 +104,7 @@ def read_files(
     contents = Contents()
     sources = [Source.open(path, max_size) for path in paths]
     known = {source.path.resolve() for source in sources}
-    for source in sources:  # grows during iteration: a .rig refers to files
+    for source in sources:  # the list grows during iteration: a .rig refers to files
         for path in read_source(source, contents, settings or MotionSettings()):
             if path.resolve() not in known:  # a .rig may refer to another, or to itself
                 known.add(path.resolve())
@@ -157,7 +158,7 @@ _LISTS = {
     "MorphTarget": "morphs",
     "Figure": "figures",
 }
-"""Field for each class name: only readers that create a class import its module."""
+"""Fields by class name: only readers that create a class import its module."""
 
 
 def _sort(source: Source, contents: Contents, settings: MotionSettings) -> tuple[Path, ...]:
@@ -186,15 +187,20 @@ def _read(source: Source, settings: MotionSettings) -> Content:
         from viewer.rig.captures.capture_rate import capture_rate
 
         source.used_options |= {"images", "video"}
-        return open_capture(
+        video = _video_rate(settings)
+        rate = capture_rate(settings.frame_rate, None, video)
+        capture = open_capture(
             source,
-            frame_rate=capture_rate(settings.frame_rate, None, _video_rate(settings)),
+            frame_rate=rate,
             flat_hands=settings.flat_hands,
             up=settings.up,
             legacy_expression=settings.legacy_expression,
             layout=settings.layout,
             images=settings.images,
         )
+        if capture.n_frames > 1 and not (settings.frame_rate or video):
+            source.warn("F007.capture-no-rate", rate=rate)
+        return capture
     if kind == "video_mocap":
         from viewer.formats.video_mocap import open_results
 

@@ -1,4 +1,4 @@
-"""Applies images as textures of figures."""
+"""Application of images as textures of figures."""
 
 from __future__ import annotations
 

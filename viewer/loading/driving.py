@@ -59,9 +59,10 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
     named = _named_model(cast, settings) if bodies or drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
-        cast.used_options |= {"model", "rig", "lod"}  # this message is enough
+        cast.used_options |= {"model", "rig", "lod"}  # no further messages about these options
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
+        _check_footage(contents, settings)
         model, is_bundled, target = _model(contents, cast, named, settings)
         for path, body in contents.body_motions:
             _give_body_motion(path, body, cast, settings, model, is_bundled, target)
@@ -71,6 +72,15 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         from viewer.loading.skeleton_motions import agree_on_units
 
         agree_on_units(cast, lone)
+
+
+def _check_footage(contents: Contents, settings: MotionSettings) -> None:
+    """Raise RigError if one video, or one folder of images, is given for several captures."""
+    paths = [path for path, _ in contents.captures]
+    for option, footage in (("--video", settings.video), ("--images", settings.images)):
+        if footage is not None and len(paths) > 1:
+            values = {"option": option, "n": len(paths), "paths": paths}
+            raise RigError(Diagnostic("F001.several-captures", footage, values=values))
 
 
 def _give_skeleton_motions(
@@ -113,7 +123,7 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 def is_body(figure: Figure) -> bool:
     """Return whether a figure can show captured bodies: it has the family's root and a mesh.
 
-    A VRM character cannot, whatever its joints are called: its rest pose and origin differ.
+    A VRM character cannot, even with the same joint names: its rest pose and origin differ.
     """
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
@@ -144,8 +154,8 @@ def _model(
 ) -> tuple[Figure, bool, Figure | None]:
     """Return the figure for captured bodies, and whether it is the bundled body.
 
-    A body model among the files is not shown as an actor of its own. The third result is a figure
-    with other joints that the bodies move: that of ``--model``.
+    A body model among the files is not shown as a separate actor. The third result is a figure
+    with different joints that the bodies move: that of ``--model``.
     """
     if named is not None:
         moves = [body.joint_names for _, body in contents.body_motions]
@@ -169,7 +179,7 @@ def _model(
 
 def _bundled() -> Figure:
     body = read(Source.open(bundled_body()))
-    assert isinstance(body, Figure)  # it is a bundled file
+    assert isinstance(body, Figure)  # the bundled body is a figure
     return body
 
 
@@ -186,7 +196,7 @@ def _own_model(
             continue
         try:
             model = read(Source.open(found))
-        except FormatError as problem:  # the user did not ask for this file
+        except FormatError as problem:  # the user has not named this file
             cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
             continue
         if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
@@ -261,7 +271,7 @@ def _carried(
 
     Raises RigError if too few joints match.
     """
-    assert isinstance(actor.clip, SampledClip)  # that of a captured body
+    assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
     drive = carrying_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
     try:
         clip, notes = driven_clip(drive, target)
@@ -282,7 +292,7 @@ def _drives_character(
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
     from viewer.rig.retargeting.drive import Drive
 
-    assert isinstance(actor.clip, SampledClip)  # that of a captured body
+    assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
     body = Figure(name, skeleton=actor.figure.skeleton, up="z" if up[-1] == "z" else "y")
     drive = Drive(
         SkeletonMotion(body, actor.clip),
@@ -321,7 +331,7 @@ def _begin_capture(
     is_bundled: bool,
     target: Figure | None,
 ) -> None:
-    """Read a capture until the first person appears; the rest is read later."""
+    """Read a capture until the first person appears; the remaining frames are read later."""
     capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
     builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)

@@ -19,8 +19,8 @@ from viewer.rig.captures.capture import Capture
 
 __all__ = ["filmed"]
 
-_NAME = "video"  # of the camera of captures that have none
-_ALIKE = 0.005  # relative difference of frame rates: 29.97 and 30 are alike
+_NAME = "video"  # name of the camera for captures that have none
+_ALIKE = 0.005  # maximum relative difference of equal frame rates, such as 29.97 and 30
 
 
 def filmed(
@@ -84,7 +84,7 @@ def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
 
 
 def _camera_of(views: Sequence[CameraView], path: Path) -> int:
-    """Return the index of the camera that recorded a video: the only one, or that of its name."""
+    """Return the index of the camera that recorded a video: the only one, or one of its name."""
     if not views:
         raise RigError(Diagnostic("F001.video-camera", path))
     names = [view.name for view in views]

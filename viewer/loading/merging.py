@@ -25,7 +25,7 @@ from viewer.rig.shape import rest_joints
 
 __all__ = ["merge_people"]
 
-_SAME = 0.25  # largest distance of one person's two tracks, relative to the size of a body
+_SAME = 0.25  # maximum distance between two tracks of one person, relative to the body's size
 
 
 def merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
@@ -46,7 +46,7 @@ def merge_people(scene: Scene, people: Sequence[int]) -> list[Diagnostic]:
     Raises
     ------
     RigError
-        If there is no such person, or they are apart in a frame.
+        If there is no such person, or they are too far apart in a frame.
     """
     notes: list[Diagnostic] = []
     known = sorted({actor.person for actor in scene.actors if actor.person is not None})
@@ -80,7 +80,7 @@ def _renumbered(actor: Actor, person: int) -> Diagnostic:
 
 
 def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list[Diagnostic]:
-    """Give the frames of one actor to another; return notes."""
+    """Transfer the frames of one actor to another; return notes."""
     names: dict[str, object] = {
         "kept": person_label(kept.person or 0),
         "other": person_label(other.person or 0),
@@ -110,7 +110,7 @@ def _joined_drives(first: Drive | None, second: Drive | None) -> Drive | None:
         return None
     motion = first.motion
     clip = joined_tracks(motion.clip, second.motion.clip)
-    assert isinstance(clip, SampledClip)  # as both are
+    assert isinstance(clip, SampledClip)  # both clips are sampled
     return replace(first, motion=replace(motion, clip=clip))
 
 

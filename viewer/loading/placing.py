@@ -28,7 +28,7 @@ def stand_up(cast: Cast, world_up: str) -> None:
 
 
 def place_side_by_side(cast: Cast) -> None:
-    """Move actors without a position of their own to the right of those before them.
+    """Move actors without their own position to the right of the actors before them.
 
     Actors of one group of figures are moved together.
     """
@@ -54,7 +54,7 @@ def place_side_by_side(cast: Cast) -> None:
 
 
 def _by_group(cast: Cast) -> list[list[Actor]]:
-    """Return the actors without a position of their own, grouped by figure group."""
+    """Return the actors without their own position, grouped by figure group."""
     groups: dict[FigureGroup | int, list[Actor]] = {}
     for index, (actor, group) in enumerate(zip(cast.actors, cast.groups, strict=True)):
         if not cast.placed[index]:

@@ -17,7 +17,8 @@ def model_refusal(problem: RigError, path: Path | None) -> RigError:
     Parameters
     ----------
     problem : RigError
-        Why it does not match; returned unchanged if it refers to a file, such as a joint map.
+        Reason why it does not match; returned unchanged if it refers to a file, such as a joint
+        map.
     path : Path or None
         File of the motion.
     """

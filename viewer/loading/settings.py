@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from viewer.data_classes import dataclass
 
 if TYPE_CHECKING:
     from viewer.rig.retargeting.joint_map import JointMap
@@ -23,7 +24,7 @@ class MotionSettings:
         The figure for captured bodies, which BVH motions also drive; None for a figure among the
         files, or the bundled body for captures.
     rig : str
-        Which of a body model's rigs is read, for Anny; empty for its default.
+        Rig of a body model to read, for Anny; empty for its default.
     lod : str
         Level of detail, for MHR; empty for its default.
     frame_rate : float or None
@@ -32,7 +33,7 @@ class MotionSettings:
         The up axis of captures and BVH; empty to detect it from the bodies.
     unit : str
         Unit of BVH lengths, which are converted to metres: a key of ``viewer.rig.units.METRES``;
-        empty to guess it from the skeleton's size.
+        empty to estimate it from the skeleton's size.
     flat_hands : bool or None
         Whether hand components are relative to the flat hand; None for the model's convention.
     layout : str
@@ -41,18 +42,18 @@ class MotionSettings:
     legacy_expression : bool
         Whether expressions drive SMPL-X columns 10 to 19, as in EasyMocap.
     drives : bool
-        Whether a BVH drives a figure opened with it, instead of being shown beside it.
+        Whether a BVH drives a figure opened with it, instead of being shown next to it.
     images : Path or None
-        Folder with an image folder for each camera of a capture; None for ``images`` beside the
+        Folder with an image folder for each camera of a capture; None for ``images`` next to the
         capture.
     video : Path or None
-        Video of a capture's camera; also gives the frame rate of captures that have none.
+        Video of a capture's camera; also sets the frame rate of captures that have none.
     animation : str
         The animation that figures play, by name or by number from 1; ``"none"`` for their rest
         pose, empty for the first.
     motions : tuple of Path
-        Further files whose motion drives a figure: their first animation, or the one of the name
-        ``animation``.
+        Further files whose motion drives a figure: the animation called ``animation``, or the first
+        one.
     springs : bool
         Whether spring joints, such as those of hair, are simulated while a motion plays.
     find_model : callable or None
@@ -64,10 +65,11 @@ class MotionSettings:
         Whether people of video motion capture keep one shape, the average over time.
     source_rest : int, "zero" or "auto"
         Rest pose of skeletons whose motion drives a figure: the number of a frame, ``"zero"`` for
-        the zero pose of the file, ``"auto"`` for the zero pose if somebody stands in it, otherwise
+        the zero pose of the file, ``"auto"`` for the zero pose if it is a standing pose, otherwise
         a frame in a T- or A-pose, otherwise an estimate from the anatomy.
     feet : bool
-        Whether the feet of driven figures stay planted while those of the motion stand.
+        Whether the feet of driven figures are planted while the feet of the motion are on the
+        ground.
     joint_map : JointMap or None
         Joints of driven figures and the joints that drive them; None to match them by name.
     """

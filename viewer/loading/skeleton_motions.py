@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.cast import Cast
@@ -157,7 +158,7 @@ def drive_somebody(
     is_driving : bool
         Whether there is such a figure.
     refusal : str or Diagnostic
-        Why the first figure does not match; empty if there is none.
+        Reason why the first figure does not match; empty if there is no figure.
 
     Raises
     ------
@@ -183,7 +184,7 @@ def drive_somebody(
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale separate skeletons to metres if other actors have a different unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have another unit; record the estimates.
 
     A lone skeleton, or one among others in the same unit, keeps the values of its file.
 

@@ -16,7 +16,7 @@ def unused_options(settings: MotionSettings, used: set[str]) -> Iterator[Diagnos
     Parameters
     ----------
     settings : MotionSettings
-        What was requested.
+        The requested settings.
     used : set of str
         Names of the options that had an effect.
     """

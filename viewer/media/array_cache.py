@@ -36,15 +36,15 @@ VARIABLE = "VIEWER_CACHE"
 """Environment variable: a folder for the cache, or ``off``."""
 
 LIMIT = 1 << 29
-"""Bytes of all entries; those that were not used for longest are removed beyond it."""
+"""Maximum size of all entries in bytes; beyond it, the least recently used ones are removed."""
 
 _OFF = ("off", "0", "no", "none")
-_LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
-_LARGEST = 1 << 25  # bytes of an entry; larger ones would evict all others
+_LEAST = 1 << 15  # minimum bytes: parsing shorter text is faster than opening an entry
+_LARGEST = 1 << 25  # maximum bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
 _BINARY = getattr(os, "O_BINARY", 0)
-# A link could lead to a device, or to a file of somebody else; opening a pipe would wait for ever.
+# A link could lead to a device or to another user's file; opening a pipe would block forever.
 _READING = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | _BINARY
 _MAGIC = f"viewer {zlib.crc32(VERSION.encode()):08x}".encode().ljust(16, b"\0")
 _is_off = False
@@ -58,7 +58,7 @@ def cache_folder() -> Path | None:
     if asked:
         return Path(os.path.abspath(os.path.expanduser(asked)))  # noqa: PTH100, PTH111
     if sys.platform.startswith("linux"):
-        # As platformdirs defines it; importing it takes longer than reading a small entry.
+        # As in platformdirs, whose import takes longer than reading a small entry.
         base = os.environ.get("XDG_CACHE_HOME", "").strip()
         home = base if os.path.isabs(base) else os.path.expanduser("~/.cache")  # noqa: PTH111, PTH117
         return Path(home) / "viewer" / "arrays"
@@ -205,7 +205,7 @@ class Slot:
 
 
 def _checksum(data: memoryview, axes: Sequence[int]) -> int:
-    """Return the checksum of an array and its axes, as others may have as many items."""
+    """Return the checksum of an array and its axes, because arrays of other shapes may be equal."""
     return zlib.crc32(data, zlib.crc32(struct.pack("<3Q", *axes)))
 
 

@@ -1,4 +1,4 @@
-"""The 256-colour palette of a GIF: chosen from a few frames, used for all with ordered dithering.
+"""The 256-colour palette of a GIF, chosen from a few frames; pixels get an ordered dither.
 
 With one palette for the whole video, static regions are identical from frame to frame and are not
 stored again, which makes the file five times smaller than with a palette per frame. The dither is

@@ -29,7 +29,7 @@ __all__ = [
     "save_image",
 ]
 
-_MAX_PIXELS = 16384 * 16384  # of one image, and of all images that are decoded together
+_MAX_PIXELS = 16384 * 16384  # limit for one image, and for all images that are decoded together
 _MOST_THREADS = 8
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # raised by Pillow
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
@@ -62,7 +62,7 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
     slot = slot_of("pixels-1", data, 0, len(data))
     kept = None if slot is None else slot.load("|u1", 3)
     if kept is not None:
-        kept.flags.writeable = False  # as below
+        kept.flags.writeable = False  # the array may be shared
         return kept
     found = decode_pictures([(path, data)])[0]
     if isinstance(found, FormatError):

@@ -135,7 +135,7 @@ def save_bytes(path: str | Path, data: bytes) -> None:
 
 
 def save_parts(path: str | Path, parts: Iterable[bytes]) -> None:
-    """Write a file part by part, so that its content need not exist at once; see ``save_bytes``.
+    """Write a file in parts, so that its content need not fit into memory; see ``save_bytes``.
 
     Errors of the iterable leave the file unchanged.
     """
@@ -215,7 +215,7 @@ class Replacement:
 
     def commit(self) -> int:
         """Replace the target with the temporary file; return its size in bytes."""
-        assert self.temporary is not None  # begin() made it
+        assert self.temporary is not None  # created by begin()
         poll(in_any_thread=True)  # as in _replace, but this is the encoder's thread
         try:
             with self.temporary.open("rb+") as stream:
@@ -238,7 +238,7 @@ class Replacement:
             self.temporary = None
 
 
-_Copies = dict[Path, Path | None]  # by resolved path; None if no file existed
+_Copies = dict[Path, Path | None]  # copies by resolved path; None if no file existed
 _outer: ContextVar[_Copies | None] = ContextVar("copies of the innermost all_or_none", default=None)
 
 
@@ -258,7 +258,7 @@ def all_or_none(paths: Iterable[Path]) -> Iterator[None]:
     OutputError
         If their old content cannot be copied.
     """
-    hold()  # also protects the copies, none of which may be left behind
+    hold()  # signals must not leave copies behind
     poll()
     copies: _Copies = {}
     outer = _outer.get()
@@ -344,7 +344,7 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
-        poll()  # last moment at which a signal can still stop the write
+        poll()  # the last point at which a signal can stop the write
         Path(name).replace(target)
     except BaseException:  # including Ctrl-C: the temporary file must not be left behind
         with contextlib.suppress(OSError):

@@ -14,7 +14,7 @@ from viewer.streams import is_stdout, require_stdout
 __all__ = ["check_folder_target", "check_targets"]
 
 _FORCE = "--force replaces it"
-_Identity = tuple[int, int] | Path  # device and inode of an existing file, else its path
+_Identity = tuple[int, int] | Path  # device and inode of an existing file, otherwise its path
 
 
 def check_targets(
@@ -36,8 +36,8 @@ def check_targets(
     Raises
     ------
     OutputError
-        For the first file that is a folder or an input, already exists, is written twice, lies in
-        a folder that is missing or read-only, or is a closed standard output. Links are resolved.
+        For the first file that is a folder or an input, already exists, is written twice, is in a
+        folder that is missing or read-only, or is a closed standard output. Links are resolved.
     """
     opened = _Inputs(inputs)
     written: dict[_Identity, Path] = {}
@@ -89,7 +89,7 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
 def _checked(
     file: Path, inputs: _Inputs, force: bool, hint: str, folders: set[Path]
 ) -> _Identity | None:
-    """Check one file and return its identity; None for a device or stream, never replaced."""
+    """Check one file and return its identity; None for devices and streams, never replaced."""
     if is_stdout(file):
         require_stdout(file)
         return None
@@ -138,7 +138,7 @@ class _Inputs:
                 continue  # a file without a status cannot have been read
 
     def hold(self, target: Path, status: os.stat_result) -> bool:
-        """Return whether a resolved file is an input, or lies in an input folder."""
+        """Return whether a resolved file is an input, or is in an input folder."""
         return (status.st_dev, status.st_ino) in self._files or target.parent in self._folders
 
 

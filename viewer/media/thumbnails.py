@@ -19,8 +19,8 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["data_uri", "thumbnail"]
 
-_QUALITY = 82  # of JPEG
-_MOST_BYTES = 256 << 20  # of a file
+_QUALITY = 82  # JPEG quality
+_MOST_BYTES = 256 << 20  # maximum size of a file
 
 
 def thumbnail(path: str | Path, size: tuple[int, int]) -> Bytes | None:

@@ -1,4 +1,4 @@
-"""Temporary files that would be left behind if the process had to end at once."""
+"""Temporary files that would be left behind if the process had to end immediately."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from pathlib import Path
 
 __all__ = ["note_unfinished", "remove_unfinished"]
 
-_MOST = 64  # maximum number of files at a time, in all threads; far fewer are written at once
+# Maximum number of registered files in all threads; far fewer are written simultaneously.
+_MOST = 64
 
 _unfinished: deque[Path] = deque(maxlen=_MOST)
 

@@ -156,7 +156,8 @@ class VideoSink:
         OutputError
             If it cannot be finished; an existing file is then unchanged.
         """
-        assert self._container is not None and self._output is not None  # there is a frame
+        # Opened for the first frame.
+        assert self._container is not None and self._output is not None
         with self._errors():
             if self._palette is not None:
                 self._encode(self._palette.taken(None))
@@ -211,7 +212,7 @@ class VideoSink:
         stream.width, stream.height = self._coded
         stream.pix_fmt = "pal8" if self.encoder == "gif" else self._pixel_format
         context = stream.codec_context
-        context.thread_count = 0  # one per processor
+        context.thread_count = 0  # 0: one thread per processor
         if self._chooser is not None:
             context.time_base = Fraction(1, 100)
             palette = self._chooser.palette()
@@ -229,7 +230,7 @@ class VideoSink:
         return "yuva420p" if self._has_alpha else "yuv420p"
 
     def _picture(self, pixels: Bytes) -> VideoFrame:
-        """Return the pixels in FFmpeg's memory, the edges repeated where the size must be even."""
+        """Return the pixels in FFmpeg's memory, with repeated edges if the size must be even."""
         (wide, high), (height, width) = self._coded, pixels.shape[:2]
         picture: VideoFrame = self._av.VideoFrame(wide, high, "rgba")
         plane = picture.planes[0]
@@ -253,12 +254,12 @@ class VideoSink:
                 format=self._pixel_format,
                 dst_colorspace=_BT709,
                 dst_color_range=_LIMITED,
-                threads=1,  # the encoder's threads are busy enough
+                threads=1,  # the encoder already uses all processors
             )
         ]
 
     def _encode(self, pictures: Iterable[VideoFrame]) -> None:
-        assert self._container is not None  # write() opened it
+        assert self._container is not None  # opened by write()
         for picture in pictures:
             self._container.mux(self._stream.encode(picture))
 

@@ -75,7 +75,7 @@ class VideoFile:
         return self._place
 
     def reopen(self, url: str, flags: int, options: dict[str, str]) -> BinaryIO:
-        """Open the same file for reading, as FFmpeg does to move MP4's index to the front."""
+        """Open the same file for reading, which FFmpeg does to move MP4's index to the front."""
         return self._path.open("rb")
 
     def finish(self) -> None:

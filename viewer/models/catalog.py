@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from viewer.data_classes import dataclass
 
 __all__ = ["CATALOG", "Publication"]
 
@@ -16,9 +16,9 @@ class Publication:
     title : str
         Name of the model.
     about : str
-        What it models, in a few words.
+        Description of its content, in a few words.
     licence : str
-        Licence in a word or two.
+        Short name of the licence.
     address : str
         Web address, or the command that adds it.
     """

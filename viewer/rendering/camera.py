@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pyrr import matrix44
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 
@@ -67,12 +68,12 @@ class Camera:
     up : "y" or "z"
         The scene's up axis.
     fixed : CameraView or None
-        A calibrated camera to look through. It provides the matrices; the other fields take effect
-        again when this field is None.
+        A calibrated camera to look through. It provides the matrices; the other fields have an
+        effect only while this field is None.
     front : float
         Azimuth of the front view; named views are relative to it.
     seconds : float
-        Time of the scene, which determines where a moving calibrated camera is.
+        Time of the scene, which determines the position of a moving calibrated camera.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -103,7 +104,7 @@ class Camera:
 
     @property
     def pinhole(self) -> CameraView | None:
-        """The calibrated camera to look through as it is at ``seconds``; None without one."""
+        """The calibrated camera to look through, at ``seconds``; None if there is none."""
         if self.fixed is None:
             return None
         from viewer.rig.captures.camera_view import view_at
@@ -265,12 +266,12 @@ def camera_from_view(
     fixed, view = view, view_at(view, seconds)
     width, height = picture_size(view)
     aspect = size[0] / size[1]
-    seen = max(height, width / aspect)  # rows of the image and the margins above and below
+    seen = max(height, width / aspect)  # rows of the image, including the margins above and below
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
     distance = float((place - middle) @ backward)
-    if distance <= _SMALLEST:  # it is behind the camera
+    if distance <= _SMALLEST:  # the object is behind the camera
         distance = float(np.linalg.norm(place - middle)) or 1.0
     x, y, z = backward if up == "y" else (backward[0], backward[2], -backward[1])
     focal = float(view.intrinsic[1, 1] / view.intrinsic[2, 2])
@@ -289,14 +290,14 @@ def camera_from_view(
 def follow_view(
     camera: Camera, size: tuple[int, int], seconds: float, box: Floats | None = None
 ) -> None:
-    """Move a camera to a time of the scene, in place, with the calibrated one it looks through.
+    """Move a camera, and the calibrated camera it looks through, to a time of the scene, in place.
 
-    If ``fixed`` is reset to None later, the camera continues from where that one is now.
+        If ``fixed`` is later reset to None, the camera continues from the current position.
 
     Parameters
     ----------
     camera : Camera
-        Any camera; without a moving calibrated one, only its time changes.
+        Any camera; unless it looks through a moving calibrated camera, only its time changes.
     size, seconds, box
         As for ``camera_from_view``.
     """
@@ -358,6 +359,7 @@ def zoom(camera: Camera, factor: float, x: float = 0.0, y: float = 0.0) -> None:
         Offset of the pointer from the image's centre, right and up, in image heights.
     """
     distance = min(max(camera.distance * factor, _SMALLEST), 1e12)
-    factor = distance / camera.distance  # 1, so without panning, at the ends of the range
+    # At the ends of the range, the factor is 1, so the camera does not pan.
+    factor = distance / camera.distance
     pan(camera, x * (1.0 - factor), y * (1.0 - factor))
     camera.distance = distance

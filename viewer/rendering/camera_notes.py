@@ -10,11 +10,11 @@ from viewer.rig.scene import Scene
 
 __all__ = ["image_notes", "lens_notes"]
 
-_VISIBLE = 0.5  # pixels of the camera's images; smaller errors are invisible
+_VISIBLE = 0.5  # pixels of the camera's images; smaller errors are not visible
 
 
 def image_notes(scene: Scene, camera: CameraView) -> list[str]:
-    """Return messages about a camera's images, one line each; none if there are no images.
+    """Return messages about a camera's images, one line each; an empty list if it has no images.
 
     Raises
     ------

@@ -29,7 +29,7 @@ __all__ = [
 ]
 
 _FRAMED = 24  # number of positions along the path of a moving camera that are framed
-_TOLERANCE = 0.01  # relative difference of aspect ratios: one pixel of a small image
+_TOLERANCE = 0.01  # maximum relative difference of aspect ratios: one pixel of a small image
 
 
 def drawn_cameras(

@@ -29,10 +29,10 @@ __all__ = [
     "seen_aspect",
 ]
 
-_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # limits for fitting
+_MOST_FRAMES, _MOST_POINTS = 32, 10_000_000  # maximum numbers of frames and points for fitting
 _N_DIRECTIONS = 1000
-_BLOCK = 5_000  # points at a time: the matrix of dot products stays below 40 MB
-_N_VIEWS = 24  # views of a rotating camera to fit, 15 degrees apart in a full rotation
+_BLOCK = 5_000  # points per batch, whose matrix of dot products stays below 40 MB
+_N_VIEWS = 24  # number of views of a rotating camera to fit, 15 degrees apart in a full rotation
 
 
 def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
@@ -74,7 +74,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
 def level_shifts(recording: Recording) -> Floats:
     """Return the movement of the actors over the ground up to each frame, scene units: (F, 3).
 
-    A camera with these shifts shows all frames at one scale and with one ground line.
+    A camera with these shifts shows all frames at the same scale and with the same ground line.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def level_shifts(recording: Recording) -> Floats:
         pose_scene(scene, recording, seconds)
         places = {i: followed_point(actor) for i, actor in enumerate(scene.actors)}
         now = {i: place for i, place in places.items() if place is not None}
-        # Actors that enter or leave do not move the camera.
+        # Actors that appear or disappear do not move the camera.
         steps = [now[i] - before[i] for i in now if i in before]
         shifts[frame] = shifts[max(frame - 1, 0)] + (np.mean(steps, axis=0) if steps else 0.0)
         before |= now
@@ -133,7 +133,7 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
     """Return the extreme points along each of many directions.
 
-    Their bounding box is exact. A camera fitted to them cuts off much less than 1 % of the size:
+    Their bounding box is exact. A camera fitted to them cuts off much less than 1 % of the size, as
     1000 directions are 7 degrees apart. The margin of ``fit`` is 8 %.
 
     Parameters

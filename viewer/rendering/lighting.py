@@ -27,12 +27,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Lighting"]
 
-_SHADOW_STRENGTH = 0.9  # the remainder represents light reflected by other surfaces
-_BLUR = 0.011  # filter radius on the ground, relative to a figure's size, where passes are averaged
+# Fraction of light removed; the remainder represents light reflected by other surfaces.
+_SHADOW_STRENGTH = 0.9
+_BLUR = 0.011  # filter radius on the ground relative to a figure's size, if passes are averaged
 
 
 class Lighting:
-    """Draws the maps on which the lighting depends, before each pass of an image.
+    """Renderer of the maps on which the lighting depends, before each pass of an image.
 
     Parameters
     ----------
@@ -85,7 +86,7 @@ class Lighting:
         if not of_actors:
             return
         self._size = max(box_size(bounding_box(spheres[:, :3])) for spheres in of_actors)
-        # The joints of a figure may all be in one place.
+        # All joints of a figure may coincide.
         self._size = self._size or casters.largest_mesh()
         if options.has_shadows and self._size > 0.0:
             self._spheres, (axes, height) = np.concatenate(of_actors), _ground(up, box)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.rig.skinning import Skinning
 
 __all__ = [
@@ -27,10 +28,10 @@ SHOWN = {
     "both": "Skin and skeleton",
     "binding": "Skin in bind pose",
 }
-"""Parts of a figure that are drawn, with labels for menus."""
+"""Parts of a figure that are drawn, with their labels in menus."""
 
 MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
-"""Images of lit spheres for the shading ``"matcap"``, with labels for menus."""
+"""Images of lit spheres for the shading ``"matcap"``, with their labels in menus."""
 
 BONES = {
     "auto": "Automatic",
@@ -39,13 +40,13 @@ BONES = {
     "sticks": "Sticks",
     "axes": "Axes",
 }
-"""Styles of skeletons, with labels for menus: see ``DisplayOptions.bones``."""
+"""Styles of skeletons, with their labels in menus: see ``DisplayOptions.bones``."""
 
 OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
-"""Default opacity of a skeleton over the skin: boxes often enclose the skin, thin shapes do not."""
+"""Default opacity of a skeleton over the skin: unlike thin shapes, boxes often enclose the skin."""
 
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
-"""Backgrounds by name; a colour is given as ``#rrggbb``."""
+"""Names of backgrounds; colours are given as ``#rrggbb``."""
 
 
 QUALITIES = {

@@ -25,8 +25,8 @@ _DISTINCT = np.array(
         [153, 255, 153], [153, 221, 255], [221, 170, 187], [119, 136, 204],
     ]
 )  # fmt: skip
-_ROUNDS = (1.0, 0.55, 0.3)  # three brightness levels of each colour
-_RELUCTANCE = 0.04  # OKLab distance by which a darker colour must be better
+_ROUNDS = (1.0, 0.55, 0.3)  # brightness levels of each colour
+_RELUCTANCE = 0.04  # OKLab distance by which a darker colour must be farther from its neighbours
 
 # Linear colours as seen with normal vision, protanopia and deuteranopia (Machado et al. 2009).
 _EYES = np.array(

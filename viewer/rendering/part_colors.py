@@ -21,7 +21,7 @@ _DISTINCT = np.array(
         [204, 121, 167],
     ]
 )
-_DARKER = 0.55  # factor on the brightness for each repetition of the list
+_DARKER = 0.55  # factor of the brightness for each repetition of the list
 
 
 def part_colors(count: int) -> Floats:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
@@ -37,7 +38,7 @@ from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Passes", "Pick", "PickPass"]
 
-_REACH = 3  # pixels around the requested pixel
+_REACH = 3  # search radius around the requested pixel, pixels
 _SIDE = 2 * _REACH + 1
 _PREFERENCE = 2.5  # pixels by which a keypoint may be farther from the pointer than a surface
 
@@ -82,7 +83,7 @@ _Found = Callable[[int, int, Floats], Pick]
 
 
 class PickPass:
-    """Draws indices instead of colours into a few pixels, on request.
+    """Pass that draws indices instead of colours into a few pixels, on request.
 
     Parameters
     ----------
@@ -119,7 +120,7 @@ class PickPass:
         size : (int, int)
             Width and height of the image.
         pixel : (float, float)
-            From the image's left and upper edge.
+            Pixels from the image's left and upper edge.
         """
         if has_joint_marks(options):
             # Dots, and bones in X-ray mode, are drawn over everything else.

@@ -12,7 +12,7 @@ from viewer.rig.mesh import box_size
 __all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
-_UNBOUNDED = 1e9  # replaces an infinite distortion
+_UNBOUNDED = 1e9  # value that replaces an infinite distortion
 _THINNEST = 1e-6  # minimum depth in front of and behind the scene, relative to its distance
 _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's centre
 

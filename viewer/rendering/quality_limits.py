@@ -12,17 +12,18 @@ from viewer.rig.scene import Scene
 
 __all__ = ["limit_passes", "time_note"]
 
-_MOST_WORK = 2.0  # of a still image
-_FEWEST = 3  # passes; fewer look no better than normal quality
-_BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9  # of the sum of passes, and occlusion at half resolution
-_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # about seconds on two cores
-_PATIENCE = 5.0  # seconds after which the time is stated
+_MOST_WORK = 2.0  # maximum work for a still image
+_FEWEST = 3  # minimum number of passes; fewer look no better than normal quality
+# Memory for the sum of passes and for occlusion at half resolution, and its limit.
+_BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9
+_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # work units, about seconds on two cores
+_PATIENCE = 5.0  # seconds above which the time is stated
 
 
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would be much work for software, or need over 1 GB of memory.
+    """Lower a quality that would take software long, or need over 1 GB of memory.
 
     The work is counted, not timed, so that an image does not depend on the machine or its load.
 
@@ -35,7 +36,7 @@ def limit_passes(
     size : (int, int)
         Width and height in pixels.
     context : moderngl.Context
-        Context, which tells whether rendering is done in software.
+        Context, which determines whether rendering is done in software.
 
     Returns
     -------

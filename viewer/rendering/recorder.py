@@ -20,12 +20,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.target import Target, picture_rows, straight
 from viewer.rendering.gpu.upload import checked
@@ -124,7 +125,8 @@ class Recording:
     box : (2, 3) or None
         Bounds for the ground grid and the depth range; None for those of the current scene.
     moves : bool
-        Whether clips pose the actors; False keeps their poses, for a turntable of a still pose.
+        Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
+        pose.
     interpolate : bool
         Interpolate across gaps of captures.
     turntable : float
@@ -168,7 +170,7 @@ class Progress:
     Attributes
     ----------
     done : int
-        Number of frames drawn and passed to the sink.
+        Number of frames that have been drawn and passed to the sink.
     total : int
         Number of all frames.
     seconds : float
@@ -248,7 +250,8 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
     try:
         drawer = _Drawer(recording, renderer)
         for data in drawer.draw(samples):
-            queue.begin(partial(look, data)).result()  # one at a time, in order
+            # Sample frames are inspected one at a time, in order.
+            queue.begin(partial(look, data)).result()
             yield progress(0)
         for frame, data in enumerate(drawer.draw(range(total))):
             queue.add(partial(write, frame, data))
@@ -258,7 +261,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         while wait([closing], _PATIENCE).not_done:
             yield progress(total)
         closing.result()
-    except BaseException:  # also Ctrl-C, and a generator that is closed
+    except BaseException:  # includes Ctrl-C and the closing of the generator
         queue.stop()
         sink.abort()
         raise

@@ -195,7 +195,7 @@ class Renderer:
         selected: tuple[int, int],
         strength: float,
     ) -> None:
-        """Draw everything that is part of the scene, from the background on."""
+        """Draw everything that is part of the scene, starting with the background."""
         if options.background == "environment":
             self.late.backdrop_pass.draw(view, options.lights)
         draw_image_behind(self.late, scene, view, options, target.size)
@@ -228,7 +228,7 @@ class Renderer:
                 self._draw_markers(actor, view, options)
 
     def _accumulate(self, target: Target, is_first: bool) -> None:
-        """Add the pass that a target shows, and show the average of all so far."""
+        """Add the pass in a target, and replace it by the average of all passes so far."""
         summed = self.late.accumulation(target.size)
         if is_first:
             summed.clear()

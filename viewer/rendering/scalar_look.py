@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.colormap import colormap, diverging_map
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
@@ -36,7 +36,7 @@ class ScalarLook:
     is_whole : bool
         Whether each colour represents one integer, from 0.
     dark_zero : bool
-        Whether 0 has a colour of its own, ``NOTHING``.
+        Whether 0 has a separate colour, ``NOTHING``.
     isolines : bool
         Whether lines are drawn at every tenth of the range.
     is_typical : bool

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.effects import NO_EFFECTS, Effects
 from viewer.rendering.gpu.program import set_uniforms
@@ -53,10 +53,27 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
     values = {
         "u_model_view": as_uniform(model_view),
         "u_projection": as_uniform(view.projection),
-        "u_normal_matrix": as_uniform(np.linalg.inv(model_view[:3, :3]).T),
+        "u_normal_matrix": as_uniform(normal_matrix(model_view[:3, :3])),
         "u_orthographic": view.camera.is_parallel,
     }
     set_uniforms(program, values)
+
+
+def normal_matrix(linear: Floats) -> Floats:
+    """Return the matrix that transforms normals: the inverse transpose, up to a positive factor.
+
+    A singular matrix, as of a flattened or vanished mesh, has no inverse. Its cofactors, the
+    determinant times the inverse transpose, still transform normals.
+
+    Parameters
+    ----------
+    linear : (3, 3)
+        Transforms positions.
+    """
+    if np.linalg.det(linear) != 0.0:
+        return np.linalg.inv(linear).T.astype(np.float64, copy=False)
+    x, y, z = linear
+    return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
 
 
 def set_lights(program: moderngl.Program, view: View, lights: Lights) -> None:
@@ -109,6 +126,6 @@ def _direction(light: Light, follows: bool, view: View) -> Floats:
         flat = math.cos(inclination)
         across, towards = flat * math.sin(azimuth), flat * math.cos(azimuth)
         return np.array([across, math.sin(inclination), towards])
-    # The light comes from where a camera at these angles would be.
+    # The light comes from the position of a camera at these angles.
     camera = Camera(azimuth=light.azimuth, inclination=light.inclination, up=view.camera.up)
     return view.matrix[:3, :3] @ camera_axes(camera)[2]

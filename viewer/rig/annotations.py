@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -48,7 +47,7 @@ class Keypoints:
     joints : (N,) int32
         Joint of each keypoint, -1 for a point on the mesh.
     vertices : (N, 3) int32
-        Corners of the triangle; ignored if there is a joint.
+        Corners of the triangle; ignored for keypoints on a joint.
     weights : (N, 3)
         Barycentric coordinates in that triangle.
     """
@@ -68,7 +67,7 @@ class Keypoints:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ReducedMesh:
-    """A coarser level of detail over a subset of the vertices.
+    """A coarser level of detail that uses a subset of the vertices.
 
     Attributes
     ----------

@@ -27,11 +27,11 @@ class Deferred:
     Parameters
     ----------
     shape : tuple of int
-        As the file declares it.
+        Shape declared by the file.
     dtype : dtype
-        As the file declares it.
+        Element type declared by the file.
     load : callable
-        Reads the array; called once, may raise a ``FormatError``.
+        Reads the array; called once; may raise a ``FormatError``.
 
     Attributes
     ----------
@@ -79,14 +79,15 @@ def frozen(
     values : array-like of ``shape``
         Copied if its memory can still be modified.
     shape : tuple
-        Required shape; ``None`` leaves an axis free.
+        Required shape; ``None`` allows any length of an axis.
     dtype : dtype
         Required element type.
 
     Raises
     ------
     RigError
-        If the shape differs, a number is not finite, or an integer type gets a fraction.
+        If the shape differs, a number is not finite, or an integer type is required and a value has
+        a fraction.
 
     >>> frozen("offset", [1, 2, 3], (3,)).flags.writeable
     False

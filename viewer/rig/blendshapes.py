@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
 from viewer.rig.bodies.feature import Feature
@@ -48,8 +48,8 @@ class SummedOffsets(Deferred):
         self.total = total
 
 
-_BLOCK = 9  # correctives of one joint in SMPL
-_LONGEST = 252  # rows in one range of correctives; a multiple of the block
+_BLOCK = 9  # number of correctives per joint in SMPL
+_LONGEST = 252  # maximum number of rows in one range of correctives; a multiple of _BLOCK
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,12 +69,12 @@ class BlendShapes:
         Offsets of the rest normals per unit of weight; None if the normals are recomputed from
         the changed surface.
     rest_weights : (S,) or None
-        Weights of the file's own pose; None if all are 0.
+        Weights of the pose stored in the file; None if all are 0.
     rules : ExpressionRules or None
         Rules by which expressions modify each other's weights; None if they do not.
     space : ShapeSpace or None
-        Computes the displacement if it is not the sum of the offsets; these are then those of
-        each weight of 1 alone.
+        Computes the displacement if it is not the sum of the offsets; the offsets are then the
+        displacements by each weight of 1 alone.
     origins : (S,) or None
         Value that a slider shows at weight 0; None if all are 0.
     ranges : (S, 2) or None
@@ -134,7 +134,7 @@ class BlendShapes:
         return 0.0 if self.origins is None else float(self.origins[row])
 
     def is_expression(self, row: int) -> bool:
-        """Return whether a blend shape is a combination of others, governed by ``rules``."""
+        """Return whether a blend shape is a combination of others controlled by ``rules``."""
         return self.rules is not None and bool((self.rules.rows == row).any())
 
     def displacement(self, weights: Floats) -> Floats:
@@ -143,7 +143,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; missing weights count as 0.
+            N <= S; missing weights are treated as 0.
 
         Returns
         -------
@@ -166,7 +166,7 @@ class BlendShapes:
         Parameters
         ----------
         weights : (N,)
-            N <= S; missing weights count as 0.
+            N <= S; missing weights are treated as 0.
 
         Returns
         -------
@@ -312,8 +312,8 @@ class JointRegressor:
     weights : (N,)
         Value of each entry.
     axes : (N, 2) int32 or None
-        Coordinate of the joint and of the vertex that an entry connects; None if each connects
-        all three with themselves.
+        Coordinates (0 to 2) of the joint and of the vertex that an entry connects; None if each
+        entry applies to all three coordinates.
     bias : (J, 3) or None
         Constants b; None if all are 0.
     """

@@ -54,7 +54,7 @@ def apply_coefficients(
     group : str
         ``"shape"`` or ``"expression"``.
     values : (N,) or None
-        Coefficients of the group's first shapes; None changes nothing.
+        Coefficients of the group's first shapes; None leaves the weights unchanged.
     figure : Figure
         Figure with or without blend shapes.
     pose : Pose

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.kinematics import posed_skeleton
@@ -30,7 +30,7 @@ __all__ = ["AttachedFigure", "Figure", "skeleton_points"]
 
 
 class AttachedFigure(NamedTuple):
-    """The parts of a figure whose mesh follows its skeleton; none of them is missing."""
+    """The mesh, skeleton and skin of a figure whose mesh follows its skeleton."""
 
     mesh: Mesh
     skeleton: Skeleton
@@ -67,7 +67,7 @@ class Figure:
     pose_layout : PoseLayout or None
         Order of the values in the model's own pose vectors; None if those are the DOFs.
     parameters : ModelParameters or None
-        Parameters of the model from which its DOFs and scales follow.
+        Parameters of the model that determine its DOFs and scales.
     body_parts, keypoints, reduced : BodyParts, Keypoints, ReducedMesh, or None
         Other annotations of the mesh.
     symmetry : (V,) int32 or None
@@ -77,9 +77,9 @@ class Figure:
     fields : tuple of VertexField
         Precomputed values per vertex, to be shown as colours.
     facts : tuple of (str, str or Diagnostic)
-        Findings of the reader for ``viewer info``, each a heading and a text.
+        Findings of the reader for ``viewer info``, as pairs of heading and text.
     animations : tuple of Animation
-        Motions from the figure's own file, in file order.
+        Motions from the figure's file, in file order.
     record : FileRecord or None
         Other data of its glTF or FBX file, to be written back.
     """
@@ -161,7 +161,7 @@ class Figure:
 
     @property
     def rest_shape_weights(self) -> Floats:
-        """Shape weights of the file's own pose: (S,)."""
+        """Shape weights of the pose stored in the file: (S,)."""
         shapes = self.blend_shapes
         if shapes is None or shapes.rest_weights is None:
             return np.zeros(self.n_shapes)

@@ -1,11 +1,12 @@
-"""Properties of a figure that only its own kind of file uses, kept to be written back."""
+"""Properties of a figure that only its file format uses, stored to be written back."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Ints
 
 __all__ = ["FileRecord", "StoredImage", "StoredTextures", "VrmRecord"]
@@ -29,7 +30,7 @@ class StoredImage:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StoredTextures:
-    """Textures of a glTF file as it lists them.
+    """Textures of a glTF file in its own lists.
 
     Attributes
     ----------
@@ -57,7 +58,7 @@ class VrmRecord:
     joints, parts : mapping of int
         Joint, and part of the mesh, of each node that has one.
     meshes : mapping of int
-        Mesh of each node in ``parts``.
+        Mesh of each node that ``parts`` lists.
     materials : tuple of int
         Index in the file of each material of the figure's mesh.
     toon : mapping

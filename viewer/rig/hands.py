@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -49,7 +48,7 @@ def hand_vectors(hand: Hand, coefficients: Floats, flat: bool) -> Floats:
     hand : Hand
         Provides the components and mean.
     coefficients : (N,)
-        N <= C; missing coefficients count as 0.
+        N <= C; missing coefficients are treated as 0.
     flat : bool
         Whether to omit the mean.
 

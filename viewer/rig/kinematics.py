@@ -25,7 +25,7 @@ __all__ = [
 # Relative tolerance of A^T A = s^2 I. Treating a matrix within this tolerance as rigid rotates
 # normals by at most half of it, in radians.
 _RIGID = 1e-5
-_MOST_JOINTS = 4096  # of hierarchies whose passes are kept
+_MOST_JOINTS = 4096  # maximum number of joints of hierarchies whose passes are cached
 
 Indices = NDArray[np.intp]
 
@@ -59,7 +59,8 @@ def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None)
     """
     world = local.copy()
     if local.ndim > 3:
-        # Of many poses, a joint's matrices fill the caches: one pass, without copies.
+        # The matrices of one joint in many poses fill the caches, so one pass without copies is
+        # fastest.
         for joint, parent in enumerate(parents.tolist()):
             if parent >= 0:
                 np.matmul(world[parent], local[joint], out=world[joint])

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bytes, Floats, frozen
 
 __all__ = ["ALPHA_MODES", "MINIFICATIONS", "TEXTURES", "WRAPS", "Material", "Texture"]
 
 ALPHA_MODES = ("opaque", "mask", "blend")
-"""Alpha ignored; cut out below the cutoff; blended with the background."""
+"""Alpha is ignored; surfaces are cut out below the cutoff; or they are blended with the
+background."""
 
 WRAPS = ("clamp", "repeat", "mirror")
 """Texture coordinates outside 0 to 1: clamped, repeated, or mirrored on every other repeat."""
@@ -21,7 +21,7 @@ MINIFICATIONS = (
     *("nearest", "linear", "nearest_mipmap_nearest"),
     *("linear_mipmap_nearest", "nearest_mipmap_linear", "linear_mipmap_linear"),
 )
-"""Filters of images that are drawn smaller than they are, as OpenGL and glTF name them."""
+"""Filters of minified images, with their names in OpenGL and glTF."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,8 +101,8 @@ class Material:
     base_texture : Texture or None
         Colour and opacity, sRGB.
     base_color : (r, g, b, a) or None
-        Linear, 0 to 1; None for a material without a colour of its own, which is white under a
-        texture and otherwise has the figure's colour.
+        Linear, 0 to 1; None for a material without a colour, which is white under a texture and
+        otherwise has the figure's colour.
     metallic, roughness : float
         0 to 1; roughness is perceptual, the square root of the GGX width.
     metallic_texture, roughness_texture : Texture or None
@@ -128,7 +128,7 @@ class Material:
     unlit : bool
         Whether the base colour is shown without lighting.
     shade_color : (r, g, b) or None
-        Linear colour of the side away from the key light in toon shading; None without it.
+        Linear colour of the side away from the key light in toon shading; None in other shading.
     shade_texture : Texture or None
         Colour that multiplies ``shade_color``, sRGB.
     shade_range : (float, float)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
@@ -31,10 +31,10 @@ __all__ = [
 ]
 
 PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person"]
-"""Whether a part is drawn from outside, from the character's own eyes, or in both views.
+"""Whether a part is drawn from outside, from the character's eyes, or in both views.
 
-``"auto"`` parts are drawn from outside and, without triangles that move with the head, from the
-eyes.
+``"auto"`` parts are drawn from outside and, unless they have triangles that move with the head,
+from the eyes.
 """
 
 _ROW = 64  # points per row of a reduction, see bounding_box
@@ -49,7 +49,7 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
+        Vertex indices; counter-clockwise from outside in most files, on which no code relies.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
@@ -104,7 +104,8 @@ class Mesh:
         for name in ("triangle_materials", "triangle_parts"):
             given = getattr(self, name)
             if name == "triangle_parts" and not self.parts and np.all(np.asarray(given) == -1):
-                # It may be that of a mesh with other triangles, copied by ``dataclasses.replace``.
+                # The array may belong to a mesh with other triangles, copied by
+                # ``dataclasses.replace``.
                 given = None
             values = np.full(self.n_triangles, -1, dtype=np.int32) if given is None else given
             put(name, frozen(name, values, (self.n_triangles,), np.int32))
@@ -259,7 +260,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     if mesh.uv_triangles is None or mesh.uvs is None:
         identity = np.arange(mesh.n_vertices, dtype=np.int32)
         return identity, identity, mesh.triangles
-    # Only corners with a further texture coordinate of a vertex are sorted, which are few.
+    # Only corners with an additional texture coordinate of their vertex are sorted; these are few.
     corners, uvs, n_uvs = mesh.triangles.ravel(), mesh.uv_triangles.ravel(), len(mesh.uvs)
     lowest = np.full(mesh.n_vertices, n_uvs, dtype=np.int32)
     np.minimum.at(lowest, corners, uvs)
@@ -270,7 +271,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     is_used, n_further = lowest < n_uvs, np.bincount(owners, minlength=mesh.n_vertices)
     counts = is_used + n_further
     starts = np.cumsum(counts) - counts
-    # Further copies of a vertex keep their order among all further copies.
+    # Additional copies of a vertex keep their order among all additional copies.
     places = starts[owners] + 1 + np.arange(len(pairs)) - (np.cumsum(n_further) - n_further)[owners]
     triangles = starts[corners]
     triangles[further] = places[which]
@@ -283,7 +284,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
 
 
 def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
-    """Return a mesh with one texture coordinate per vertex, for formats without others.
+    """Return a mesh with one texture coordinate per vertex, for formats that support no others.
 
     Parameters
     ----------
@@ -295,7 +296,7 @@ def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
     mesh : Mesh
         R vertices, split along texture seams.
     sources : (R,) int32
-        Vertex that each of them is a copy of.
+        Original vertex of each of these.
     """
     sources, uv_indices, triangles = split_seams(mesh)
     return Mesh(
@@ -346,21 +347,21 @@ def vertex_normals(positions: Floats, triangles: Ints) -> Floats:
 
 
 def visible_triangles(mesh: Mesh, hidden: Collection[int]) -> Bools:
-    """Return which triangles are in no hidden part: (T,) bool.
+    """Return a mask of the triangles that are not in a hidden part: (T,) bool.
 
     Parameters
     ----------
     mesh : Mesh
         With or without parts.
     hidden : collection of int
-        Indices of the hidden parts; others than those of the mesh are ignored.
+        Indices of the hidden parts; indices that are not parts of the mesh are ignored.
     """
     shown: Bools = ~np.isin(mesh.part_indices, list(hidden))
     return shown
 
 
 def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
-    """Return which vertices are not those of hidden triangles only: (V,) bool."""
+    """Return a mask of the vertices that are not used by hidden triangles alone: (V,) bool."""
     shown = visible_triangles(mesh, hidden)
     visible = np.ones(mesh.n_vertices, dtype=np.bool_)
     visible[mesh.triangles[~shown]] = False
@@ -369,7 +370,7 @@ def visible_vertices(mesh: Mesh, hidden: Collection[int]) -> Bools:
 
 
 def area_vectors(positions: Floats, triangles: Ints) -> Floats:
-    """Return (b - a) x (c - a) of each triangle: along its normal, twice its area long.
+    """Return (b - a) x (c - a) of each triangle: its normal, scaled to twice its area.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ _NOT_ZERO = set("123456789n")  # "inf" and "nan" contain an n
 
 
 def number_text(value: float, spec: str = "g") -> str:
-    """Format a number; if it rounds to 0, it has no minus sign.
+    """Format a number, without a minus sign if it rounds to 0.
 
     Parameters
     ----------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.axis_products import AxisProducts, axis_products
@@ -40,11 +41,11 @@ class Pose:
     dofs : (D,)
         Lengths or radians.
     translations : (J, 3)
-        Added to the skeleton's rest translations, which follow the figure's shape.
+        Offsets from the skeleton's rest translations, which follow the figure's shape.
     rotations, scales : (J, 4), (J, 3)
         Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
     shape_weights : (S,)
-        Weights of the figure's blend shapes; missing trailing weights count as 0.
+        Weights of the figure's blend shapes; missing trailing weights are treated as 0.
     figure_scale : float
         Scale of the whole skinned figure about its origin, applied after skinning.
     figure_translation : (3,)
@@ -65,7 +66,7 @@ class Pose:
 
     @property
     def skinning_key(self) -> NumberKey:
-        """Key of all values except the figure's placement; the same object until a value changes.
+        """Key of all values except the figure's placement, the same object until a value changes.
 
         Poses with equal keys have the same joints and need no second skinning.
         """
@@ -132,7 +133,7 @@ def placement_matrix(pose: Pose) -> Floats:
 
 
 def rest_pose(skeleton: Skeleton) -> Pose:
-    """Return a new pose with the file's own values, clamped to the limits.
+    """Return a new pose with the values stored in the file, clamped to the limits.
 
     Parameters
     ----------
@@ -191,7 +192,7 @@ def local_matrices(skeleton: Skeleton, pose: Pose) -> Floats:
 def joint_rotations(skeleton: Skeleton, pose: Pose) -> Floats:
     """Return each joint's rotation relative to its parent, R(quaternion) R(DOFs): (J, 3, 3).
 
-    Constraints are not applied: these are the rotations that the pose asks for.
+    Constraints are not applied: these are the rotations that the pose specifies.
     """
     return quaternion_to_matrix(pose.rotations) @ dof_rotations(skeleton, pose.dofs)
 

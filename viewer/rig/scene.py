@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
@@ -16,7 +17,7 @@ from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 __all__ = [
     "Actor",
@@ -43,11 +44,11 @@ if TYPE_CHECKING:
     from viewer.rig.retargeting.drive import Drive
 
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
-"""The motion of an actor; every kind has ``name``, and ``start`` and ``end`` in seconds."""
+"""The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
-# The camera frames the box of the other 99.9 % of the points ...
+# The camera ignores this fraction of outlying points ...
 _OUTLIER_FRACTION = 0.001
-# ... if the box of all points is this many times larger.
+# ... if the bounding box of all points is this many times larger.
 _OUTLIER_RATIO = 100.0
 
 
@@ -55,7 +56,7 @@ class Swinging(Protocol):
     """Simulation of spring joints; see ``viewer.rig.motion.spring_motion``."""
 
     def swing(self, actor: Actor, time: float) -> None:
-        """Rotate the spring joints of an actor that its clip has posed for a time, in place."""
+        """Rotate the spring joints of an actor, already posed by its clip at a time, in place."""
 
 
 @dataclass(slots=True, eq=False)
@@ -81,7 +82,7 @@ class Actor:
     color : (r, g, b) or None
         Linear, 0 to 1; None for the default colour.
     opacity : float
-        Below 1, it is drawn translucently as one layer: nothing inside it is visible.
+        Below 1, the actor is drawn as one translucent layer: nothing inside it is visible.
     points : (K, 4) or None
         Captured points at the current time: x, y, z, confidence.
     is_present : bool
@@ -89,13 +90,13 @@ class Actor:
     animation : int
         Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
     origin : Path or None
-        File of its figure; figures of one file play their animations together.
+        File of its figure; figures from the same file play their animations together.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
     hidden_parts : frozenset of int
         Parts of the mesh that are not drawn, by index.
     springs : Swinging or None
-        Simulation of its spring joints while its clip plays; None leaves them to the clip.
+        Simulation of its spring joints while its clip plays; if None, the clip moves them.
     drive : Drive or None
         Motion of another skeleton from which the clip was retargeted; None for other clips.
     """
@@ -136,7 +137,7 @@ class Actor:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is drawn, being visible and present at the current time."""
+        """Whether it is drawn: visible and present at the current time."""
         return self.visible and self.is_present
 
     def __post_init__(self) -> None:
@@ -187,7 +188,7 @@ def free_title(actors: Iterable[Actor], title: str) -> str:
 
 
 def figure_pose(figure: Figure) -> Pose:
-    """Return a new pose of a figure with a skeleton: the file's own, with its shape weights."""
+    """Return a new pose of a figure with a skeleton: the pose and shape weights of the file."""
     pose = rest_pose(figure.require_skeleton())
     pose.shape_weights = figure.rest_shape_weights.copy()
     return pose
@@ -301,32 +302,38 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     (N, 3)
         Scene space.
     """
-    from viewer.rig.skinning import deform
-
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        shape = shaped(figure, actor.pose.shape_weights).require_skeleton()
+        shape = shaped_skeleton(figure, actor.pose.shape_weights)
         joints = skeleton_points(shape, actor.pose)
         parts.append(apply_transform(placement_matrix(actor.pose), joints))
         # Joints that coincide have no size to frame.
         shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
     if figure.mesh is not None and shows_mesh:
-        is_bound = show == "binding"
-        points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
+        points = figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.pose)
         if actor.hidden_parts:
             points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
         parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))
 
 
+def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
+    """Return the posed vertices (V, 3) without normals, which would double the work."""
+    from viewer.rig.skinning import deform, deform_frames
+
+    if pose is None or not figure.is_attached:
+        return deform(figure, pose)[0]
+    return deform_frames(figure, [pose])[0]
+
+
 def scene_unit(scene: Scene) -> str:
     """Return the unit of length of the scene: that of its first figure with a known unit.
 
-    A scale that converts the figure's unit into another, as of a placement, is considered; any
-    other scale of a pose is taken as the user's own.
+    A scale that converts the figure's unit into another one, such as that of a placement, is taken
+    into account; any other scale of a pose is assumed to be the user's choice.
 
     Parameters
     ----------
@@ -349,7 +356,7 @@ def scene_unit(scene: Scene) -> str:
 
 
 def _unit_of(metres: float) -> str:
-    """Return the unit of this length; empty if there is none."""
+    """Return the unit that has this length; empty if there is none."""
     from viewer.rig.units import METRES
 
     known = (unit for unit, size in METRES.items() if math.isclose(size, metres, rel_tol=1e-6))

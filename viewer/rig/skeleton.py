@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
@@ -39,7 +39,7 @@ DOF_KINDS = ("tx", "ty", "tz", "x", "y", "z")
 """Kinds of DOF by code: translations along x, y, z, then rotations about x, y, z."""
 
 FIRST_ROTATION = 3
-"""Kinds below this translate, the others rotate."""
+"""Kinds less than this are translations, all others rotations."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -58,19 +58,19 @@ class Skeleton:
         Joint of each DOF, and its index into ``DOF_KINDS``. The first rotation row of a joint
         is applied first.
     rest_dofs : (D,)
-        Values of the file's own pose: lengths or radians, within the limits.
+        Values of the pose stored in the file: lengths or radians, within the limits.
     dof_limits : (D, 2)
         Smallest and largest value; -inf and inf if unlimited.
     boxes : (J, 2, 3) or None
         Lowest and highest corner of the box drawn for each joint, in joint space.
     auxiliary : (J,) bool or None
-        Joints that the file does not have: a reader added them to express a transform or a second
-        binding exactly. They have no DOFs, and ``shown_joints`` leaves them out: lists, pictures
-        and messages show the nearest ancestor in their place. None if there are none.
+        Joints that are not in the file: a reader added them to represent a transform or a second
+        binding exactly. They have no DOFs, and ``shown_joints`` omits them: lists, pictures and
+        messages show the nearest ancestor in their place. None if there are none.
     humanoid : Humanoid or None
         Joints with the standard names of human bones, if the file states them.
     constraints : tuple of Constraint
-        Joints that follow others, in the order of evaluation; at most one per joint.
+        Constraints of joints that follow others, in the order of evaluation; at most one per joint.
     springs : Springs or None
         Joints that are simulated as springs while a motion plays.
     posing : JointPosing or None
@@ -264,7 +264,7 @@ def shown_joint_of(skeleton: Skeleton) -> Ints:
     shown: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
     if skeleton.auxiliary is not None:
         for joint in np.flatnonzero(skeleton.auxiliary).tolist():
-            # Parents come first, so theirs is already final.
+            # Parents come first, so their entries are already final.
             shown[joint] = shown[skeleton.parents[joint]]
     return shown
 
@@ -343,7 +343,7 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     Raises
     ------
     RigError
-        If there is no such DOF, or several joints have that name.
+        If there is no such joint, or several joints have that name.
     """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.skeleton import Skeleton, shown_joint_of, shown_joints
@@ -29,7 +30,7 @@ __all__ = [
     "weight_sums",
 ]
 
-_NO_SUM = 1e-12  # smaller sums of weights cannot be scaled to 1
+_NO_SUM = 1e-12  # sums of weights smaller than this cannot be scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -43,7 +44,7 @@ class Skin:
     Attributes
     ----------
     starts : (V + 1,) int32
-        Vertex v has the influences from ``starts[v]`` up to, not including, ``starts[v + 1]``.
+        Vertex v has the influences from ``starts[v]`` up to, but not including, ``starts[v + 1]``.
     joints : (N,) int32
         Joint of each influence; if a vertex lists a joint twice, the weights are summed.
     weights : (N,)
@@ -155,7 +156,7 @@ def has_influence(skin: Skin) -> Bools:
 def idle_joints(skin: Skin, skeleton: Skeleton | None = None) -> Ints:
     """Return the joints without influence, in ascending order: (N,) int32.
 
-    Influences of auxiliary joints of the skeleton count as those of the joints shown for them.
+    Influences of auxiliary joints of the skeleton are assigned to the joints shown in their place.
     """
     used, shown = skin.joints[skin.weights != 0.0], np.arange(skin.n_joints, dtype=np.int32)
     if skeleton is not None and skeleton.n_joints == skin.n_joints:
@@ -173,7 +174,7 @@ def skin_from_entries(
     n_vertices : int
         V.
     vertices, joints : (N,)
-        Row and column of each weight; the order within a vertex is kept.
+        Row and column of each weight; the order within a vertex is preserved.
     weights : (N,)
         As stored.
     inverse_bind : (J, 4, 4)
@@ -266,14 +267,14 @@ def limit_influences(skin: Skin, count: int) -> Skin:
 
 
 def normalized(skin: Skin) -> Skin:
-    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are kept."""
+    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are unchanged."""
     sums = weight_sums(skin)
     factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
     return replace(skin, weights=skin.weights * factors[owners(skin)])
 
 
 def merged(skin: Skin) -> Skin:
-    """Return the skin with duplicate influences of a joint on a vertex summed into one."""
+    """Return the skin with duplicate influences of a joint on a vertex merged."""
     keys = owners(skin).astype(np.int64) * skin.n_joints + skin.joints
     unique, inverse = np.unique(keys, return_inverse=True)
     if len(unique) == len(keys):

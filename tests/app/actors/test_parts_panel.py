@@ -1,4 +1,4 @@
-"""Parts of a mesh in the window: hidden in their panel and by a right click, and undone."""
+"""Mesh parts in the window, hidden in their panel or by a right click, and shown again by undo."""
 
 from dataclasses import replace
 
@@ -13,7 +13,7 @@ from viewer.rig.scene import Actor, Scene
 
 @pytest.fixture
 def parts(drive, rig):
-    """A test driver on the tiny column: its lid, its foot, and its walls."""
+    """A test driver on the tiny column, which has three parts: lid, foot and walls."""
     figure = viewer.load(*rig).actors[0].figure
     listed = np.array([0, 0, 1, 1, *[2] * 16])
     mesh = replace(figure.mesh, parts=("lid", "", "walls"), triangle_parts=listed)
@@ -50,5 +50,5 @@ def test_right_click_hides_the_part_under_the_pointer(parts):
     assert not parts.state.actor.hidden_parts
 
 
-def test_panel_needs_several_parts(hand):
-    assert no_panel(hand.state, "parts") == "this figure has one part only"
+def test_panel_requires_several_parts(hand):
+    assert no_panel(hand.state, "parts") == "this figure has only one part"

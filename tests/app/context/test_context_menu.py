@@ -39,7 +39,7 @@ def test_menu_of_a_joint_resets_it_as_one_step(bones):
     assert bones.dof("arm.x") == 0.4
 
 
-def test_menu_of_a_skin_explains_its_vertex_and_selects_its_joint(hand):
+def test_menu_of_the_skin_explains_its_vertex_and_selects_its_joint(hand):
     right_click(hand, joint(hand, 0))
     spot = hand.state.of(ContextMenu).spot
     assert spot.vertex >= 0 and spot.joint >= 0
@@ -50,7 +50,7 @@ def test_menu_of_a_skin_explains_its_vertex_and_selects_its_joint(hand):
     assert hand.state.of(Weights).pinned.vertex == spot.vertex
 
 
-def test_hidden_actor_comes_back_from_the_menu_of_the_background(hand):
+def test_hidden_actor_is_shown_again_by_the_menu_of_the_background(hand):
     right_click(hand, joint(hand, 0))
     hand.click("Hide actor")
     assert not hand.state.actor.visible
@@ -63,7 +63,7 @@ def test_hidden_actor_comes_back_from_the_menu_of_the_background(hand):
     assert not hand.state.actor.visible
 
 
-def test_right_drag_pans_and_opens_nothing(hand):
+def test_right_drag_pans_and_opens_no_menu(hand):
     x, y = hand.middle
     before = hand.state.camera.target.copy()
     hand.pull((x, y), (x + 40.0, y), button=1)
@@ -72,7 +72,7 @@ def test_right_drag_pans_and_opens_nothing(hand):
     assert "Find an action…" not in hand.state.item_rects
 
 
-def test_escape_closes_the_menu_alone(bones):
+def test_escape_closes_only_the_menu(bones):
     bones.state.selected_joint = 0
     right_click(bones, joint(bones, 1))
     bones.key("escape")

@@ -38,13 +38,14 @@ def clock(clip, **settings):
     return playback
 
 
-def test_shows_the_start_of_all_clips_and_ends_with_the_longest():
+def test_clock_starts_with_all_clips_and_ends_with_the_longest():
     late = actor(captured())
     late.offset = 10.0
     playback = Clock()
     playback.show(Scene([actor(keyed()), late]))
     assert playback.time == 1.0
-    assert playback.whole == (1.0, 12.0)  # nine frames at 4 a second last 2 s, from second 10 on
+    # Nine frames at 4 frames per second last 2 s, starting at 10 s.
+    assert playback.whole == (1.0, 12.0)
     assert (playback.frame_rate, playback.first_frame) == (4.0, 100)
     assert not playback.playing
 
@@ -75,7 +76,7 @@ def test_clock_starts_at_the_time_of_the_scene():
         ("run on", -4.0, 1.0, -3.0, True),
     ],
 )
-def test_time_advances_by_playback_mode(mode, speed, seconds, shown, playing):
+def test_time_advances_according_to_the_playback_mode(mode, speed, seconds, shown, playing):
     playback = clock(keyed(), mode=mode, speed=speed)
     for _ in range(10):
         playback.advance(seconds / 10)
@@ -83,7 +84,7 @@ def test_time_advances_by_playback_mode(mode, speed, seconds, shown, playing):
     assert playback.playing is playing
 
 
-def test_slow_frames_drop_no_time():
+def test_slow_frames_lose_no_time():
     fine, coarse = clock(keyed()), clock(keyed())
     for _ in range(370):
         fine.advance(0.01)
@@ -115,7 +116,7 @@ def test_steps_snap_to_whole_frames_and_stop_at_the_ends():
     assert playback.time == 2.0
 
 
-def test_range_stays_within_the_clips_and_ordered():
+def test_range_is_ordered_and_within_the_clips():
     playback = clock(keyed())
     playback.set_range(9.0, 2.0)
     assert (playback.start, playback.end) == (2.0, 5.0)
@@ -143,7 +144,7 @@ def test_single_frame_neither_advances_nor_divides_by_zero():
         assert playback.time == 0.0
 
 
-def test_whole_range_grows_with_captures_but_a_chosen_one_stays():
+def test_full_range_grows_with_captures_and_a_chosen_range_stays():
     scene = Scene([actor(captured(frames=5))])
     playback = Clock()
     playback.show(scene)
@@ -164,7 +165,7 @@ def test_scene_without_motion_does_not_play():
     assert playback.time == 0.0
 
 
-def test_every_frame_of_the_active_actor_can_be_reached():
+def test_steps_reach_every_frame_of_the_active_actor():
     one, other = actor(captured(4, 30.0, 0)), actor(captured(5, 50.0, 0))
     other.offset = 0.005
     scene = Scene([one, other])
@@ -182,7 +183,7 @@ def test_every_frame_of_the_active_actor_can_be_reached():
         times.append(playback.time)
     assert times == pytest.approx([0.005, 0.025, 0.045])
     assert playback.frame == 2
-    # From 0 to 0.1 s: frames 0 to 4 of that actor lie within.
+    # Frames 0 to 4 of that actor are between 0 and 0.1 s.
     assert playback.whole == pytest.approx((0.0, 0.1)) and playback.frame_range == (0, 4)
     playback.follow(one)
     assert playback.frame_range == (0, 3) and playback.frame == 1

@@ -1,4 +1,4 @@
-"""The message log (kept, counted, bounded), its window, and message positions in the view."""
+"""The bounded message log with repetition counts, its window, and message positions in the view."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_log_counts_repeated_messages_and_moves_them_to_the_end():
     assert texts_of(log) == [("b", 1), ("c", 1), ("a", 3)]
 
 
-def test_log_keeps_the_latest_thousand():
+def test_log_keeps_the_latest_thousand_messages():
     log = MessageLog()
     for number in range(1003):
         log.add(f"message {number}")
@@ -51,7 +51,7 @@ def test_log_separates_key_feedback_from_messages():
         (Message("bad file", "error", 2), "error: bad file (2 times)"),
     ],
 )
-def test_message_line(message, line):
+def test_message_line_shows_its_text_and_count(message, line):
     assert message_line(message) == line
 
 
@@ -83,7 +83,7 @@ def test_repeated_note_is_shown_once(hand):
     assert texts_of(hand.state.messages.log)[-1] == ("the driver has no such thing", 5)
 
 
-def test_errors_are_kept_once_while_they_are_shown(hand):
+def test_error_is_counted_once_while_it_is_shown(hand):
     for _ in range(2):
         hand.state.error = "tube.skin:41: expected 3 numbers, found 2"
         hand.step(5)
@@ -93,7 +93,7 @@ def test_errors_are_kept_once_while_they_are_shown(hand):
     assert [(m.text, m.count) for m in errors] == [("tube.skin:41: expected 3 numbers, found 2", 2)]
 
 
-def test_key_and_menu_open_the_window_and_escape_closes_it(hand, texts):
+def test_key_and_menu_open_the_message_window_and_escape_closes_it(hand, texts):
     hand.state.say("three joints were left out")
     hand.key("m", "ctrl")
     hand.step(2)
@@ -108,13 +108,13 @@ def test_key_and_menu_open_the_window_and_escape_closes_it(hand, texts):
     assert hand.state.messages.is_open
 
 
-def test_empty_message_window_says_so(hand, texts):
+def test_empty_message_window_reports_no_messages(hand, texts):
     hand.key("m", "ctrl")
     hand.step(2)
     assert "no messages yet" in texts
 
 
-def test_copy_puts_every_listed_message_on_the_clipboard(hand):
+def test_copy_puts_all_listed_messages_on_the_clipboard(hand):
     hand.state.say("no normals", "no texture", "no normals")
     hand.state.say_status("Wireframe on")
     hand.key("m", "ctrl")
@@ -133,14 +133,14 @@ def test_keys_act_while_the_window_is_open(hand):
     assert hand.state.options.wireframe
 
 
-# In the view
+# Messages in the view
 
 
 @pytest.mark.parametrize(
     ("heights", "room", "count"),
     [
         ([10, 10, 10], 30, 3),
-        ([10, 10, 10], 29, 1),  # one message, and the line that counts the other two
+        ([10, 10, 10], 29, 1),  # one message and the line with the count of the other two
         ([10, 10, 10], 19, 0),
         ([10] * 20, 1000, 8),
         ([10] * 8, 1000, 8),
@@ -149,7 +149,7 @@ def test_keys_act_while_the_window_is_open(hand):
         ([], 100, 0),
     ],
 )
-def test_newest_messages_that_fit(heights, room, count):
+def test_newest_messages_are_shown_if_they_fit(heights, room, count):
     assert n_newest(heights, 10, room) == count
 
 
@@ -210,13 +210,13 @@ def test_messages_that_do_not_fit_are_only_counted(drive, rig, texts):
     assert "3 messages (Window > Messages)" in texts
 
 
-def test_interface_image_shows_warnings_however_long_rendering_takes(drive, rig, monkeypatch):
+def test_interface_image_shows_warnings_even_if_rendering_is_slow(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
     values = {"n": 3, "vertex": 0}
     scene.diagnostics = (Diagnostic("M007.computed", Path("tiny.skin"), values=values),)
     hand = drive(scene=scene, samples=1)
     for note in hand.state.messages.notes:
-        note.until = 1e11  # as if shown just before the next line
+        note.until = 1e11  # as if the message appeared just before the next line
     plain = hand.app.picture()
     monkeypatch.setattr("viewer.app.core.messages.time.monotonic", lambda: 1e12)
     late = hand.app.picture()

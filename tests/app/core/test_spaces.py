@@ -56,7 +56,7 @@ def scene(contents):
     return assembly.assemble(*contents)
 
 
-def test_the_scene_offers_its_other_space(scene):
+def test_scene_offers_both_spaces(scene):
     assert scene.space == "world"
     other = scene.in_space("camera")
     assert other.space == "camera" and other.in_space is not None
@@ -65,21 +65,21 @@ def test_the_scene_offers_its_other_space(scene):
     assert_allclose(other.views[0].translation, [0, 0, 4])
 
 
-def test_captures_that_are_being_read_end_with_the_switch(contents):
+def test_switching_the_space_stops_reading_of_captures(contents):
     scene, builders = assembly.begin(*contents)
     assert not builders[0].is_done
     scene.in_space("camera")
     assert builders[0].is_cut
 
 
-def test_the_other_space_is_cleaned_up_too(scene):
+def test_clean_up_applies_to_the_other_space_too(scene):
     clean_up(scene, CleanUp(frames=(1, 5)))
     other = scene.in_space("camera")
     assert other.actors[0].clip.timing.n_frames == 4
     assert "X006.trimmed" in [note.key for note in other.diagnostics]
 
 
-def test_the_panel_switches_and_keeps_time_selection_look_and_camera(drive, scene):
+def test_panel_switches_the_space_and_keeps_time_selection_colour_and_camera(drive, scene):
     driver = drive(scene=scene, size=(1000, 900), pixels_per_point=1.0)
     state = driver.state
     driver.show_panel("Actors")
@@ -100,7 +100,7 @@ def test_the_panel_switches_and_keeps_time_selection_look_and_camera(drive, scen
     assert state.scene.space == "world" and state.actor.person == 7
 
 
-def test_files_that_cannot_be_read_again_leave_the_scene(drive, scene):
+def test_scene_stays_if_its_files_cannot_be_read_again(drive, scene):
     driver = drive(scene=scene)
 
     def fail(space: str):

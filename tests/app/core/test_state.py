@@ -15,14 +15,14 @@ class Notebook:
     pages: list[str] = field(default_factory=list)
 
 
-def test_a_feature_s_state_is_made_once_and_kept():
+def test_state_of_a_feature_is_created_once():
     state = make_state(viewer.load())
     state.of(Notebook).pages.append("one")
     assert state.of(Notebook).pages == ["one"]
     assert make_state(viewer.load()).of(Notebook).pages == []
 
 
-def test_a_feature_s_state_can_be_replaced():
+def test_state_of_a_feature_can_be_replaced():
     state = make_state(viewer.load())
     first, other = state.of(Notebook), Notebook(["two"])
     assert state.put(other) is other and state.of(Notebook) is other is not first

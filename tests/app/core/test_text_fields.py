@@ -1,4 +1,4 @@
-"""Typing into fields: focus, Tab, Escape, calculations, and mistakes."""
+"""Typing into fields: focus, Tab, Escape, calculations, and invalid input."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.app.files.state import Files
 
 
 def _typed(hand):
-    """Return the text of the active field, and the part that is selected."""
+    """Return the text of the active field and its selected part."""
     editing = imgui.internal.get_input_text_state(imgui.internal.get_active_id())
     if editing is None:
         return None
@@ -20,7 +20,7 @@ def _typed(hand):
     return editing.get_text(), editing.get_text()[slice(*ends)]
 
 
-def test_tab_goes_to_the_next_field_and_selects_its_content(hand):
+def test_tab_moves_to_the_next_field_and_selects_its_content(hand):
     hand.click("Filter")
     hand.key("tab")
     hand.step(2)
@@ -47,20 +47,20 @@ def test_tab_goes_to_the_next_field_and_selects_its_content(hand):
         ("arm.x", "-30 \N{DEGREE SIGN}", -math.pi / 6),
     ],
 )
-def test_calculation_with_a_unit_is_entered(hand, label, text, value):
+def test_calculation_with_a_unit_is_evaluated(hand, label, text, value):
     hand.enter_value(label, text)
     assert hand.dof(label) == pytest.approx(value, rel=1e-12)
     assert hand.undo_steps == 1
 
 
 @pytest.mark.parametrize("text", ["abc", "1.5 m", "1/0", "90//2", "2**3", "__import__('os')"])
-def test_mistake_is_named_and_leaves_the_value(hand, text):
+def test_invalid_input_is_quoted_and_keeps_the_value(hand, text):
     before = hand.dofs()
     hand.enter_value("root.tx", text)
     assert (hand.dofs() == before).all() and hand.says(f'found "{text}"')
 
 
-def test_units_of_a_field_convert_into_each_other():
+def test_units_are_converted_to_that_of_the_field():
     assert read_number("250 ms", "s") == 0.25
     assert read_number("1.5 m", "cm") == 150.0
     assert read_number("50 %", "%") == 50.0
@@ -90,7 +90,7 @@ def test_escape_in_a_dialog_restores_the_path_first(hand):
     assert hand.state.of(Files).dialog is None
 
 
-def test_keys_of_a_field_move_neither_time_nor_camera(curves):
+def test_keys_typed_into_a_field_change_neither_time_nor_camera(curves):
     hand = curves
     camera = (hand.state.camera.azimuth, hand.state.camera.distance)
     hand.show_panel("Timeline")
@@ -106,7 +106,7 @@ def test_keys_of_a_field_move_neither_time_nor_camera(curves):
     assert hand.state.clock.frame == 3
 
 
-def test_name_of_a_new_file_is_selected_without_its_suffix(hand, rig):
+def test_name_for_a_new_file_is_selected_without_its_suffix(hand, rig):
     hand.menu("menu File", "Export…")
     hand.step(2)
     assert _typed(hand) == ("tiny.obj", "tiny")
@@ -114,7 +114,7 @@ def test_name_of_a_new_file_is_selected_without_its_suffix(hand, rig):
     hand.key("enter")
     hand.step(3)
     assert hand.state.of(Files).dialog is None and (rig[0].parent / "other.obj").is_file()
-    # A suffix that is typed before the selected one's is not written twice.
+    # A suffix typed in front of the unselected suffix is not duplicated.
     hand.menu("menu File", "Export…")
     hand.step(2)
     hand.type("third.obj")
@@ -130,7 +130,7 @@ def test_name_of_a_new_file_is_selected_without_its_suffix(hand, rig):
     assert "other.obj exists" in hand.state.of(Files).dialog.problem
 
 
-def test_files_are_chosen_and_opened_by_keys(hand, rig):
+def test_files_are_chosen_and_opened_with_the_keyboard(hand, rig):
     (rig[0].parent / "inner").mkdir()
     hand.key("o", "ctrl")
     hand.step(4)

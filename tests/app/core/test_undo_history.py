@@ -30,7 +30,7 @@ def watched():
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_an_edited_array_element_is_a_step(watched, name):
+def test_edited_array_element_is_an_undo_step(watched, name):
     history, scene, options = watched
     array = getattr(scene.actors[0].pose, name)
     old = array.copy()
@@ -49,7 +49,7 @@ def test_an_edited_array_element_is_a_step(watched, name):
     ("name", "value"),
     [("offset", 0.5), ("visible", False), ("color", (1.0, 0.0, 0.0)), ("clip", None)],
 )
-def test_an_edited_setting_of_an_actor_is_a_step(watched, name, value):
+def test_edited_setting_of_an_actor_is_an_undo_step(watched, name, value):
     history, scene, options = watched
     scene.actors[0].clip = Clip("c", (), 0.0, 1.0) if name == "clip" else None
     history.start(scene, options)
@@ -57,7 +57,7 @@ def test_an_edited_setting_of_an_actor_is_a_step(watched, name, value):
     assert history.observe(scene, options, busy=False)
 
 
-def test_an_edited_placement_is_a_step(watched):
+def test_edited_placement_is_an_undo_step(watched):
     history, scene, options = watched
     scene.actors[0].placement[0, 3] = np.nextafter(0.0, 1.0)
     assert history.observe(scene, options, busy=False)

@@ -73,7 +73,7 @@ def test_display_change_is_not_an_undo_step(hand):
     assert not state.options.wireframe and state.actor.visible
 
 
-def test_people_still_loading_join_every_undo_step(drive, rig):
+def test_people_that_appear_while_loading_are_added_to_every_undo_step(drive, rig):
     hand = drive(scene=people(rig, [True] * 5), samples=1)
     state = hand.state
     state.scene.actors.append(Actor(state.actor.figure))

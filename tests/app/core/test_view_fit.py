@@ -1,4 +1,4 @@
-"""The camera fits the free view until the user moves it; the ground follows shapes."""
+"""Camera fit to the unobstructed part of the view, and the ground under changing shapes."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ from viewer.rendering.recorder import Recording
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import scene_points
 
-streaming = test_timeline.streaming  # the fixture
+streaming = test_timeline.streaming  # the fixture of the timeline tests
 
-ROOM = 1.08  # around a fitted figure
+ROOM = 1.08  # margin around a fitted figure
 
 
 def reach(hand, points=None):
-    """Return the extent of points relative to the view, across and up: 1 is at an edge."""
+    """Return the horizontal and vertical extent of points relative to the view; 1 is an edge."""
     points = scene_points(hand.state.scene) if points is None else points
     x, y, width, height = hand.state.view_rect
     seen = view_frame(hand.state).project(points) - (x + width / 2, y + height / 2)
@@ -48,7 +48,7 @@ def resize(hand, width, height):
 
 @pytest.fixture
 def wide(drive, tmp_path):
-    """A test driver on a bar ten times as wide as high, just opened in a window."""
+    """A test driver on a newly opened bar that is ten times as wide as high."""
     hand = drive(bar(tmp_path / "bar.obj"), size=(1200, 700), samples=1)
     hand.state.framing.restart()
     hand.step(2)
@@ -59,7 +59,7 @@ def test_first_view_fits_between_the_panels(wide):
     assert is_fitted(wide)
 
 
-def test_fit_keeps_up_with_window_and_panels(wide):
+def test_fit_follows_changes_of_window_and_panels(wide):
     distance = wide.state.camera.distance
     resize(wide, 900, 700)
     assert is_fitted(wide) and wide.state.camera.distance > distance
@@ -125,7 +125,7 @@ def test_following_ends_the_fit(wide):
 @pytest.mark.parametrize(
     ("key", "azimuth", "inclination"), [("_1", 0, 0), ("_3", 90, 0), ("_7", 0, 90)]
 )
-def test_keys_of_views_fit_again(wide, key, azimuth, inclination):
+def test_keys_of_named_views_restore_the_fit(wide, key, azimuth, inclination):
     wide.wheel(8, wide.middle)
     wide.key(key)
     wide.step(2)
@@ -135,7 +135,7 @@ def test_keys_of_views_fit_again(wide, key, azimuth, inclination):
 
 
 @pytest.mark.parametrize("name", ["Front", "Back", "Right", "Left", "Top", "Bottom"])
-def test_buttons_of_views_fit_again(wide, name):
+def test_buttons_of_named_views_restore_the_fit(wide, name):
     wide.wheel(-5, wide.middle)
     wide.click(name)
     wide.step(2)
@@ -154,7 +154,7 @@ def test_second_file_is_fitted_and_seen_from_its_front(wide, tmp_path):
     assert is_fitted(wide)
 
 
-def test_named_views_count_from_the_front_and_the_panel_overrides_it(drive, tmp_path):
+def test_named_views_are_relative_to_the_front_and_the_panel_overrides_it(drive, tmp_path):
     hand = drive(sided_skel(tmp_path / "turned.skel", "-z"), size=(1200, 900), samples=1)
     hand.state.set_front("auto")
     hand.key("_1")
@@ -194,7 +194,7 @@ def test_whole_motion_is_framed_as_in_a_recording(drive, rig):
     assert hand.state.camera.distance == camera.distance
 
 
-def test_fit_keeps_up_with_a_loading_capture(streaming):
+def test_fit_follows_a_capture_while_it_loads(streaming):
     streaming.start(capture(100, 5, 3))
     finish(streaming)
     streaming.step(40)
@@ -230,7 +230,7 @@ def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
     if edit == "offset and key":
         hand.state.actor.offset = 0.5
         hand.step(3)
-    place_key(hand.state, (0, 1), value=20.0)  # root x, at its end
+    place_key(hand.state, (0, 1), value=20.0)  # root x at the last key
     hand.step(3)
     assert hand.state.camera.distance == before  # the edit must be visible
     if edit == "undo":
@@ -246,11 +246,11 @@ def test_views_fit_the_edited_motion(drive, rig, tmp_path, edit):
         assert reach(hand, scene_points(viewer.Scene([actor]))).max() < 1.0
 
 
-def test_toolbar_does_not_cover_the_fitted_view(drive, tmp_path):
+def test_toolbar_does_not_cover_the_fitted_figure(drive, tmp_path):
     hand = drive(sided_skel(tmp_path / "tall.skel", "+z", 3.0), size=(1200, 700), samples=1)
     points = scene_points(hand.state.scene)
     fit(hand.state.camera, points, hand.state.aspect)
-    assert _is_covered(hand, points)  # as it would be fitted to the whole view
+    assert _is_covered(hand, points)  # the fit if the whole view were free
     hand.state.framing.restart()
     hand.step(3)
     assert not _is_covered(hand, points)
@@ -300,8 +300,8 @@ def test_view_is_redrawn_when_the_ground_moves(box):
     assert (box.scene_picture() != before).any()
 
 
-def test_ground_of_a_moving_figure_follows_its_shape(box):
-    """The lowest frame is evaluated first, the others after it."""
+def test_ground_of_a_moving_figure_follows_shape_edits(box):
+    """The lowest frame is evaluated first, the remaining frames later."""
     actor = box.state.actor
     count = actor.figure.skeleton.n_joints
     actor.clip = walk([True] * 20, count)

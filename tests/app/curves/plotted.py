@@ -19,7 +19,7 @@ def _channel(mode, keys):
 
 
 def clip_text():
-    """Root x slides, the arm waves about x; everything else has one key."""
+    """A clip in which root x slides and the arm waves about x; all other channels have one key."""
     still = [_channel("constant", [(0, value, "flat")]) for value in (0, 0, 0, 0.6, 0.3)]
     slide = _channel("linear", [(0, 0, "linear"), (2, 1, "linear")])
     wave = _channel("cycle", [(0, 0.2, "smooth"), (1, 0.6, "smooth"), (2, -0.2, "smooth")])
@@ -60,7 +60,7 @@ def _at(hand, time, degrees):
 
 
 def _pick(hand, label, number):
-    """Choose an entry of a drop-down list, which opens above its widget if there is no room."""
+    """Choose an entry of a drop-down list, which opens upwards if there is no room below."""
     hand.click(label)
     hand.step(2)
     popup = imgui.internal.find_window_by_name("##Combo_00")

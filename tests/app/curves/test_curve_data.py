@@ -45,7 +45,7 @@ def test_sampled_animation_has_curves_for_position_and_three_angles_per_joint():
     assert labels == ["figure.x", "figure.y", "figure.z", *joints]
 
 
-def test_captured_points_have_coordinate_curves_and_still_figures_none():
+def test_captured_points_have_coordinate_curves_and_static_figures_have_none():
     layout = PointLayout("one", ("nose",), np.zeros((0, 2)), np.zeros(1))
     clip = PointClip("p", Timing(10.0, np.arange(1)), np.ones((1, 1, 4)))
     labels = [c.label for c in curves_of(Actor(Figure("p", points=layout), clip=clip))]
@@ -69,7 +69,7 @@ def test_curves_pass_through_frames_and_angles_are_unwrapped():
     assert_allclose(times, 5.0 + np.arange(15) / 10, atol=1e-12)
     assert_allclose(values, angles, atol=1e-12)
     assert_array_equal(sampled_points(clip, 7, 0, 99)[1], values)
-    # Full rotations about z, which is not the middle axis, do not jump back.
+    # Full rotations about z, which is not the middle axis, do not wrap around.
     turns = np.zeros((40, 1, 4))
     turns[:, 0, 2], turns[:, 0, 3] = np.sin(np.arange(40) / 4), np.cos(np.arange(40) / 4)
     long = SampledClip("z", Timing(10.0, np.arange(40)), turns)
@@ -115,7 +115,7 @@ def test_long_motions_are_decimated_only_as_needed(low, high):
     assert_allclose(values, angles[frames], atol=1e-12)
     # The visible range is covered from end to end.
     assert times[0] <= low and (times[-1] >= high or frames[-1] >= count - 1 - np.diff(frames)[0])
-    # ... with every frame if they are few.
+    # If there are few frames, each is plotted.
     if (high - low) * rate < 900:
         assert (np.diff(frames) == 1).all()
 

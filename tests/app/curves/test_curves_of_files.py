@@ -19,10 +19,10 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
-# Whole poses, and files
+# Keys of whole poses, and files
 
 
-def test_key_pose_and_key_changes(curves):
+def test_key_pose_and_key_changes_add_the_expected_keys(curves):
     curves.state.clock.seek(0.5)
     curves.step(2)
     curves.state.actor.pose.dofs[curves.dof_index("arm.y")] = 0.75
@@ -37,7 +37,7 @@ def test_key_pose_and_key_changes(curves):
     assert curves.dof("arm.y") == 0.75
 
 
-def test_new_clip_gives_a_still_figure_keys(drive, rig):
+def test_new_clip_adds_keys_to_a_static_figure(drive, rig):
     hand = drive(*rig, size=SIZE, samples=1)
     assert "curves" not in hand.state.item_rects and hand.state.actor.clip is None
     before = hand.dofs()
@@ -183,7 +183,7 @@ def test_extreme_times_and_values_are_harmless(curves):
 
 
 @pytest.mark.golden("app_curves")
-def test_panel_matches_golden_image(curves):
+def test_curves_panel_matches_golden_image(curves):
     curves.click("curves of arm")
     curves.state.clock.seek(0.5)
     curves.step(3)
@@ -198,7 +198,7 @@ def test_panel_matches_golden_image(curves):
     _compare(curves.screen()[round(top) :], "curves")
 
 
-def test_window_appears_only_with_a_motion(drive, rig):
+def test_curves_window_appears_only_with_a_motion(drive, rig):
     hand = drive(*rig, size=SIZE, samples=1)
     window = imgui.internal.find_window_by_name("Curves")
     assert window is None or not window.active

@@ -21,7 +21,7 @@ def _chosen(hand):
     return sorted(hand.state.of(Curves).keys)
 
 
-# What is shown
+# Shown curves
 
 
 def test_rounding_of_a_constant_curve_is_not_magnified():
@@ -29,7 +29,7 @@ def test_rounding_of_a_constant_curve_is_not_magnified():
     for values, least in ((30.0 + noise, 0.1), (1e5 + 5e3 * noise, 1e-3), (noise, 1e-3)):
         bottom, top = value_limits(values, least)
         assert np.ptp(values) < 0.05 * (top - bottom) and bottom < values.min() < top
-    # A small motion is shown, between a third of the height and all but the margins.
+    # A small motion is shown in a range of at least 0.1, half of which is 0.05.
     bottom, top = value_limits(np.array([2.0, 2.05]), 0.1)
     assert 0.05 / (top - bottom) == pytest.approx(0.5)
 
@@ -78,7 +78,7 @@ def test_filter_lists_only_matching_names(curves):
     assert not [label for label in curves.state.item_rects if label.startswith("curve ")]
 
 
-def test_all_keys_of_the_shown_curves_are_drawn_where_they_are(curves):
+def test_all_keys_of_the_shown_curves_are_drawn_at_their_positions(curves):
     shown = [label for label in curves.state.item_rects if label.startswith("key ")]
     assert sorted(shown) == ["key arm.x 0", "key arm.x 1", "key arm.x 2"]
     x, y = _center(curves, "key arm.x 2")
@@ -87,7 +87,7 @@ def test_all_keys_of_the_shown_curves_are_drawn_where_they_are(curves):
     assert x0 < x < x1 and y0 < y < y1
 
 
-def test_wheel_zooms_drag_pans_and_fit_shows_everything(curves):
+def test_wheel_zooms_and_drag_pans_and_fit_shows_everything(curves):
     before = _scale(curves)[0]
     x, y = _center(curves, "key arm.x 1")
     for _ in range(6):
@@ -104,7 +104,7 @@ def test_wheel_zooms_drag_pans_and_fit_shows_everything(curves):
     assert _scale(curves)[0] == pytest.approx(before, rel=1e-3)
 
 
-# Keys by mouse
+# Keys edited by mouse
 
 
 def test_dragged_key_follows_the_mouse_as_one_undo_step(curves):
@@ -122,7 +122,7 @@ def test_dragged_key_follows_the_mouse_as_one_undo_step(curves):
     assert _arm(curves).times[1] > 1.0
 
 
-def test_dragged_key_poses_the_figure_at_once(curves):
+def test_dragged_key_poses_the_figure_immediately(curves):
     curves.state.clock.seek(1.0)
     curves.step(2)
     assert curves.dof("arm.x") == pytest.approx(0.6)
@@ -175,7 +175,7 @@ def test_double_click_adds_a_key_on_the_curve(curves):
 def test_insert_adds_a_key_to_the_nearest_curve(curves):
     curves.click("curve arm.z", held="ctrl")
     curves.step(2)
-    # arm.z lies at -0.1 all the time, far below the wave at 1 s.
+    # arm.z is constantly -0.1, far below the wave at 1 s.
     curves.move(_at(curves, 1.2, math.degrees(-0.08)))
     curves.key("insert")
     curves.step()
@@ -285,7 +285,7 @@ def test_shift_rotates_both_tangents(curves):
     assert incoming == outgoing and isinstance(incoming, float)
 
 
-def test_tangent_pulled_to_the_other_side_stays_finite(curves):
+def test_tangent_dragged_past_its_key_stays_finite(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     x, y, key = _knob(curves, 1)
@@ -295,14 +295,14 @@ def test_tangent_pulled_to_the_other_side_stays_finite(curves):
     curves.assert_sane()
 
 
-def test_rules_are_chosen_from_lists(curves):
+def test_tangent_rules_are_chosen_from_lists(curves):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     _pick(curves, "In", 0)
     assert _arm(curves).tangents[1] == ("flat", "smooth")
     _pick(curves, "Out", 1)
     assert _arm(curves).tangents[1] == ("flat", "linear")
-    # A number keeps the slope that the rule gave: -0.8 in a second.
+    # The rule "number" keeps the slope of the previous rule: -0.8 per second.
     _pick(curves, "Out", 3)
     assert _arm(curves).tangents[1] == ("flat", pytest.approx(-0.8))
     assert curves.undo_steps == 3
@@ -325,7 +325,7 @@ def test_values_are_typed_in_the_shown_unit(curves):
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-1e300", "1e999", "", "abc"])
-def test_typed_nonsense_changes_nothing(curves, text):
+def test_invalid_typed_value_changes_nothing(curves, text):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     for label in ("Time", "Value"):
@@ -338,7 +338,7 @@ def test_typed_nonsense_changes_nothing(curves, text):
 # Extrapolation, range and time
 
 
-def test_extrapolation_is_chosen_per_side(curves):
+def test_extrapolation_is_chosen_for_each_end(curves):
     _pick(curves, "Before", 4)
     assert _arm(curves).extrapolation == ("bounce", "cycle")
     _pick(curves, "After", 1)
@@ -355,10 +355,10 @@ def test_range_lines_are_dragged(curves):
     curves.state.clock.seek(1.0)
     curves.step(2)
     x, y = _center(curves, "range start")
-    y += 25  # a key lies on the middle of the line
+    y += 25  # a key covers the middle of the line
     curves.pull((x, y), (_at(curves, 0.25, 0)[0], y))
     assert _clip(curves).start == pytest.approx(0.25, abs=0.02)
-    # Not past the other end.
+    # The line stops at the other end of the range.
     x, y = _center(curves, "range start")
     curves.pull((x, y), (_at(curves, 1.9, 0)[0], y))
     assert _clip(curves).start == _clip(curves).end

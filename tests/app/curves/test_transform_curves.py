@@ -50,7 +50,7 @@ def test_curves_are_named_by_joint_and_property(hand):
     ]  # fmt: skip
 
 
-def test_a_joint_shows_its_angles_first_else_what_has_keys(hand):
+def test_joint_shows_its_angles_if_keyed_and_otherwise_its_keyed_property(hand):
     assert hand.state.of(Curves).rows == rows(hand, "hip.x", "hip.y", "hip.z")
     add_key_at(hand.state, rows(hand, "foot.x"), 1.0)
     delete_chosen(hand.state)
@@ -117,7 +117,7 @@ def test_interpolation_is_chosen_for_the_channel(hand):
     assert channels(hand)[1].interpolation == "step"
 
 
-def test_added_and_deleted_keys(hand):
+def test_added_and_deleted_keys_are_undone(hand):
     (foot,) = rows(hand, "foot.y")
     hand.state.actor.pose.dofs[7] = 0.3
     add_key_at(hand.state, [foot], 1.0)

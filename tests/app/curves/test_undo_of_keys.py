@@ -257,7 +257,7 @@ def test_edits_while_another_actor_plays_are_undo_steps(curves, held, monkeypatc
     assert still.pose.dofs[ARM_X] == 0.4
 
 
-def test_drag_there_and_back_is_not_an_undo_step(curves, monkeypatch):
+def test_drag_back_to_the_start_is_not_an_undo_step(curves, monkeypatch):
     pose = curves.state.actor.pose
     monkeypatch.setattr("viewer.app.frame.is_held", lambda state: True)
     start = pose.dofs[ARM_X]
@@ -279,7 +279,7 @@ def test_undo_twice_before_the_next_frame(curves):
     go(curves, 1.5)
     undo(state)
     undo(state)
-    assert_follows_its_clip(curves, 0.75)  # at once
+    assert_follows_its_clip(curves, 0.75)  # without a frame in between
     curves.step(1)
     assert_follows_its_clip(curves, 0.75)
     assert_allclose(curves.dofs(), before, atol=1e-12)
@@ -310,7 +310,7 @@ def test_following_camera_moves_with_undo(curves):
     assert_allclose(state.camera.target, target, atol=1e-12)
 
 
-def test_following_camera_stays_put_while_a_pose_is_edited(curves):
+def test_following_camera_does_not_move_while_a_pose_is_edited(curves):
     state = curves.state
     start_following(state, 0, 1)
     curves.step(1)

@@ -80,7 +80,7 @@ def test_dropped_texture_needs_texture_coordinates(box, tmp_path):
     assert box.state.actor.figure is figure and _key(box) == before
 
 
-def test_no_dropped_file_is_applied_if_one_does_not_fit(textured, tmp_path):
+def test_no_dropped_file_is_applied_if_one_is_incompatible(textured, tmp_path):
     (tmp_path / "other.json").write_text('{"dofs": {"tail.x": 1}}')
     figure, before = textured.state.actor.figure, _key(textured)
     textured.open(_picture(tmp_path), tmp_path / "other.json")

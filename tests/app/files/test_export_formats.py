@@ -1,4 +1,4 @@
-"""Formats of an export: each with what it keeps and omits; the name follows the choice."""
+"""Export formats: the properties that each keeps or omits, and the suffix of the file name."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_chosen_format_changes_the_suffix_of_the_name(hand):
     assert "format .bvh" not in hand.state.item_rects
 
 
-def test_format_that_cannot_hold_the_motion_says_why(curves):
+def test_format_that_cannot_store_the_motion_states_the_reason(curves):
     state = curves.state
     assert "SMPL" in unsuited_formats(state.actor)[FOLDER]
     assert set(motion_formats(state.actor)) > {FOLDER, ".bvh", ".glb", ".anim"}

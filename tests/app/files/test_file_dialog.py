@@ -11,7 +11,7 @@ from viewer.app.files.state import Files
 
 @pytest.fixture
 def dialog(hand, tmp_path):
-    """A driver on an open dialog: rig, a folder with another rig, a text file, a hidden file."""
+    """A driver on a dialog for a rig, a folder with another rig, a text file and a hidden file."""
     inner = tmp_path / "inner"
     inner.mkdir()
     write_rig(inner, "inside")
@@ -26,7 +26,7 @@ def _listed(hand):
     return [label[5:] for label in hand.state.item_rects if label.startswith("file ")]
 
 
-def test_dialog_lists_folders_first_and_only_what_can_be_opened(dialog):
+def test_dialog_lists_folders_first_and_only_files_that_can_be_opened(dialog):
     assert _listed(dialog) == ["inner", "tiny.skel", "tiny.skin"]
 
 
@@ -62,7 +62,7 @@ def test_dialog_click_replaces_the_selection_and_ctrl_click_deselects(dialog):
     assert not dialog.state.of(Files).dialog.chosen
 
 
-def test_dialog_goes_up(dialog, tmp_path):
+def test_dialog_goes_to_the_parent_folder(dialog, tmp_path):
     dialog.click("Up")
     assert dialog.state.of(Files).dialog.folder == tmp_path.resolve().parent
     assert tmp_path.name in _listed(dialog)
@@ -142,12 +142,12 @@ def test_dialog_keeps_its_folder_if_another_cannot_be_read(tmp_path, monkeypatch
     assert dialog.folder == tmp_path and "Permission denied" in dialog.problem
 
 
-def test_dialog_starts_in_a_folder_that_is_gone(tmp_path):
+def test_dialog_opens_if_its_start_folder_is_missing(tmp_path):
     dialog = FileDialog(tmp_path / "gone")
     assert dialog.problem and dialog.entries == []
 
 
-def test_dialog_shows_strange_names(dialog, tmp_path):
+def test_dialog_shows_unusual_names(dialog, tmp_path):
     for name in ("a\nb.skel", "100% {x}.skel", "##id.skel", "bad\udcff.skel", "a###b.skel"):
         (tmp_path / name).write_text("balljoint a {}")
     dialog.state.of(Files).dialog.enter(tmp_path)
@@ -171,7 +171,7 @@ def test_dialog_shows_strange_names(dialog, tmp_path):
         ("ada", "ada.mp4"),
     ],
 )
-def test_typed_suffix_takes_the_place_of_the_suggested_one(tmp_path, typed, written):
+def test_typed_suffix_replaces_the_suggested_one(tmp_path, typed, written):
     (tmp_path / "old.gif.mp4").touch()
     kinds = (".mp4", ".webm", ".gif")
     dialog = FileDialog(tmp_path, purpose="save", suffixes=kinds, name="fox.webm.mp4")

@@ -11,7 +11,7 @@ from rendering.gpu.gl_objects import gl_objects
 
 
 def kept(hand: Driver) -> tuple[dict[str, int], int]:
-    """Return the numbers of OpenGL objects by kind, and the number of Python objects."""
+    """Return the number of OpenGL objects of each kind, and the number of Python objects."""
     gc.collect()
     return dict(gl_objects()), len(gc.get_objects())
 

@@ -8,7 +8,9 @@ import threading
 import numpy as np
 import pytest
 from app.captured import dots, people, walk
+from export.gltf.two_parts import two_parts
 
+import viewer
 from viewer.app.files import motion_export
 from viewer.app.files.export_formats import FOLDER
 from viewer.app.files.motion_export import (
@@ -20,6 +22,7 @@ from viewer.app.files.motion_export import (
 from viewer.app.files.state import Files
 from viewer.formats import save_bytes
 from viewer.progress import report
+from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.scene import Actor, Scene
 
@@ -35,7 +38,7 @@ def moving(drive, rig):
     return hand
 
 
-def test_every_suffix_offered_is_written(moving, tmp_path):
+def test_every_offered_suffix_can_be_written(moving, tmp_path):
     unsuited = unsuited_formats(moving.state.actor)
     assert [*unsuited] == ["/", ".vrma"]
     for suffix in motion_suffixes():
@@ -54,10 +57,10 @@ def test_only_the_playback_range_is_written(moving, tmp_path):
     save_motion(moving.state, tmp_path / "part.bvh")
     moving.finish_job()
     text = (tmp_path / "part.bvh").read_text()
-    assert "Frames: 10\n" in text  # 6 to 15, at 30 frames per second
+    assert "Frames: 10\n" in text  # frames 6 to 15 at 30 frames per second
 
 
-def test_menu_asks_for_a_path_and_reports_what_was_written(moving, tmp_path):
+def test_menu_asks_for_a_path_and_reports_the_written_file(moving, tmp_path):
     moving.click("menu File")
     moving.click("Export motion…")
     moving.step(2)
@@ -94,7 +97,7 @@ def test_cancelled_export_keeps_the_existing_file(moving, tmp_path, monkeypatch)
     assert [(file.name, file.read_text()) for file in path.parent.iterdir()] == [(path.name, "old")]
 
 
-def test_files_that_are_open_are_never_replaced(moving, tmp_path):
+def test_opened_files_are_never_replaced(moving, tmp_path):
     path = tmp_path / "open.bvh"
     path.write_text("precious")
     moving.state.paths = (*moving.state.paths, path)
@@ -103,7 +106,7 @@ def test_files_that_are_open_are_never_replaced(moving, tmp_path):
     assert path.read_text() == "precious"
 
 
-def test_missing_folder_is_one_message(moving, tmp_path):
+def test_missing_folder_is_reported_in_one_message(moving, tmp_path):
     save_motion(moving.state, tmp_path / "no" / "slide.bvh")
     folder = tmp_path / "no"
     assert moving.state.error == f"{folder / 'slide.bvh'}: the folder {folder} does not exist"
@@ -123,7 +126,7 @@ def test_keys_are_written_at_the_shown_frame_rate(moving, tmp_path):
 
 @pytest.fixture
 def crowd(drive, rig):
-    """A driver on three people of one capture: the third appears only at its end; and points."""
+    """A driver on a capture of points and three people; the third appears only at its end."""
     there = np.ones(21, dtype=bool)
     late = np.arange(21) >= 15
     scene = people(rig, there, there, late)
@@ -136,7 +139,7 @@ def frames_of(path):
     return next(int(line.split()[1]) for line in lines if line.startswith("Frames:"))
 
 
-def test_every_person_gets_a_file_named_as_by_convert(crowd, tmp_path):
+def test_every_person_is_written_to_a_file_named_as_by_convert(crowd, tmp_path):
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
     assert crowd.state.job.title == "Writing walk-0.bvh and 2 more"
     crowd.finish_job()
@@ -150,7 +153,38 @@ def test_every_person_gets_a_file_named_as_by_convert(crowd, tmp_path):
     assert crowd.says("captured points are not exported: face4 0")
 
 
-def test_only_the_chosen_actor_is_written_if_asked_for(crowd, tmp_path):
+def test_glb_contains_everyone_and_figures_without_motion(crowd, tmp_path):
+    crowd.state.scene.actors.append(Actor(crowd.state.scene.actors[0].figure, called="post"))
+    save_motion(crowd.state, tmp_path / "walk.glb", everyone=True)
+    assert crowd.state.job.title == "Writing walk.glb"
+    crowd.finish_job()
+    assert crowd.state.error == ""
+    assert [path.name for path in tmp_path.glob("walk*")] == ["walk.glb"]
+    actors = viewer.load(tmp_path / "walk.glb").actors
+    assert [actor.figure.name for actor in actors] == ["tiny 0", "tiny 1", "tiny 2", "post"]
+    assert [actor.clip is not None for actor in actors] == [True, True, True, False]
+    assert {actor.clip.name for actor in actors[:3]} == {"take"}
+
+
+def test_figures_with_their_own_keys_share_a_glb(drive, tmp_path):
+    figure = two_parts()
+    clip = figure.animations[0].clip()
+    actors = [Actor(figure, clip=clip, animation=0), Actor(figure, clip=clip, animation=0)]
+    actors[1].placement = translation_matrix(np.array([0.0, 0.0, 4.0]))
+    hand = drive(scene=Scene(actors), size=(1000, 700), samples=1)
+    save_motion(hand.state, tmp_path / "both.glb", everyone=True)
+    hand.finish_job()
+    assert hand.state.error == ""
+    found = viewer.load(tmp_path / "both.glb").actors
+    assert [[each.name for each in actor.figure.animations] for actor in found] == [
+        ["wave", "jump"],
+        ["wave", "jump"],
+    ]
+    rotations = next(each for each in found[1].clip.channels if each.path == "rotation")
+    assert rotations.times.tolist() == [0.0, 0.5, 2.0]
+
+
+def test_only_the_chosen_actor_is_written_if_requested(crowd, tmp_path):
     crowd.state.choose_actor(1)
     save_motion(crowd.state, tmp_path / "walk.bvh")
     crowd.finish_job()
@@ -172,7 +206,7 @@ def test_range_without_people_is_reported(drive, rig, tmp_path):
     assert hand.state.error == ("all actors are absent in the playback range: nothing to export")
 
 
-def test_all_files_appear_or_none(crowd, tmp_path):
+def test_either_all_files_are_written_or_none(crowd, tmp_path):
     (tmp_path / "walk-0.bvh").write_text("before")
     (tmp_path / "walk-2.bvh").mkdir()  # cannot be replaced by a file
     save_motion(crowd.state, tmp_path / "walk.bvh", everyone=True)
@@ -191,8 +225,10 @@ def test_open_files_are_never_replaced_when_exporting_everyone(crowd, tmp_path):
     assert path.read_text() == "precious" and crowd.state.job is None
 
 
-def test_file_names_derived_from_one_name(crowd, tmp_path):
-    assert motion_files(crowd.state, tmp_path / "a.gltf", True) == [
+def test_file_names_are_derived_from_one_name(crowd, tmp_path):
+    both = [tmp_path / "a.gltf", tmp_path / "a.bin"]
+    assert motion_files(crowd.state, tmp_path / "a.gltf", True) == both
+    assert motion_files(crowd.state, tmp_path / "a-{person}.gltf", True) == [
         *(tmp_path / f"a-{person}.gltf" for person in range(3)),
         *(tmp_path / f"a-{person}.bin" for person in range(3)),
     ]
@@ -236,7 +272,7 @@ def test_amass_export_writes_a_file_per_person(bodies, tmp_path):
     assert (tmp_path / "take-3.npz").exists()
 
 
-def test_opened_folder_is_never_replaced(bodies, tmp_path):
+def test_opened_folder_is_never_overwritten(bodies, tmp_path):
     (tmp_path / "out" / "smpl").mkdir(parents=True)
     bodies.state.paths = (tmp_path / "out",)
     save_motion(bodies.state, tmp_path / "out", everyone=True)
@@ -245,7 +281,7 @@ def test_opened_folder_is_never_replaced(bodies, tmp_path):
     assert bodies.state.job is None
 
 
-# The dialog
+# The export dialog
 
 
 def _ask(hand, folder):
@@ -256,7 +292,7 @@ def _ask(hand, folder):
     hand.step(2)
 
 
-def test_dialog_exports_all_actors_unless_told_otherwise(crowd, tmp_path):
+def test_dialog_exports_all_actors_by_default(crowd, tmp_path):
     _ask(crowd, tmp_path)
     assert crowd.state.of(Files).dialog.name == "tiny.bvh"
     crowd.click("Save###Save")
@@ -304,7 +340,7 @@ def test_dialog_changes_the_suffix_with_the_format(bodies, tmp_path):
     assert dialog.name == "hand.made.bvh"
 
 
-def test_dialog_for_one_actor_does_not_ask_for_the_actor(moving, tmp_path):
+def test_dialog_for_one_actor_has_no_choice_of_actors(moving, tmp_path):
     _ask(moving, tmp_path)
     assert "Actors##exported" not in moving.state.item_rects
     assert "format .bvh" in moving.state.item_rects

@@ -1,4 +1,4 @@
-"""Opening files in the window: what is kept and replaced, and messages."""
+"""Opening files in the window: replaced and retained state, and messages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _open(hand, *paths):
     hand.wait_for_loader()
 
 
-def test_bad_file_shows_its_message_and_keeps_everything(hand, tmp_path):
+def test_invalid_file_shows_its_message_and_keeps_the_scene(hand, tmp_path):
     bad = tmp_path / "bad.skel"
     bad.write_text("balljoint root {\n offset 1 2\n}\n")
     hand.drag("arm.x", 0.9)
@@ -47,7 +47,7 @@ def test_message_is_copied_by_its_button(hand):
     assert hand.state.error
 
 
-def test_view_responds_again_after_a_message_or_dialog(hand):
+def test_view_responds_after_a_message_or_dialog_is_closed(hand):
     for close in ("escape", "button"):
         hand.state.error = "something"
         hand.step(3)
@@ -94,14 +94,14 @@ def test_camera_keeps_its_direction_for_a_new_figure(hand, tmp_path):
 
 
 @pytest.mark.parametrize("order", [(0, 1), (1, 0)])
-def test_dropped_skin_or_skeleton_joins_its_counterpart(drive, rig, order):
+def test_dropped_skin_or_skeleton_is_combined_with_its_counterpart(drive, rig, order):
     hand = drive(rig[order[0]])
     _open(hand, rig[order[1]])
     assert hand.state.actor.figure.is_attached
     assert {path.suffix for path in hand.state.paths} == {".skel", ".skin"}
 
 
-def test_dropped_skin_that_does_not_fit_opens_alone(drive, rig, tmp_path):
+def test_dropped_skin_of_a_different_skeleton_opens_alone(drive, rig, tmp_path):
     other = tmp_path / "three.skin"
     other.write_text(skin_text(3))
     hand = drive(rig[0])
@@ -203,7 +203,7 @@ def test_progress_of_opening_is_shown_and_cancelling_ends_the_reading(hand, rig,
     assert hand.state.of(Files).loader is None
 
 
-def test_figure_refused_by_the_driver_keeps_the_scene(hand, tmp_path, monkeypatch):
+def test_scene_stays_if_the_driver_refuses_a_figure(hand, tmp_path, monkeypatch):
     other = tmp_path / "other.skel"
     other.write_text(SKEL)
     scene, picture = hand.state.scene, hand.scene_picture()
@@ -242,7 +242,7 @@ def test_opened_files_are_remembered_latest_first(hand, rig, tmp_path):
     assert hand.state.of(Files).recent == groups == load_recent()
 
 
-def test_bad_file_is_not_remembered(hand, tmp_path):
+def test_invalid_file_is_not_remembered(hand, tmp_path):
     hand.app.frame.keeps_recent = True
     _open(hand, tmp_path / "missing.skel")
     assert load_recent() == []
@@ -308,7 +308,7 @@ def test_driver_error_while_drawing_becomes_a_message(hand, monkeypatch):
     assert hand.state.error == "" and (hand.dofs() == pose).all()
 
 
-def test_parts_hidden_on_one_model_hide_nothing_of_the_next(hand, rig):
+def test_new_model_shows_all_parts(hand, rig):
     hand.state.options.hidden_parts, hand.state.options.reduced = (1,), True
     _open(hand, *rig)
     assert hand.state.options.hidden_parts == ()

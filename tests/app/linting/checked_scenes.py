@@ -16,8 +16,8 @@ PINK = np.array([round(255 * channel) for channel in MARK_COLOR])
 SIZE = (1000, 700)
 
 
-# Vertex 5, at (-1, 1, 1), is bound to the foot at the origin, and joint 1 is the knee at y = 2:
-# a weight of 0.9 takes it to (-0.9, 0.9, 0.9).
+# Vertex 5 at (-1, 1, 1) is bound to the foot at the origin; joint 1 is the knee at y = 2. A weight
+# of 0.9 moves the vertex to (-0.9, 0.9, 0.9).
 LIGHT = weighted({5: [(0, 0.9)]})
 
 
@@ -38,13 +38,13 @@ def row_of(hand, code):
 
 
 def marked(hand):
-    """Return how many pixels of the view have the colour of marks."""
+    """Return the number of pixels in the view that have the colour of marks."""
     pixels = hand.scene_picture()[..., :3].astype(int)
     return int((np.abs(pixels - PINK).max(axis=-1) <= 6).sum())
 
 
 def jump() -> Scene:
-    """Return a column that is 40 m away for one frame, file frame 130."""
+    """Return a column that is 40 m away in a single frame, frame 130 of the file."""
     figure = column()
     clip = standing(figure)
     places = np.zeros((FRAMES, figure.skeleton.n_joints, 3))

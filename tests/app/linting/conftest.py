@@ -11,7 +11,7 @@ from viewer.rig.scene import Scene
 
 @pytest.fixture
 def lint(drive):
-    """Open an app that shows a figure or scene, its Lint panel open and the check done."""
+    """Open an app that shows a figure or scene with the Lint panel open and the check finished."""
 
     def open_panel(shown, **settings):
         scene = shown if isinstance(shown, Scene) else scene_of(shown)

@@ -1,4 +1,4 @@
-"""Checks in the window while figures move: stale findings, cancellation, other work."""
+"""Checks in the window while figures move: stale findings, cancellation, and other running jobs."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_findings_are_stale_while_the_pose_differs(lint, texts):
     assert not stale(hand, texts)
 
 
-def test_posing_makes_findings_stale_and_time_does_not(lint, texts):
+def test_posing_makes_findings_stale_and_playback_does_not(lint, texts):
     hand = lint(jump())
     hand.state.clock.playing = True
     hand.step(20)
@@ -63,13 +63,13 @@ def test_recheck_uses_the_current_pose_and_limits(lint, texts):
     assert codes(hand) == []
     hand.state.of(Linting).options = replace(hand.state.of(Linting).options, max_rotation=1.0)
     assert stale(hand, texts)
-    hand.state.actor.pose.dofs[4] = 3.5  # its limits are -3 and 3
+    hand.state.actor.pose.dofs[4] = 3.5  # the limits of the DOF are -3 and 3
     hand.click("Recheck")
     finish(hand)
     assert codes(hand) == ["S004"] and not stale(hand, texts)
 
 
-def test_new_scene_is_unchecked(lint, rig, texts):
+def test_new_scene_is_shown_as_unchecked(lint, rig, texts):
     hand = lint(LIGHT)
     hand.click(row_of(hand, "W001"))
     hand.open(*rig)
@@ -107,7 +107,7 @@ def test_posing_during_a_check_does_not_affect_it(drive, monkeypatch):
 
 
 def hold_checks(monkeypatch):
-    """Block checks after their third step until an event; return it, later steps and times."""
+    """Block checks after three steps until an event is set; return it, later steps and times."""
     import threading
 
     go, seen, is_held = threading.Event(), [], threading.Event()
@@ -145,7 +145,7 @@ def test_check_is_cancelled_between_steps(drive, monkeypatch, how):
     assert hand.says("Cancelled")
 
 
-def test_check_waits_for_other_work(lint, monkeypatch):
+def test_check_waits_for_another_running_job(lint, monkeypatch):
     hand = lint(LIGHT)
     go, _, is_held = hold_checks(monkeypatch)
     first = hand.state.of(Linting).checked

@@ -1,4 +1,4 @@
-"""The Lint panel matches ``viewer lint``: files are read again; gaps jump to the frame before."""
+"""Agreement of the Lint panel with ``viewer lint``, which reads files again, and jumps to gaps."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def files(tmp_path):
 
 @pytest.fixture
 def lint(drive):
-    """Open an app that shows files or a scene, its Lint panel open and the check done."""
+    """Open an app that shows files or a scene with the Lint panel open and the check finished."""
 
     def open_panel(*paths, **settings):
         hand = drive(*paths, size=SIZE, samples=1, **settings)
@@ -53,7 +53,7 @@ def row_of(hand, code):
     return f"finding {codes.index(code)}"
 
 
-def test_the_panel_copies_what_the_command_prints(lint, files, monkeypatch, capsys):
+def test_panel_copies_the_text_that_the_command_prints(lint, files, monkeypatch, capsys):
     hand = lint(*files)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
@@ -63,7 +63,7 @@ def test_the_panel_copies_what_the_command_prints(lint, files, monkeypatch, caps
     assert " S003: " in copied[-1] and copied[-1].endswith(" in 3 files")
 
 
-def test_the_bundled_figure_has_files_too(lint, monkeypatch, capsys):
+def test_files_of_the_bundled_figure_are_checked_too(lint, monkeypatch, capsys):
     hand = lint()
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
@@ -83,7 +83,7 @@ def test_rows_show_file_and_line_and_can_be_filtered_by_them(lint, files, texts)
     assert row_of(hand, "C001") in listed and row_of(hand, "W001") not in listed
 
 
-def test_a_finding_from_a_reader_jumps_to_its_vertex(lint, files):
+def test_click_on_a_reader_finding_jumps_to_its_vertex(lint, files):
     hand = lint(*files)
     hand.click(row_of(hand, "M007"))
     assert hand.state.of(Linting).marks.points.shape == (1, 3)
@@ -101,7 +101,7 @@ def test_missing_or_changed_files_are_reported(lint, files, texts):
     assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
 
 
-def test_a_file_only_finding_says_so_and_copies_its_location(lint, files, texts, monkeypatch):
+def test_finding_about_a_file_only_says_so_and_copies_its_location(lint, files, texts, monkeypatch):
     hand = lint(*files)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
@@ -148,20 +148,20 @@ def gappy() -> Scene:
     return scene_of(figure, clip)
 
 
-def test_a_gap_jumps_to_the_frame_before_it(lint):
+def test_click_on_a_gap_jumps_to_the_frame_before_it(lint):
     hand = lint(scene=gappy())
     hand.click(row_of(hand, "C005"))
     playback, view = hand.state.clock, hand.state.of(Linting)
     assert playback.frame + playback.first_frame == 109
     assert view.finding.message == "3 of 60 frames are missing in 1 gap: frames 110 to 112"
     assert hand.state.actor.is_present
-    # Its root is marked, and all of it is visible.
+    # The root of the figure is marked, and the whole figure is visible.
     assert view.marks.points.tolist() == [[7.0, 0.0, 0.0]]
     assert hand.state.camera.target == pytest.approx([7.0, 2.0, 0.0])
     assert hand.says("Last frame before the gap: the person is absent in the next frame")
 
 
-def test_a_gap_in_captured_points_marks_their_centre(lint):
+def test_gap_in_captured_points_marks_their_centre(lint):
     figure, clip = keypoints()
     rows = np.arange(FRAMES)
     rows[30] = -1
@@ -172,7 +172,7 @@ def test_a_gap_in_captured_points_marks_their_centre(lint):
     np.testing.assert_allclose(hand.state.of(Linting).marks.points, [[0.0, 0.5, 0.0]])
 
 
-def test_the_ground_is_a_limit(lint):
+def test_ground_height_is_a_limit(lint):
     hand = lint(scene=scene_of(column()))
     hand.click("Limits…")
     hand.step(2)

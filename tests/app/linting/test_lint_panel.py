@@ -1,4 +1,4 @@
-"""The Lint panel: checks, the list, jumping to findings, marks, and stale findings."""
+"""The Lint panel: checks, the list of findings, jumps to findings, marks, and stale findings."""
 
 from __future__ import annotations
 
@@ -56,10 +56,10 @@ def test_panel_starts_closed_and_checks_when_first_shown(drive):
     assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
     hand.menu("menu Window", "Lint")
     finish(hand)
-    assert hand.state.of(Linting).checked is first  # automatic only the first time
+    assert hand.state.of(Linting).checked is first  # only the first check is automatic
 
 
-def test_reset_layout_closes_it(lint):
+def test_reset_layout_closes_the_lint_panel(lint):
     hand = lint(LIGHT)
     hand.menu("menu Window", "Reset layout")
     hand.step(3)
@@ -93,7 +93,7 @@ def test_severities_and_text_filter_the_list(lint):
     assert listed == [row_of(hand, "W002")]
 
 
-def test_filter_without_a_match_says_so(lint, texts):
+def test_filter_without_a_match_is_reported(lint, texts):
     hand = lint(LIGHT)
     hand.state.of(Linting).text = "zebra"
     hand.step(2)
@@ -107,7 +107,7 @@ def test_valid_figure_has_no_findings(lint, texts):
     assert not hand.says("copied")
 
 
-def test_click_marks_the_vertex_and_aims_there(lint):
+def test_click_marks_the_vertex_and_aims_the_camera_at_it(lint):
     hand = lint(LIGHT)
     assert marked(hand) == 0
     hand.click(row_of(hand, "W001"))
@@ -131,7 +131,7 @@ def test_mark_follows_the_pose(lint):
 
 
 @pytest.mark.parametrize("end", ["same row", "escape"])
-def test_marks_end_with_the_row_or_escape(lint, end):
+def test_marks_disappear_with_the_row_or_escape(lint, end):
     hand = lint(LIGHT)
     hand.click(row_of(hand, "W001"))
     assert marked(hand)
@@ -204,16 +204,16 @@ def test_captured_points_are_marked(lint):
     assert hand.state.of(Linting).marks.points.tolist() == [[0.0, 0.0, 0.0]]
 
 
-def test_camera_orbits_to_the_facing_side(lint):
+def test_camera_orbits_to_the_side_that_the_triangle_faces(lint):
     hand = lint(LIGHT)
     camera = hand.state.camera
-    camera.azimuth, camera.inclination = 135.0, 0.0  # from behind, +x and -z
+    camera.azimuth, camera.inclination = 135.0, 0.0  # from behind, between +x and -z
     hand.click(row_of(hand, "W001"))
     normal = hand.state.actor.figure.mesh.normals[5]
     assert float(camera_axes(camera)[2] @ normal) > 0.8
     before = camera.azimuth
     hand.click(row_of(hand, "W001"))
-    camera.azimuth = before + 40.0  # still from its side: the direction stays
+    camera.azimuth = before + 40.0  # still on the facing side, so the direction stays
     hand.click(row_of(hand, "W001"))
     assert camera.azimuth == before + 40.0
 
@@ -222,7 +222,7 @@ def test_limits_are_set_in_their_dialog(lint):
     hand = lint(column())
     hand.click("Limits…")
     hand.step(2)
-    # Room for the longest text of the fields.
+    # The fields have room for their longest text.
     x0, _, x1, _ = hand.state.item_rects["Largest speed"]
     assert x1 - x0 > 10 * imgui.get_style().font_size_base
     hand.enter_value("Largest rotation", "180")
@@ -240,7 +240,7 @@ def test_limits_are_set_in_their_dialog(lint):
     assert hand.state.of(Linting).options == type(hand.state.of(Linting).options)()
 
 
-def test_all_are_copied_as_text_and_json(lint, monkeypatch):
+def test_all_findings_are_copied_as_text_and_json(lint, monkeypatch):
     hand = lint(LIGHT)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)

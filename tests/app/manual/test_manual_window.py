@@ -21,7 +21,7 @@ def test_pages_open_from_the_menu_and_the_list(drive, rig, texts) -> None:
     texts.clear()
     hand.click("page keys")
     hand.step(2)
-    assert shown(hand) == "keys" and "reset the pose to that of the file" in texts
+    assert shown(hand) == "keys" and "reset the pose to the file's pose" in texts
 
 
 @pytest.mark.parametrize("size", [(900, 640), (300, 200)])
@@ -35,7 +35,7 @@ def test_every_page_is_drawn_inside_the_window(drive, rig, size) -> None:
     assert set(hand.state.of(Manual).pages) == set(PAGES) and not hand.state.error
 
 
-def test_escape_closes_it_and_nothing_else(drive, rig) -> None:
+def test_escape_closes_only_the_manual_window(drive, rig) -> None:
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.selected_joint = 1
     hand.state.of(Manual).topic = "motion"
@@ -44,7 +44,7 @@ def test_escape_closes_it_and_nothing_else(drive, rig) -> None:
     assert shown(hand) == "" and hand.state.selected_joint == 1
 
 
-def test_a_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path) -> None:
+def test_missing_page_shows_a_message(drive, rig, monkeypatch, tmp_path) -> None:
     monkeypatch.setattr("viewer.resources._PACKAGE", tmp_path / "viewer")
     hand = drive(*rig, size=(1000, 640), samples=1)
     hand.state.of(Manual).topic = "motion"

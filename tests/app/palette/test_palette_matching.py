@@ -1,4 +1,4 @@
-"""Fuzzy matching: words before single letters, prefixes before infixes, all words required."""
+"""Fuzzy matching: words rank above letters, prefixes above infixes, and all words must match."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def test_best_match_comes_first(query, first):
     assert NAMES[ranked(query, NAMES)[0]] == first
 
 
-def test_all_words_must_be_found_and_order_of_letters_counts():
+def test_all_words_must_match_and_letters_must_be_in_order():
     assert ranked("front knee", NAMES) == []
     assert score("eerf", "Wireframe") < 0
     assert ranked("", NAMES) != [] and len(ranked("", NAMES)) == len(NAMES)
 
 
-def test_beginning_of_a_word_beats_a_place_inside_and_shorter_names_win():
+def test_word_prefix_ranks_above_infix_and_shorter_name_above_longer():
     assert (
         score("view", "Fit the view") > score("iew", "Fit the view") > score("ftw", "Fit the view")
     )

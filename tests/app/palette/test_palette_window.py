@@ -1,4 +1,4 @@
-"""The command palette by keyboard alone, and by mouse."""
+"""The command palette, used by keyboard alone and by mouse."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_enter_runs_the_best_match_and_closes(hand):
     assert not hand.state.options.wireframe
 
 
-def test_letters_run_no_keys_and_escape_closes_it_alone(hand):
+def test_letters_run_no_shortcuts_and_escape_closes_only_the_palette(hand):
     hand.state.selected_joint = 1
     opened(hand, "w")
     hand.key("escape")
@@ -42,7 +42,7 @@ def test_letters_run_no_keys_and_escape_closes_it_alone(hand):
     assert not hand.state.options.wireframe and hand.state.selected_joint == 1
 
 
-def test_arrows_move_the_highlight_around_the_ends(hand):
+def test_arrows_wrap_the_highlight_around_the_ends(hand):
     palette = opened(hand, "view")
     count = len(palette.shown)
     assert count > 2
@@ -69,7 +69,7 @@ def test_panel_is_opened_by_name(hand):
     assert is_open(hand.state, "lint")
 
 
-def test_click_runs_an_entry_and_one_elsewhere_closes(hand):
+def test_click_runs_an_entry_and_click_outside_closes_the_palette(hand):
     opened(hand, "octahedra")
     hand.click("palette 0")
     assert hand.state.options.bones == "octahedra" and not hand.state.of(Palette).is_open
@@ -78,7 +78,7 @@ def test_click_runs_an_entry_and_one_elsewhere_closes(hand):
     assert not hand.state.of(Palette).is_open
 
 
-def test_disabled_entries_say_why_and_do_not_run(hand):
+def test_disabled_entries_state_the_reason_and_do_not_run(hand):
     palette = opened(hand, "curves")
     entry = palette.known[palette.shown[0]]
     assert entry.text == "Curves" and "no motion" in entry.why
@@ -88,7 +88,7 @@ def test_disabled_entries_say_why_and_do_not_run(hand):
 
 
 @pytest.mark.parametrize("kind", ["action", "panel", "choice", "joint", "figure"])
-def test_all_kinds_are_there_with_names_of_their_own(hand, kind):
+def test_entries_of_every_kind_have_unique_names(hand, kind):
     named = [entry.text for entry in entries(hand.state) if entry.kind == kind]
     assert named and len(named) == len(set(named))
 

@@ -1,4 +1,4 @@
-"""Animations of a file in the window: chosen by list, key and palette, and undone."""
+"""Animations of a file in the window, chosen by list, key or palette, and undo of the choice."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,7 +35,7 @@ def names(hand) -> list[str | None]:
     return [None if a.clip is None else a.clip.name for a in hand.state.scene.actors]
 
 
-def test_the_first_animation_is_shown_at_its_own_times(hand):
+def test_first_animation_is_shown_with_its_own_time_range(hand):
     assert names(hand) == ["wave", None]
     assert hand.state.clock.whole == (0.5, 2.5) and hand.state.clock.time == 0.5
     assert hand.state.clock.frame_rate == 30.0
@@ -45,7 +45,7 @@ def test_the_list_switches_all_figures_of_the_file(hand):
     _pick(hand, "Animation", 2)
     assert names(hand) == ["bow", "bow"]
     assert hand.state.clock.whole == (0.0, pytest.approx(5 / 24)) and hand.state.clock.time == 0.0
-    # Frames are counted at the rate of the keys that play now.
+    # Frames are counted at the rate of the current animation's keys.
     assert hand.state.clock.frame_rate == 24.0
     actor = hand.state.actor
     assert_array_equal(actor.pose.scales, figure_pose(actor.figure).scales)
@@ -61,7 +61,7 @@ def test_the_list_switches_all_figures_of_the_file(hand):
     ]
 
 
-def test_without_an_animation_the_timeline_still_offers_them(hand):
+def test_timeline_offers_the_animations_when_none_plays(hand):
     _pick(hand, "Animation", 0)
     assert names(hand) == [None, None] and not hand.state.clock.has_motion
     assert_array_equal(hand.state.actor.pose.dofs, figure_pose(hand.state.actor.figure).dofs)
@@ -96,7 +96,7 @@ def test_edited_keys_stay_when_another_animation_plays(hand):
     choose_animation(hand.state, 0)
     hand.step(2)
     assert actor.clip is edited
-    for _ in range(3):  # back to the edit, and before it
+    for _ in range(3):  # back to the edit, then to the state before it
         undo(hand.state)
         hand.step(2)
     assert actor.clip is actor.figure.animations[0].clip()

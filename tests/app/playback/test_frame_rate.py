@@ -1,4 +1,4 @@
-"""The field "Frames per second": undoable for captures, and used for counting keyed frames."""
+"""The field "Frames per second": undoable for captures, and used to number keyed frames."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def rising(drive, rig):
 
 @pytest.fixture
 def pair(drive, rig):
-    """Two people of one capture: 31 frames, 10 a second; the second appears at frame 20."""
+    """Two people of one capture with 31 frames at 10 per second; the second appears at frame 20."""
     scene = people(rig, [True] * 31, [False] * 20 + [True] * 11)
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.step(2)
@@ -58,7 +58,7 @@ def test_clip_at_another_rate_has_the_same_frames():
 
 def test_keyed_frames_are_counted_by_the_typed_rate(rising):
     clip, playback = rising.state.actor.clip, rising.state.clock
-    assert playback.n_frames == 121  # four seconds at 30 a second
+    assert playback.n_frames == 121  # four seconds at 30 frames per second
     rising.enter_value("Frame rate", "24")
     assert (playback.frame_rate, playback.n_frames) == (24.0, 97)
     assert playback.whole == (0.0, 4.0) and rising.state.actor.clip is clip
@@ -74,7 +74,7 @@ def test_rate_for_keyed_clips_stays_when_the_clip_changes(rising):
     assert (rising.state.clock.frame_rate, rising.state.clock.n_frames) == (25.0, 51)
 
 
-def test_rate_applies_to_everyone_in_a_capture(pair):
+def test_rate_applies_to_all_people_in_a_capture(pair):
     pair.enter_value("Frame rate", "20")
     assert rates(pair) == [20.0, 20.0]
     assert pair.state.clock.whole == (0.0, 1.5)  # 30 frames of a twentieth of a second
@@ -114,10 +114,10 @@ def test_rate_change_is_undone_with_its_time_and_pose(pair):
 
 
 @pytest.mark.parametrize("text", ["0", "-5", "1001", "0.001", "nan", "inf"])
-def test_rate_out_of_limits_is_refused_with_a_message(pair, text):
+def test_rate_outside_its_limits_is_refused_with_a_message(pair, text):
     pair.enter_value("Frame rate", text)
     assert rates(pair) == [10.0, 10.0] and pair.undo_steps == 0
-    if text not in ("nan", "inf"):  # the field itself rejects these
+    if text not in ("nan", "inf"):  # the field rejects these
         assert pair.says(f"frames per second: expected 0.01 to 1000, found {text}")
 
 
@@ -152,7 +152,7 @@ def test_rate_is_greyed_if_another_actor_defines_the_frames(drive, rig):
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.state.choose_actor(1)
     hand.step(2)
-    assert foreign_rate(hand.state) == "the frames are those of another motion: select its actor"
+    assert foreign_rate(hand.state) == "the frames belong to another motion: select its actor"
     assert rate_of(hand.state) == 10.0
     hand.enter_value("Frame rate", "20")
     assert hand.state.scene.actors[0].clip.timing.frame_rate == 10.0

@@ -12,7 +12,7 @@ from viewer.rig.scene import Actor
 SMOOTH = ("smooth", "smooth")
 
 
-def test_keys_of_the_selected_joint_or_all():
+def test_track_shows_keys_of_the_selected_joint_or_all_keys():
     actor = Actor(animated_leg(), clip=wave(), offset=1.0)
     assert_array_equal(key_times(actor, -1), [1.5, 2.0, 2.5, 3.0, 3.5])
     assert_array_equal(key_times(actor, 1), [1.5, 2.0, 3.5])

@@ -36,7 +36,7 @@ def test_scrubbing_snaps_to_the_nearest_frame(keyed, rate, share):
     assert playback.frame == number
 
 
-def test_scrubbing_with_alt_goes_between_frames(keyed):
+def test_scrubbing_with_alt_stops_between_frames(keyed):
     playback = keyed.state.clock
     playback.count_by(2.0)
     wanted = scrub(keyed, 0.63, held="alt")
@@ -55,7 +55,7 @@ def test_scrubbing_a_capture_snaps_to_its_frames(drive, rig):
 
 
 @pytest.mark.parametrize("held", ["", "alt"])
-def test_time_line_in_the_curve_editor_snaps_to_frames_too(keyed, held):
+def test_time_line_in_the_curves_panel_snaps_to_frames_too(keyed, held):
     keyed.show_panel("Curves")
     keyed.state.selected_joint = 1
     keyed.step(3)

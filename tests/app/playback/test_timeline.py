@@ -1,4 +1,4 @@
-"""The timeline by mouse and keys: play, step, scrub, range, tracks; captures that stream in."""
+"""The timeline with mouse and keys: play, step, scrub, range, tracks, and captures being read."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from viewer.app.core.clock import MODES
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.diagnostics import Diagnostic
@@ -22,7 +23,7 @@ ARM = 0  # the DOF that the test's clip moves
 
 @pytest.fixture
 def moving(drive, rig):
-    """A driver on the tiny figure with a clip: its last DOF rises by 0.1 per s from 0 to 0.4."""
+    """A driver on the tiny figure; a clip raises its last DOF by 0.1 per s from 0 to 0.4."""
     hand = drive(*rig, size=(1280, 800))
     actor = hand.state.actor
     dof = int(np.flatnonzero(actor.figure.skeleton.dof_kinds >= 3)[0])
@@ -141,7 +142,7 @@ def test_clip_change_is_undone(moving):
 
 
 def capture(n_frames, part, people, name="take"):
-    """A capture of boxes: person p is present from frame 10 p on; x is the frame's number."""
+    """A capture of boxes: person p is present from frame 10 p on, at x = the frame number."""
 
     def parts():
         for first in range(0, n_frames, part):
@@ -190,7 +191,7 @@ def finish(hand):
         if hand.state.of(Files).stream is None:
             return
         hand.state.of(Files).stream._thread.join(0.005)
-    raise AssertionError("the capture was not read to its end")
+    raise AssertionError("the capture was not read completely")
 
 
 def test_people_appear_while_a_capture_is_read(streaming):
@@ -237,7 +238,7 @@ def test_escape_cancels_loading_and_keeps_loaded_frames(streaming, monkeypatch):
     assert streaming.state.scene.actors[0].clip.n_rows == 10
 
 
-def test_editing_while_reading_keeps_its_undo(streaming):
+def test_edit_made_while_reading_can_be_undone(streaming):
     builder = streaming.start(capture(60, 5, 2))
     assert isinstance(streaming.state.of(Files).stream, Stream | type(None))
     streaming.state.options.wireframe = True
@@ -290,7 +291,7 @@ def test_actors_are_hidden_and_chosen_by_clicks(streaming):
     assert streaming.state.chosen_actor == 0
 
 
-def test_camera_follows_an_actor_until_following_ends(streaming):
+def test_camera_follows_an_actor_until_following_is_turned_off(streaming):
     streaming.start(capture(60, 60, 1))
     streaming.show_panel("Actors")
     streaming.click("Actor##follow")
@@ -302,3 +303,18 @@ def test_camera_follows_an_actor_until_following_ends(streaming):
     streaming.state.clock.seek(5.0)
     streaming.step(2)
     assert_allclose(streaming.state.camera.target - before, [30.0, 0.0, 0.0], atol=1e-9)
+
+
+def test_arrow_keys_choose_from_an_open_list(moving):
+    clock, before = moving.state.clock, moving.state.clock.time
+    modes = list(MODES)
+    assert clock.mode == modes[0]
+    moving.click("Mode")
+    moving.step(2)
+    moving.key("down_arrow")
+    moving.key("down_arrow")
+    moving.key("space")  # ImGui chooses with it; it must not also play
+    moving.step(2)
+    assert clock.mode == modes[2] and clock.time == before and not clock.playing
+    moving.key("right_arrow")  # the list is closed: the key steps again
+    assert clock.mode == modes[2] and clock.time > before

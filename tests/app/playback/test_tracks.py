@@ -14,10 +14,10 @@ from viewer.rig.srgb import decode_color, encode_color
     ("places", "drawn"),
     [
         ([0, 9], [(0, 9)]),
-        ([10, 10], [(10, 15)]),  # as wide as the narrowest
-        ([40, 40], [(35, 40)]),  # at the end it grows to the left
-        ([20, 20, 22, 30], [(16, 21), (22, 30)]),  # a point is left before the next one
-        ([0, 18, 20, 20, 22, 30], [(0, 18), (19, 21), (22, 30)]),  # between others
+        ([10, 10], [(10, 15)]),  # the minimum width
+        ([40, 40], [(35, 40)]),  # at the end of the track the bar grows to the left
+        ([20, 20, 22, 30], [(16, 21), (22, 30)]),  # one point stays free before the next bar
+        ([0, 18, 20, 20, 22, 30], [(0, 18), (19, 21), (22, 30)]),  # between other bars
         ([], []),
     ],
 )
@@ -43,7 +43,7 @@ def test_last_ruler_label_is_not_cut_off(drive, rig):
     hand = drive(scene=scene, size=(1280, 800), samples=1, pixels_per_point=1.0)
     _, y0, x1, _ = hand.state.item_rects["Scrubber"]
     picture = hand.screen()[round(y0) : round(y0) + 14].astype(int).sum(axis=2)
-    # Letters are the brightest there: those of the last number are left of the end.
+    # The digits are the brightest pixels there; those of the last number are left of the end.
     letters = np.flatnonzero((picture > 380).any(axis=0))
     last = letters[letters > x1 - 45]
     assert len(last) > 10 and last.max() < x1 - 1
@@ -51,7 +51,7 @@ def test_last_ruler_label_is_not_cut_off(drive, rig):
 
 def test_srgb_round_trip():
     color = (0.001, 0.2, 0.9)
-    # IEC 61966-2-1: the dark end is 12.92 times the light; 0.2 is 0.4845 by its formula.
+    # In IEC 61966-2-1, dark values are 12.92 times the linear value; 0.2 is 0.4845 by its formula.
     assert encode_color(color)[:2] == pytest.approx((0.01292, 0.484529), abs=1e-6)
     assert decode_color(encode_color(color)) == pytest.approx(color, abs=1e-12)
 
@@ -63,7 +63,7 @@ def _row(hand, index):
     return hand.screen()[round((y0 + y1) / 2), round(x0) : round(x1)].astype(int)
 
 
-def test_single_frame_is_visible_and_tracks_have_their_actors_colour(drive, rig):
+def test_single_frame_is_visible_and_tracks_have_the_colour_of_their_actor(drive, rig):
     lone = np.zeros(2000, dtype=bool)
     lone[1000] = True
     scene = people(rig, np.ones(2000, dtype=bool), lone)

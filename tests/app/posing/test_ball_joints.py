@@ -31,7 +31,7 @@ def euler(x, y, z):
 
 
 def _rotation(hand, joint):
-    """Return a joint's rotation by its DOFs; its other transforms must be those of the file."""
+    """Return a joint's rotation by its DOFs; its remaining transforms must be those of the file."""
     return euler(*(hand.dof(f"{joint}.{axis}") for axis in "xyz"))
 
 
@@ -42,7 +42,7 @@ def _enter_vector(hand, joint, *degrees):
 
 @pytest.fixture
 def vectors(box):
-    """A test driver on the box, its joints edited as rotation vectors."""
+    """A test driver on the box, with joints edited as rotation vectors."""
     box.click("Rotation vectors")
     assert box.state.of(Posing).as_vectors
     return box
@@ -102,7 +102,7 @@ def test_drag_passes_180_degrees_without_a_jump(vectors):
 
 
 @pytest.mark.parametrize("key", ["undo", "reset"])
-def test_shown_vector_is_discarded_with_another_pose(vectors, key):
+def test_shown_vector_is_discarded_when_another_pose_is_restored(vectors, key):
     vectors.enter_value("joint_1.rz", "270")
     vectors.key("z", "ctrl") if key == "undo" else vectors.key("r")
     vectors.step(2)
@@ -124,7 +124,7 @@ def test_vectors_are_typed_in_the_chosen_unit(vectors):
     assert vectors.dof("joint_1.y") == pytest.approx(1.5, abs=1e-7)
 
 
-def test_typed_nonsense_leaves_a_rotation(vectors):
+def test_invalid_typed_value_leaves_a_valid_rotation(vectors):
     for text in ("nan", "inf", "1e39", "-1e300", "", "abc"):
         vectors.enter_value("joint_1.rx", text)
         vectors.assert_sane()
@@ -167,13 +167,13 @@ def test_rigs_without_a_pose_layout_have_angles_only(hand, texts):
     assert "arm.x" in hand.state.item_rects
 
 
-def test_vectors_are_discarded_with_the_body(vectors, rig):
+def test_vectors_are_discarded_when_the_body_is_removed(vectors, rig):
     vectors.open(*rig)
     vectors.step(2)
     assert "arm.x" in vectors.state.item_rects and "arm.rx" not in vectors.state.item_rects
 
 
-def test_figure_rows_move_and_scale_it(box):
+def test_figure_sliders_move_and_scale_the_figure(box):
     first, pose = box.scene_picture(), box.state.actor.pose
     size = math.sqrt(0.5**2 + 2.0**2 + 0.25**2)
     for axis, name in enumerate("xyz"):
@@ -199,14 +199,14 @@ def test_typed_scale_stays_positive(box):
     assert box.scene_picture().any()
 
 
-def test_figure_rows_start_collapsed_for_rigs(hand):
+def test_figure_sliders_start_collapsed_for_rigs(hand):
     assert "figure" in hand.state.item_rects and "figure.tx" not in hand.state.item_rects
     hand.click(hand.place("figure", 0.02))
     hand.enter_value("figure.ty", "0.25")
     assert hand.state.actor.pose.figure_translation.tolist() == [0, 0.25, 0]
 
 
-def test_r_resets_pose_and_placement_and_keeps_the_shape(vectors):
+def test_r_key_resets_pose_and_placement_and_keeps_the_shape(vectors):
     _enter_vector(vectors, "joint_1", 30, 60, 0)
     vectors.enter_value("figure.tx", "0.5")
     vectors.enter_value("figure.scale", "2")
@@ -220,7 +220,7 @@ def test_r_resets_pose_and_placement_and_keeps_the_shape(vectors):
     assert vectors.state.actor.pose.figure_scale == 2
 
 
-def test_m_swaps_left_and_right(vectors):
+def test_m_key_mirrors_the_pose(vectors):
     _enter_vector(vectors, "joint_0", 10, 20, 30)
     _enter_vector(vectors, "joint_1", 40, -50, 60)
     _enter_vector(vectors, "joint_2", -70, 0, 5)
@@ -237,7 +237,7 @@ def test_m_swaps_left_and_right(vectors):
     assert_allclose(vectors.dofs(), before, atol=1e-12)
 
 
-def test_m_reports_asymmetry_and_keeps_the_pose(drive, tmp_path):
+def test_m_key_reports_asymmetry_and_keeps_the_pose(drive, tmp_path):
     path = tmp_path / "lame.skel"
     path.write_text("balljoint hip { offset 0 0 0 balljoint left_leg { offset 1 -1 0 } }")
     hand = drive(path)

@@ -45,7 +45,7 @@ def test_panel_lists_names_and_current_confidence(points, texts, monkeypatch):
     assert "3 detected at this time, 1 of them with confidence below 0.1 and not drawn." in texts
 
 
-def test_unseen_points_are_shown_as_unseen(points, texts):
+def test_undetected_points_are_shown_as_undetected(points, texts):
     points.state.clock.mode = "run on"
     at_frame(points, 9, texts)
     assert "Absent at this time." in texts and texts.count("not detected") == 4

@@ -30,7 +30,7 @@ def framed(drive, scene):
 
 @pytest.fixture
 def arm(drive):
-    """A test driver on an arm whose shoulder is selected, with the tool Rotate."""
+    """A test driver on an arm with the shoulder selected and the tool Rotate active."""
     hand = framed(drive, arm_scene())
     hand.state.selected_joint = 0
     hand.key("e")
@@ -47,7 +47,8 @@ def test_view_ring_rotates_the_joint_by_the_angle_on_screen(arm):
     to_eye = _to_eye(arm, world_of(arm, 0)[:3, 3])
     drag_along(arm, around(center, VIEW_RADIUS, 0.3, 1.1))
     wanted = rotation_vector_to_matrix(0.8 * to_eye) @ before
-    # ImGui knows the pointer by whole points: half a point at both ends of 94 from the middle.
+    # ImGui rounds the pointer to whole points: half a point at both ends, 94 points from the
+    # middle.
     assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=0.012)
 
 
@@ -58,7 +59,7 @@ def _to_eye(hand, point):
     return away / np.linalg.norm(away)
 
 
-def test_drag_is_one_step_and_undone_at_once(arm):
+def test_drag_is_one_undo_step(arm):
     before, steps = arm.dofs(), arm.undo_steps
     camera = arm.state.camera.azimuth, arm.state.camera.distance
     drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 1.1))
@@ -83,13 +84,13 @@ def test_click_on_a_ring_selects_the_joint_under_it(arm):
     place = joint_seen(arm, 1)
     arm.move(place)
     arm.press()
-    assert arm.state.of(Posing).drag is not None  # the ring is held
+    assert arm.state.of(Posing).drag is not None  # the ring is being dragged
     arm.let_go()
     arm.step(2)
     assert arm.state.selected_joint == 1
     assert_array_equal(arm.dofs(), before)
     assert arm.undo_steps == steps
-    # A drag from there rotates the joint that has the ring.
+    # A drag from that point rotates the shoulder, whose ring it is.
     arm.state.selected_joint = 0
     arm.step(2)
     drag_along(arm, around(joint_seen(arm, 0), VIEW_RADIUS, 0.0, 0.8))
@@ -109,7 +110,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     else:
         arm.press(1)
     assert_array_equal(arm.dofs(), before)
-    # Nothing else happens until the button is released: no orbit, no drag.
+    # Until the button is released, moving the mouse neither orbits nor drags.
     azimuth = arm.state.camera.azimuth
     arm.move(places[-1])
     assert_array_equal(arm.dofs(), before)
@@ -121,7 +122,7 @@ def test_cancelled_drag_restores_the_pose_and_leaves_no_step(arm, way):
     assert arm.says("Drag cancelled")
 
 
-def test_click_on_a_ring_changes_nothing(arm):
+def test_click_on_a_ring_does_not_change_the_pose(arm):
     before, steps = arm.dofs(), arm.undo_steps
     place = around(joint_seen(arm, 0), VIEW_RADIUS, 0.3, 0.3, 1)[0]
     drag_along(arm, [place, place])
@@ -137,7 +138,7 @@ def test_ctrl_snaps_to_fifteen_degrees(arm):
     assert_allclose(world_of(arm, 0)[:3, :3], wanted, atol=1e-6)
 
 
-def test_drag_outside_the_rings_still_orbits(arm):
+def test_drag_outside_the_rings_orbits(arm):
     azimuth, before = arm.state.camera.azimuth, arm.dofs()
     x, y = joint_seen(arm, 0)
     arm.pull((x + 30, y + 200), (x + 90, y + 200))
@@ -153,7 +154,7 @@ def test_select_tool_shows_no_rings(arm):
     assert arm.state.camera.azimuth != azimuth
 
 
-def test_click_on_a_joint_selects_it_though_the_skin_hides_it(arm):
+def test_click_on_a_joint_behind_the_skin_selects_it(arm):
     arm.click(joint_seen(arm, 2))
     assert arm.state.selected_joint == 2
     assert {0, 1, 2} <= joint_tree(arm.state).opened
@@ -192,7 +193,7 @@ def _depth(hand, point):
     return (point - hand.state.camera.target) @ camera_axes(hand.state.camera)[2]
 
 
-def test_any_joint_can_be_dragged_without_selecting_it_first(drive):
+def test_any_joint_can_be_dragged_without_being_selected_first(drive):
     hand = framed(drive, arm_scene())
     hand.key("d")
     assert hand.state.selected_joint == -1
@@ -210,7 +211,7 @@ def test_root_is_dragged_directly_or_by_its_arrow(drive):
     assert_allclose(joint_seen(hand, 0), (x + 40, y - 25), atol=0.01)
     first = hand.state.actor.pose.figure_translation.copy()
     x, y = joint_seen(hand, 0)
-    drag_along(hand, [(x, y - 45), (x, y - 60), (x + 7, y - 90)])  # the arrow up
+    drag_along(hand, [(x, y - 45), (x, y - 60), (x + 7, y - 90)])  # the upward arrow
     moved = hand.state.actor.pose.figure_translation - first
     assert moved[1] > 0.05 and and_zero(moved[[0, 2]])
     assert not hand.dofs().any() and hand.undo_steps == 2

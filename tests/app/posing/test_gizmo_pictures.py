@@ -15,7 +15,7 @@ from viewer.loading import bundled_files
 
 
 def _posed(drive, joint, key):
-    """Return a test driver showing the fox, a joint selected, a tool active and panels hidden."""
+    """Return a test driver on the fox with a joint selected, a tool active and panels hidden."""
     hand = drive(*bundled_files(), size=(700, 520), samples=1, pixels_per_point=1.0)
     hand.key(key)
     hand.key("tab")

@@ -1,4 +1,4 @@
-"""Hands: components add up in rotation vectors, flat and mean hands match the file."""
+"""The Hands panel: components are added to rotation vectors; flat and mean hands match the file."""
 
 import numpy as np
 import pytest
@@ -36,7 +36,7 @@ def test_mean_hand_comes_from_the_file_and_flat_hand_is_zero(hand):
     assert_allclose(vectors(hand, 0), 0.0, atol=1e-12)
 
 
-def test_component_adds_its_row_to_the_rotation_vectors(hand):
+def test_component_slider_adds_its_row_to_the_rotation_vectors(hand):
     right = hand.state.actor.figure.hands[1]
     hand.click("right mean")
     hand.drag("right component 2", 0.6)

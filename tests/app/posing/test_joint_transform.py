@@ -9,7 +9,7 @@ from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 
 @pytest.fixture
 def unlocked(drive, rig):
-    """A test driver whose arm has rows for translation and scale."""
+    """A test driver on a rig whose arm has sliders for translation and scale."""
     hand = drive(*rig, size=(1000, 1000))
     hand.click("joint arm", button=1)
     hand.step(2)

@@ -17,7 +17,7 @@ SLIDERS = [label for label in LABELS if label != "root.z"]  # root.z is locked
 
 
 @pytest.mark.parametrize("label", SLIDERS)
-def test_slider_drag_changes_only_its_dof_as_one_step(hand, label):
+def test_slider_drag_changes_only_its_dof_as_one_undo_step(hand, label):
     before = hand.dofs()
     hand.drag(label, 0.8)
     changed = np.flatnonzero(hand.dofs() != before)
@@ -59,14 +59,14 @@ def test_unlimited_slider_keeps_a_typed_value_beyond_its_range(hand, degrees):
 
 
 @pytest.mark.parametrize("label", ["arm.x", "root.tx", "root.x"])
-def test_typed_nonsense_leaves_a_finite_pose(hand, label):
+def test_invalid_typed_value_leaves_a_finite_pose(hand, label):
     for text in ("nan", "inf", "-inf", "1e39", "-1e300", "", "abc", "1/0", "--", "3e38"):
         hand.enter_value(label, text)
         hand.assert_sane()
     assert hand.scene_picture().any()
 
 
-def test_typed_value_is_dropped_by_escape(hand):
+def test_typed_value_is_discarded_by_escape(hand):
     before = hand.dofs()
     hand.click(hand.place("arm.x", 0.3), held="ctrl")
     hand.type("90")
@@ -84,7 +84,7 @@ def test_locked_slider_does_not_move(hand):
     assert hand.dof("root.z") == 0.3 and hand.undo_steps == 0
 
 
-def test_radians_show_and_take_the_files_unit(hand):
+def test_radians_are_shown_and_typed_in_the_unit_of_the_file(hand):
     hand.click("radians")
     hand.enter_value("arm.x", "1.5")
     assert hand.dof("arm.x") == 1.5
@@ -94,7 +94,7 @@ def test_radians_show_and_take_the_files_unit(hand):
     assert hand.state.in_degrees
 
 
-def test_changing_the_unit_changes_no_dof(hand):
+def test_changing_the_unit_does_not_change_dofs(hand):
     before = hand.dofs()
     for label in ("radians", "degrees", "radians"):
         hand.click(label)
@@ -110,12 +110,12 @@ def test_double_click_resets_one_dof(hand):
     assert hand.dof("arm.z") == moved
 
 
-def test_double_click_is_one_step(hand):
+def test_double_click_is_one_undo_step(hand):
     hand.drag("arm.x", 0.9)
     hand.double_click(hand.place("arm.x", 0.1))
     steps = hand.undo_steps
     hand.key("z", "ctrl")
-    # The first of the two clicks moved the slider: at most this is an undo step of its own.
+    # The first of the two clicks moves the slider, which may be a separate undo step.
     assert steps <= 3 and hand.dof("arm.x") != FILE_POSE["arm.x"]
 
 
@@ -154,7 +154,7 @@ def test_reset_button_restores_the_clamped_pose_of_the_file(hand):
     assert hand.dof("root.tx") == 0.0
 
 
-def test_untouched_values_keep_every_digit(hand):
+def test_unchanged_values_keep_every_digit(hand):
     exact = 0.12345678901234567
     hand.state.actor.pose.dofs[hand.dof_index("arm.x")] = exact
     hand.step(3)
@@ -171,7 +171,7 @@ def test_filter_lists_only_joints_that_contain_its_text(hand):
     assert "arm.x" in hand.state.item_rects and "root.x" not in hand.state.item_rects
 
 
-def test_filter_takes_letters_that_are_shortcuts(hand):
+def test_filter_accepts_letters_that_are_shortcuts(hand):
     hand.drag("arm.x", 0.9)
     before, steps = hand.dofs(), hand.undo_steps
     view = (hand.state.camera.azimuth, hand.state.camera.orthographic)
@@ -185,7 +185,7 @@ def test_filter_takes_letters_that_are_shortcuts(hand):
     assert hand.state.panels_visible and not hand.state.of(Keyboard).is_listed
 
 
-def test_filter_without_a_match_lists_nothing_and_can_be_emptied(hand):
+def test_filter_without_a_match_lists_no_joint_and_can_be_cleared(hand):
     hand.click("Filter")
     hand.type("zzz")
     hand.step(2)
@@ -211,14 +211,14 @@ def test_joint_row_collapses_and_expands_with_its_arrow(hand):
     assert hand.state.selected_joint == -1
 
 
-def test_selected_joint_is_marked_in_the_picture(drive, rig):
+def test_selected_joint_is_highlighted_in_the_picture(drive, rig):
     hand = drive(rig[0])
     before = hand.scene_picture()
     hand.click(hand.place("joint arm", 0.5))
     assert (hand.scene_picture() != before).any()
 
 
-def test_figure_without_skeleton_says_so(drive, rig):
+def test_figure_without_skeleton_shows_a_message(drive, rig):
     hand = drive(rig[1])
     assert "Filter" not in hand.state.item_rects
     for name in ("r", "s", "k", "f"):
@@ -251,7 +251,7 @@ def test_rows_list_children_right_below_their_parent(hand):
     assert not [dof for joint, dof, _ in listed if joint == 1 and dof >= 0]
 
 
-def test_second_figure_is_activated_posed_and_reset(drive, rig, tmp_path):
+def test_second_figure_can_be_activated_posed_and_reset(drive, rig, tmp_path):
     other = tmp_path / "other.skel"
     other.write_text("balljoint hip { offset 0 0 0 balljoint knee { offset 0 -1 0 } }")
     hand = drive(*rig, other)
@@ -282,7 +282,7 @@ def test_escape_closes_a_context_menu_and_keeps_the_pose(hand):
     assert (hand.dofs() == before).all() and not hand.state.of(Keyboard).is_listed
 
 
-def test_filter_without_a_match_says_so_and_draws_no_row(hand):
+def test_filter_without_a_match_shows_a_message_and_no_row(hand):
     hand.click("Filter")
     hand.type("xyz")
     hand.step(2)

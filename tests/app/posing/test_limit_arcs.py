@@ -1,4 +1,4 @@
-"""Limit arcs: an arc ends where the bone would be at that limit."""
+"""Limit arcs, which end at the positions of the bone at the limits."""
 
 from __future__ import annotations
 
@@ -33,13 +33,14 @@ def test_arc_ends_are_at_the_limits_of_the_bone(dof) -> None:
         pose = actor.pose.copy()
         pose.dofs[dof] = value
         bone = posed_joint(actor, 1, pose).center - joint.center
-        # The arc is about the axis: only the component of the bone perpendicular to it counts.
+        # The arc is about the axis, so only the component of the bone perpendicular to it is
+        # compared.
         across = unit(bone - (bone @ arc.axis) * arc.axis)
         assert_allclose(end - joint.center, across, atol=1e-9)
 
 
 def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint() -> None:
-    # The bone lies along x: a rotation about x does not move it.
+    # The bone points along x, so a rotation about x does not move it.
     actor = Actor(arm_figure(limits=LIMITS))
     joint = posed_joint(actor, 0)
     arc = limit_arcs(joint, actor.pose)[0]
@@ -52,7 +53,7 @@ def test_twist_is_shown_by_an_axis_that_rotates_with_the_joint() -> None:
     assert (turned.high, turned.is_limited) == (pytest.approx(0.0, abs=1e-12), True)
 
 
-def test_limits_are_distinguished_from_the_current_value() -> None:
+def test_arcs_have_axis_colours_and_span_the_limits() -> None:
     actor = limited_arm()
     found = limit_arcs(posed_joint(actor, 0), actor.pose)
     assert [arc.color for arc in found] == [0, 1, 2]
@@ -65,7 +66,7 @@ def test_dof_without_two_limits_has_no_arc() -> None:
     assert limit_arcs(posed_joint(actor, 0), actor.pose) == []
 
 
-def test_more_than_360_degrees_is_drawn_as_a_full_circle() -> None:
+def test_range_over_360_degrees_is_drawn_as_a_full_circle() -> None:
     actor = Actor(arm_figure(limits={(0, "z"): (-9.0, 9.0)}))
     arc = limit_arcs(posed_joint(actor, 0), actor.pose)[0]
     points = arc_points(arc, np.zeros(3), 1.0)
@@ -73,7 +74,7 @@ def test_more_than_360_degrees_is_drawn_as_a_full_circle() -> None:
     assert len(points) < 100
 
 
-def test_end_joint_without_children_shows_its_box_or_its_parents_bone() -> None:
+def test_joint_without_children_shows_its_box_or_the_bone_of_its_parent() -> None:
     actor = Actor(arm_figure(limits={(2, "z"): (-1.0, 1.0)}))
     arc = limit_arcs(posed_joint(actor, 2), actor.pose)[0]
     assert_allclose(arc.start @ arc.axis, 0, atol=1e-12)

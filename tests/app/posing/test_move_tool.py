@@ -44,7 +44,7 @@ def hand_of(actor, pose):
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.25])
-def test_joint_comes_to_the_pointer_at_its_depth(scale) -> None:
+def test_joint_moves_to_the_pointer_at_constant_depth(scale) -> None:
     actor, view = bent_arm(), frame()
     actor.pose.figure_scale = scale
     actor.placement[:3, 3] = 0.2, -0.1, 0.5
@@ -58,7 +58,7 @@ def test_joint_comes_to_the_pointer_at_its_depth(scale) -> None:
     assert outcome.target is None and outcome.text == "hand"
 
 
-def test_joint_grabbed_off_centre_keeps_its_offset() -> None:
+def test_joint_grabbed_off_its_centre_keeps_the_offset() -> None:
     actor, view = bent_arm(), frame(parallel=True)
     posed = posed_joint(actor, 2)
     x, y = view.place(posed.center)
@@ -86,7 +86,7 @@ def test_unreachable_target_reports_its_distance() -> None:
     outcome = ReachHandle(posed, actor.pose, view.place(posed.center), 2).follow(
         view, view.place(far), False
     )
-    # The straight arm is 2 long: 0.9 are left.
+    # The straight arm is 2 long, so 0.9 remain.
     left = np.linalg.norm(hand_of(actor, outcome.pose) - far)
     assert left == pytest.approx(0.9, abs=0.01)
     assert outcome.text == f"hand   {left:.3g} away"
@@ -112,11 +112,11 @@ def test_chain_of_one_rotates_only_the_elbow() -> None:
     assert [longest_chain(skeleton, joint) for joint in (-1, 0, 1, 2)] == [0, 0, 1, 2]
 
 
-def test_default_chain_leaves_the_root_alone() -> None:
+def test_default_chain_does_not_move_the_root() -> None:
     skeleton = bent_arm().figure.skeleton
     assert used_chain(skeleton, 2, 0).tolist() == [1]
     assert used_chain(skeleton, 2, 2).tolist() == [1, 0]
-    assert used_chain(skeleton, 1, 0).tolist() == [0]  # nothing else can rotate
+    assert used_chain(skeleton, 1, 0).tolist() == [0]  # no other joint can rotate
     assert used_chain(skeleton, 0, 0).tolist() == []
 
 
@@ -147,7 +147,8 @@ def test_arrow_shifts_the_figure_along_its_axis_alone() -> None:
     ends = [view.place(np.array([x, 0.0, 0.0])) for x in (0.3, 0.8)]
     arrow = Arrow(np.array([1.0, 0, 0]), 0)
     outcome = MoveHandle(posed, actor.pose, ends[0], arrow).follow(view, ends[1], False)
-    # Half a unit of the scene is a quarter of the figure's, which is drawn at twice its size.
+    # Half a unit of the scene is a quarter of a unit of the figure, which is drawn at twice its
+    # size.
     assert_allclose(outcome.pose.figure_translation, [0.25, 0, 0], atol=1e-9)
     assert outcome.text == "figure   +0.5 +0 +0"
 

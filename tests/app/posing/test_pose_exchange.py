@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor, Scene
 
 @pytest.fixture
 def posed(drive_body):
-    """A test driver with a body whose pose, shape and placement have full-precision values."""
+    """A test driver on a body with full-precision values for pose, shape and placement."""
     hand = drive_body("smpl", size=(1000, 640))
     pose = hand.state.actor.pose
     pose.dofs[:] = 0.9 * np.sin(1.7 * np.arange(len(pose.dofs)))
@@ -178,13 +178,13 @@ def test_pose_menu_of_the_panel_copies_pastes_and_mirrors(box):
     assert box.dof("joint_2.x") == pytest.approx(np.pi / 4) and _key(box) != before
 
 
-# Other actors and windows
+# Transfer between actors and windows
 
 ANGLES = (0.4, -0.3, 0.7, 0.2, 0.9, -0.5, 0.1, 0.6, -0.2)
 
 
 def _arm_text(orders, dofs, **settings):
-    """Return the clipboard text of a window showing an arm, its pose and joint rotations."""
+    """Return the clipboard text, pose and joint rotations of an arm in another window."""
     figure = arm_figure(orders=orders, **settings)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = dofs
@@ -272,9 +272,9 @@ def test_save_dialog_suggests_a_name_and_adds_its_suffix(box, tmp_path):
     assert (tmp_path / "bare.obj").is_file()
 
 
-def test_save_button_says_what_it_replaces(box, tmp_path):
+def test_save_button_says_replace_if_the_file_exists(box, tmp_path):
     (tmp_path / "old.json").write_text("old")
-    # Without its suffix it is the same file.
+    # The name without the suffix means the same file.
     for name in ("old.json", "old"):
         box.menu("menu File", "Save pose…")
         box.step(3)
@@ -290,7 +290,7 @@ def test_save_button_says_what_it_replaces(box, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "beside"), [("out.skel", "out.skin"), ("out.gltf", "out.bin")])
-def test_save_button_considers_companion_files(box, tmp_path, name, beside):
+def test_save_button_says_replace_if_a_companion_file_exists(box, tmp_path, name, beside):
     (tmp_path / beside).write_text("old")
     box.menu("menu File", "Export…")
     box.step(3)
@@ -365,7 +365,7 @@ def test_open_files_are_never_overwritten(drive_body, tmp_path):
     assert model.read_bytes() == b"precious"
 
 
-def test_unreadable_shape_is_reverted_with_a_message(drive, tmp_path):
+def test_shape_that_cannot_be_read_is_reverted_with_a_message(drive, tmp_path):
     from formats.synthetic_smpl import model
 
     arrays = model("smpl")

@@ -25,7 +25,7 @@ def test_positions_and_axes_match_hand_calculation() -> None:
     elbow = posed_joint(actor, 1)
     assert_allclose(elbow.center, [0, 1, 0], atol=1e-12)
     assert_allclose(elbow.axes("world"), np.eye(3))
-    # The shoulder's x points up; the elbow's 45 degrees to the right of it.
+    # The shoulder's x axis points up; the elbow's points 45 degrees to the right of that.
     assert_allclose(elbow.axes("parent")[:, 0], [0, 1, 0], atol=1e-12)
     assert_allclose(elbow.axes("local")[:, 0], np.array([1, 1, 0]) / np.sqrt(2), atol=1e-12)
 
@@ -38,7 +38,7 @@ def test_placement_and_scale_of_the_figure_are_applied() -> None:
     assert_allclose(posed_joint(actor, 1).axes("local")[:, 2], [0, 0, 1], atol=1e-12)
 
 
-def test_missing_joint_gives_none() -> None:
+def test_missing_joint_returns_none() -> None:
     actor = turned_actor()
     assert posed_joint(actor, -1) is None and posed_joint(actor, 3) is None
     actor.pose = None
@@ -61,12 +61,12 @@ def test_rotation_axis_matches_observed_rotation(name, axis) -> None:
     joint = posed_joint(actor, 0)
     inside = rotation_vector_to_matrix(1e-6 * np.array(axis, float))
     seen = joint.rotation_axis(np.array(axis, float))
-    # However points move, they do not move along the axis, and by the right-hand rule about it.
+    # No point moves along the axis, and all move around it by the right-hand rule.
     for point in np.eye(3):
         step = PLACEMENTS[name] @ (inside - np.eye(3)) @ np.linalg.solve(PLACEMENTS[name], point)
         assert abs(step @ seen) < 1e-12
         assert np.cross(seen, point) @ step >= -1e-12
-    if name != "mirrored along two":  # it stretches
+    if name != "mirrored along two":  # that placement stretches
         assert_allclose(joint.parent_axis(seen), axis, atol=1e-9)
 
 

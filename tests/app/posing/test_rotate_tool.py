@@ -33,7 +33,7 @@ def grabbed(actor, joint, view, place, orientation="local"):
 
 
 def spot(angle, radius=RADIUS):
-    """Return a position around the joint at the origin, counter-clockwise from the right."""
+    """Return a position on a circle around the joint, counter-clockwise from the right."""
     return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
 
 
@@ -44,7 +44,7 @@ def test_free_joint_has_three_rings_and_one_about_the_line_of_sight() -> None:
     assert_allclose([ring.axis for ring in found], [*np.eye(3), [0, 0, 1]], atol=1e-9)
 
 
-def test_rings_and_their_reach_scale_with_the_interface() -> None:
+def test_rings_and_their_pick_distance_scale_with_the_interface() -> None:
     actor = Actor(arm_figure())
     view = replace(frame(), scale=2.0)
     posed = posed_joint(actor, 0)
@@ -64,8 +64,8 @@ def test_orientation_setting_determines_the_axes(orientation, x_axis) -> None:
     assert_allclose(found[0].axis, x_axis, atol=1e-12)
 
 
-def test_joint_with_two_dofs_has_a_ring_for_each_about_its_own_axis() -> None:
-    # x is applied first: the x axis is rotated by y, the y axis is the parent's.
+def test_joint_with_two_dofs_has_a_ring_about_each_dof_axis() -> None:
+    # x is applied first, so the x axis is rotated by y, and the y axis is that of the parent.
     actor = Actor(arm_figure(orders=("xy", "z", "")))
     actor.pose.dofs[:2] = 0.7, np.pi / 2
     found = rings(posed_joint(actor, 0), actor.pose, "world", frame())
@@ -103,9 +103,9 @@ def test_pointer_picks_the_nearest_ring_within_range() -> None:
 
 @pytest.mark.parametrize("parallel", [True, False])
 @pytest.mark.parametrize("angle", [0.4, -1.2, 2.9])
-def test_face_on_ring_rotates_by_the_pointer_angle(angle, parallel) -> None:
+def test_ring_facing_the_camera_rotates_by_the_pointer_angle(angle, parallel) -> None:
     actor, view = Actor(arm_figure()), frame(parallel=parallel)
-    handle = grabbed(actor, 0, view, spot(0.7))  # where no other ring crosses
+    handle = grabbed(actor, 0, view, spot(0.7))  # no other ring crosses there
     assert handle.ring.color == 2
     for share in (0.3, 0.6, 1.0):
         outcome = handle.follow(view, spot(0.7 + share * angle, 200.0), False)
@@ -123,7 +123,8 @@ def test_rotation_accumulates_beyond_360_degrees() -> None:
 
 
 def test_slanted_ring_follows_the_pointer_in_its_plane() -> None:
-    # From 50 degrees above the ring about y is an ellipse; a point of it is dragged to another.
+    # From 50 degrees above, the ring about y is an ellipse; one of its points is dragged to
+    # another.
     actor, view = Actor(arm_figure()), frame(inclination=50.0)
     unit = view.unit_length(np.zeros(3))
     spot = [unit * RADIUS * np.array([np.sin(a), 0, np.cos(a)]) for a in (0.3, 1.0)]
@@ -133,7 +134,7 @@ def test_slanted_ring_follows_the_pointer_in_its_plane() -> None:
     assert_allclose(outcome.pose.dofs[:3], [0, 0.7, 0], atol=1e-3)
 
 
-def test_edge_on_ring_rolls_like_a_wheel() -> None:
+def test_ring_seen_edge_on_rolls_like_a_wheel() -> None:
     # The front of the ring about y moves right by one radius: one radian.
     actor, view = Actor(arm_figure()), frame()
     handle = grabbed(actor, 0, view, (310.0, 300.0))
@@ -169,7 +170,7 @@ def test_ball_joint_rotates_exactly_about_the_axis() -> None:
                     joint_rotations(posed.skeleton, actor.pose)[0])  # fmt: skip
 
 
-def test_limit_stops_one_dof_and_is_reported() -> None:
+def test_limit_stops_its_dof_and_is_reported() -> None:
     actor = Actor(arm_figure(orders=("z", "z", ""), limits={(0, "z"): (-0.2, 0.5)}))
     view = frame()
     handle = grabbed(actor, 0, view, (300 + RADIUS, 300.0))

@@ -1,4 +1,4 @@
-"""The Shape panel: coefficients, random shapes, read-outs; hand calculation on a box body."""
+"""The Shape panel: coefficients, random shapes, and hand-calculated measurements of a box body."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_slider_covers_five_standard_deviations(shape):
 
 
 def test_joints_follow_the_shape(shape):
-    # The middles of the sides are 0.25 m out, and 20 % further with each sigma of the girth.
+    # The middles of the sides are 0.25 m from the centre, and 20 % more per sigma of the girth.
     assert_allclose(rest_joints(_rest(shape))[:, 0], [0, 0.25, -0.25], atol=1e-12)
     shape.enter_value("coefficient 1", "2.5")
     assert_allclose(rest_joints(_rest(shape))[:, 0], [0, 0.375, -0.375], atol=1e-12)
@@ -98,11 +98,11 @@ def test_drag_is_one_undo_step(shape):
     assert_array_equal(shape.scene_picture(), picture)
 
 
-def test_random_samples_the_shape_of_the_shown_seed(shape):
+def test_random_shape_is_determined_by_the_shown_seed(shape):
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 1
     first = _weights(shape).copy()
-    # The coefficients reproduced from a noted seed.
+    # The coefficients can be reproduced from the seed.
     assert_array_equal(first, np.random.default_rng(1).standard_normal(2))
     shape.click("Random")
     assert shape.state.of(Posing).shape_seed == 2 and (_weights(shape) != first).all()
@@ -133,7 +133,7 @@ def test_invalid_seeds_are_clamped(shape):
         assert np.isfinite(_weights(shape)).all()
 
 
-def test_random_varies_the_ten_first_shapes_and_no_expression(drive_body):
+def test_random_varies_the_first_ten_shapes_and_no_expression(drive_body):
     hand = drive_body("smplx", n_shapes=10, n_expressions=5)
     hand.show_panel("Shape")
     hand.click("Random")
@@ -183,8 +183,8 @@ def _said(hand, texts):
     return {name: texts[texts.index(name) + 1] for name in ("Height", "Volume", "Mass")}
 
 
-def test_read_outs_show_the_box_dimensions(shape, texts):
-    # 0.5 x 2 x 0.25 m are 250 litres, which weigh 246.25 kg.
+def test_measurements_show_the_box_dimensions(shape, texts):
+    # A box of 0.5 x 2 x 0.25 m has 250 litres and weighs 246.25 kg.
     assert _said(shape, texts) == {
         "Height": "2.000 m",
         "Volume": "250.0 litres",
@@ -207,7 +207,7 @@ def test_open_mesh_has_no_volume(shape, texts):
     shape.state.actor.figure = replace(figure, mesh=mesh)
     texts.clear()
     shape.step()
-    # The two triangles of one side are missing, whose outline has four edges.
+    # The two triangles of one side are missing; its outline has four edges.
     assert "none: open mesh (4 boundary edges)" in texts and "Mass" not in texts
 
 
@@ -219,7 +219,7 @@ def test_doubled_vertices_do_not_open_a_mesh(shape):
     assert (found.n_open_edges, found.mass) == (0, pytest.approx(246.25, abs=1e-9))
 
 
-def test_read_outs_measure_the_rest_pose(shape, texts):
+def test_measurements_are_those_of_the_rest_pose(shape, texts):
     before = _said(shape, texts)
     shape.state.actor.pose.dofs[:] = 0.7
     shape.state.actor.pose.figure_scale = 2.0
@@ -227,7 +227,7 @@ def test_read_outs_measure_the_rest_pose(shape, texts):
 
 
 @pytest.mark.parametrize("kind", ["smplx", "flame"])
-def test_expressions_have_a_group_of_their_own(drive_body, texts, kind):
+def test_expressions_have_a_separate_group(drive_body, texts, kind):
     hand = drive_body(kind, n_shapes=10, n_expressions=4)
     hand.show_panel("Shape")
     texts.clear()
@@ -247,7 +247,7 @@ def test_models_without_a_face_have_no_expressions(drive_body, texts, kind):
     assert "Shape" in texts and "Expression" not in texts
 
 
-def test_hundreds_of_coefficients_draw_only_the_rows_in_sight(drive_body):
+def test_only_visible_rows_of_hundreds_of_coefficients_are_drawn(drive_body):
     hand = drive_body("smplx", n_shapes=300, n_expressions=100, size=(1000, 640))
     hand.show_panel("Shape")
     assert hand.state.actor.figure.n_shapes == 400
@@ -304,7 +304,7 @@ def morphed(drive, rig):
     return hand
 
 
-def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
+def test_morphs_have_named_sliders_from_0_to_1(morphed, texts):
     texts.clear()
     morphed.step()
     assert "Morphs" in texts and "Shape" not in texts
@@ -312,7 +312,7 @@ def test_morphs_have_sliders_from_0_to_1_by_their_names(morphed, texts):
     for fraction in (0.25, 1.0, 1.3):
         _drag(morphed, 0, fraction)
         assert _weights(morphed)[0] == pytest.approx(min(fraction, 1.0), abs=0.02)
-    assert morphed.undo_steps == 2  # nothing changes beyond the end
+    assert morphed.undo_steps == 2  # the value stops at the end of the slider
     height = _rest(morphed).mesh.positions[0] - morphed.state.actor.figure.mesh.positions[0]
     assert_allclose(height, [0, 1, 0], atol=1e-6)
 
@@ -326,7 +326,7 @@ def test_typed_morph_weight_is_unlimited_and_resets(morphed):
     assert _weights(morphed).tolist() == [0, 0]
 
 
-def test_reset_returns_to_the_weights_of_the_file(morphed):
+def test_reset_restores_the_weights_of_the_file(morphed):
     figure = morphed.state.actor.figure
     shapes = replace(figure.blend_shapes, rest_weights=np.array([0.25, 0.0]))
     morphed.state.actor.figure = replace(figure, blend_shapes=shapes)
@@ -341,7 +341,7 @@ def test_reset_returns_to_the_weights_of_the_file(morphed):
 
 
 def _with_ranges(hand):
-    """Give the box two phenotypes: 0.5 is their mean, and one has a lower minimum."""
+    """Give the box two phenotypes with mean 0.5, one of them with a lower minimum."""
     figure = hand.state.actor.figure
     ranged = replace(
         figure.blend_shapes,
@@ -351,7 +351,7 @@ def _with_ranges(hand):
     hand.state.actor.figure = replace(figure, blend_shapes=ranged)
 
 
-def test_sliders_with_ranges_show_their_own_numbers(shape):
+def test_sliders_with_ranges_show_values_in_their_range(shape):
     _with_ranges(shape)
     shape.step(2)
     _drag(shape, 0, 1.4)

@@ -14,7 +14,7 @@ from viewer.app.posing.move_tool import shift_text
 
 @pytest.fixture
 def tooltips(monkeypatch):
-    """Tooltip texts, latest last."""
+    """Tooltip texts in the order in which they were shown."""
     said = []
     show = imgui.set_tooltip
     monkeypatch.setattr(imgui, "set_tooltip", lambda text: (said.append(text), show(text))[1])
@@ -46,7 +46,7 @@ def sliders(monkeypatch):
         ("degrees", "arm.x", "unlimited"),
     ],
 )
-def test_tooltip_gives_limits_in_the_unit_of_the_panel(hand, tooltips, unit, dof, said):
+def test_tooltip_shows_limits_in_the_unit_of_the_panel(hand, tooltips, unit, dof, said):
     hand.click(unit)
     hand.move(dof)
     hand.step(1)
@@ -54,7 +54,7 @@ def test_tooltip_gives_limits_in_the_unit_of_the_panel(hand, tooltips, unit, dof
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("degrees", math.degrees(1.0)), ("radians", 1.0)])
-def test_copied_value_is_the_one_that_is_shown(hand, unit, factor):
+def test_copied_value_equals_the_shown_value(hand, unit, factor):
     hand.click(unit)
     hand.state.actor.pose.dofs[hand.dof_index("arm.x")] = 0.75
     hand.step(2)
@@ -64,17 +64,17 @@ def test_copied_value_is_the_one_that_is_shown(hand, unit, factor):
 
 
 @pytest.mark.parametrize("value", [-0.0, -1e-5])
-def test_sliders_show_no_minus_before_a_zero(hand, sliders, value):
+def test_sliders_show_no_negative_zero(hand, sliders, value):
     row = hand.dof_index("arm.x")
     hand.state.actor.pose.dofs[row] = value
     hand.step(2)
     assert sliders[f"##dof{row}"] == "0.0\N{DEGREE SIGN}"
-    assert hand.state.actor.pose.dofs[row] == value  # only what is shown is rounded
+    assert hand.state.actor.pose.dofs[row] == value  # only the shown value is rounded
     hand.click("radians")
     assert sliders[f"##dof{row}"] == "0.0000 rad"
 
 
-def test_timeline_and_status_show_no_minus_before_a_zero(drive, rig, tmp_path, texts):
+def test_timeline_and_status_show_no_negative_zero(drive, rig, tmp_path, texts):
     (tmp_path / "wave.anim").write_text(clip_text())
     hand = drive(*rig, tmp_path / "wave.anim", size=SIZE, samples=1)
     hand.state.clock.mode = "run on"
@@ -100,7 +100,7 @@ def test_raw_pose_values_have_no_negative_zero(box, texts):
     assert shown == {"file: 0.0000  0.0000  0.0000"}
 
 
-def test_curves_are_fitted_again_when_the_unit_changes(curves):
+def test_curve_view_is_fitted_again_when_the_unit_changes(curves):
     heights = [_center(curves, f"key arm.x {key}")[1] for key in (0, 1, 2)]
     curves.click("radians")
     curves.step(3)

@@ -31,7 +31,7 @@ def arm(drive):
 
 @pytest.fixture
 def moved(drive):
-    """A test driver on an arm with a keyed clip, with the tool Rotate at its shoulder."""
+    """A test driver on an arm with a keyed clip, and with the tool Rotate at the shoulder."""
     scene = arm_scene()
     scene.actors[0].clip = waving()
     hand = drive(scene=scene, size=SIZE, samples=1)
@@ -79,7 +79,7 @@ def test_axes_are_chosen_by_key_and_list(arm):
     assert arm.state.of(Posing).orientation == "world"
 
 
-def test_chain_length_ranges_from_one_to_the_depth(arm):
+def test_chain_length_ranges_from_one_to_the_depth_of_the_joint(arm):
     arm.key("d")
     arm.state.selected_joint = 2
     arm.step(2)
@@ -131,7 +131,7 @@ def test_small_views_hide_the_toolbar(drive):
     hand.assert_sane()
 
 
-def test_mirror_button_mirrors_and_is_undone(drive_body):
+def test_mirror_button_mirrors_the_pose_and_can_be_undone(drive_body):
     hand = drive_body(size=SIZE)
     hand.key("e")
     hand.step(2)
@@ -178,7 +178,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     assert not moved.says("Paused") and moved.undo_steps == 0
 
 
-def test_key_button_adds_the_pose_to_the_clip_and_is_undone(moved):
+def test_key_button_adds_the_pose_to_the_clip_and_can_be_undone(moved):
     moved.state.clock.seek(1.0)
     moved.step(2)
     turn(moved, held="ctrl")
@@ -236,7 +236,7 @@ def test_pose_is_pasted_as_rotations_if_dofs_differ(two):
     assert not two.dofs().any()
 
 
-def test_text_from_other_programs_is_matched_by_labels(two):
+def test_pasted_text_from_other_programs_is_matched_by_labels(two):
     two.key("c", "ctrl")
     imgui.set_clipboard_text('{"dofs": {"elbow.z": 0.25}}')
     two.state.choose_actor(1)
@@ -244,7 +244,7 @@ def test_text_from_other_programs_is_matched_by_labels(two):
     assert two.dof("elbow.z") == 0.25
 
 
-def test_actor_without_a_common_joint_refuses_the_pose(drive):
+def test_pose_without_a_common_joint_is_refused(drive):
     first, second = arm_figure(name="first"), arm_figure(orders=("x", "y", "z"), name="second")
     object.__setattr__(second.skeleton, "names", ("a", "b", "c"))
     hand = drive(scene=Scene([Actor(first), Actor(second)]), size=SIZE, samples=1)

@@ -1,4 +1,4 @@
-"""Preferences: applied while the window runs, stored, read with care, and reset."""
+"""Preferences: applied while the window runs, stored, validated when read, and reset."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CHANGED = Preferences("light", 1.5, 18.0, False, "draft", 8, "z", {WIREFRAME: "S
 
 @pytest.fixture
 def shown(drive, rig):
-    """A test driver on an app with the window open."""
+    """A test driver on an app with the preferences window open."""
     hand = drive(*rig, size=(1280, 1000), samples=1)
     hand.key("comma", "ctrl")
     hand.step(3)
@@ -40,7 +40,7 @@ def luminance():
     return sum(list(imgui.get_style().color_(imgui.Col_.window_bg))[:3]) / 3.0
 
 
-def test_stored_preferences_come_back():
+def test_stored_preferences_are_restored():
     assert load_preferences() == Preferences()
     assert save_preferences(CHANGED) == ""
     assert load_preferences() == CHANGED
@@ -61,7 +61,7 @@ def test_stored_preferences_come_back():
         {"quality": None},
     ],
 )
-def test_invalid_entry_gets_its_default_and_the_others_stay(wrong):
+def test_invalid_entry_is_replaced_by_its_default_only(wrong):
     save_preferences(CHANGED)
     preferences_file().write_text(json.dumps(asdict(CHANGED) | wrong))
     (name,) = wrong
@@ -69,13 +69,13 @@ def test_invalid_entry_gets_its_default_and_the_others_stay(wrong):
 
 
 @pytest.mark.parametrize("text", ["", "null", "[]", "{", '"text"'])
-def test_unreadable_file_gives_the_defaults(text):
+def test_unreadable_file_is_replaced_by_the_defaults(text):
     save_preferences(CHANGED)
     preferences_file().write_text(text)
     assert load_preferences() == Preferences()
 
 
-def test_theme_is_applied_at_once_and_stored(shown):
+def test_theme_is_applied_immediately_and_stored(shown):
     assert luminance() < 0.3
     shown.pick("Theme", 1)
     assert luminance() > 0.8
@@ -85,9 +85,9 @@ def test_theme_is_applied_at_once_and_stored(shown):
     assert load_preferences() == Preferences()
 
 
-def test_scale_is_applied_at_once_unless_one_was_given(shown):
+def test_scale_is_applied_immediately_unless_given_by_option(shown):
     before = height(shown)
-    shown.pick("Interface scale", 2)  # 100 % as the monitor's
+    shown.pick("Interface scale", 2)  # 100 %, like the monitor
     shown.pick("Interface scale", 4)
     shown.step(2)
     assert height(shown) == pytest.approx(1.5 * before, rel=0.1)
@@ -111,7 +111,7 @@ def test_font_size_and_unit_are_applied(shown):
     assert not shown.state.in_degrees
 
 
-def test_key_is_chosen_by_pressing_it(shown):
+def test_shortcut_is_chosen_by_pressing_it(shown):
     shown.click(f"key {WIREFRAME}")
     shown.key("p", "shift")
     shown.step(2)
@@ -127,7 +127,7 @@ def test_key_is_chosen_by_pressing_it(shown):
     assert not shown.state.options.wireframe
 
 
-def test_buttons_name_the_key_that_was_chosen(shown):
+def test_buttons_show_the_chosen_shortcut(shown):
     reset = next(key.name for key in KEYS if key.label == "R")
     shown.state.put(Preferences(keys={reset: "Ctrl+R"}))
     shown.step(2)
@@ -135,18 +135,18 @@ def test_buttons_name_the_key_that_was_chosen(shown):
     assert "Reset (R)" not in shown.state.item_rects
 
 
-def test_key_that_is_taken_is_reported_and_does_not_act_while_it_is_chosen(shown):
+def test_shortcut_in_use_is_reported_and_does_not_act_while_chosen(shown):
     shown.click(f"key {WIREFRAME}")
     shown.key("n")
     shown.step(2)
     assert not shown.state.options.normals
     found = conflicts(load_preferences().keys)
     assert set(found) == {WIREFRAME, next(key.name for key in KEYS if key.label == "N")}
-    shown.key("n")  # the first one listed runs
+    shown.key("n")  # the first action in the list runs
     assert shown.state.options.wireframe and not shown.state.options.normals
 
 
-def test_escape_ends_the_choice_of_a_key_and_then_closes_the_window(shown):
+def test_escape_first_cancels_the_choice_of_a_shortcut_and_then_closes_the_window(shown):
     shown.click(f"key {WIREFRAME}")
     shown.key("escape")
     shown.step(2)
@@ -155,7 +155,7 @@ def test_escape_ends_the_choice_of_a_key_and_then_closes_the_window(shown):
     assert not shown.state.of(Appearance).is_open
 
 
-def test_table_of_keys_has_no_conflicts_and_every_name_is_read_back():
+def test_default_shortcuts_have_no_conflicts_and_their_names_round_trip():
     assert conflicts({}) == {}
     for key in KEYS:
         for chord in key.chords:
@@ -164,7 +164,7 @@ def test_table_of_keys_has_no_conflicts_and_every_name_is_read_back():
     assert parse_chord("Ctrl+Nothing") == parse_chord("Hyper+A") == parse_chord("") == 0
 
 
-def test_shown_model_folder_is_the_chosen_one(shown, tmp_path, monkeypatch):
+def test_chosen_model_folder_is_shown(shown, tmp_path, monkeypatch):
     said = []
     monkeypatch.setattr(imgui, "text_disabled", said.append)
     shown.step()
@@ -175,7 +175,7 @@ def test_shown_model_folder_is_the_chosen_one(shown, tmp_path, monkeypatch):
     assert printable(tmp_path.resolve(), 60) in said and "none" not in said
 
 
-def test_given_scale_is_shown_and_kept(shown, monkeypatch):
+def test_scale_given_by_option_is_shown_without_changing_the_setting(shown, monkeypatch):
     asked = []
     monkeypatch.setattr(
         preferences_window, "choice", lambda *given: asked.append(given) or given[2]

@@ -21,7 +21,7 @@ from viewer.rig.motion.instances import pose_actors
 
 @pytest.fixture
 def moving(drive, rig):
-    """A test driver on the tiny figure whose root moves right, 0.5 a second, for a second."""
+    """A test driver on the tiny figure, whose root moves right at 0.5 per second for a second."""
     hand = drive(*rig, size=(1000, 700), samples=1, pixels_per_point=1.0)
     channel = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 0.5]), (("linear", "linear"),) * 2)
     hand.state.actor.clip = Clip("slide", (channel,), 0.0, 1.0)
@@ -58,13 +58,13 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     assert moving.state.of(Recording).settings is None
 
 
-def test_suffix_typed_over_the_name_chooses_the_kind_of_video(moving, tmp_path):
+def test_typed_suffix_selects_the_video_format(moving, tmp_path):
     settings = RecordSettings(size="own", own_size=(64, 64), rate=5.0)
     moving.state.of(Recording).settings = settings
     moving.step(2)
     moving.click("Save as…")
     moving.step(2)
-    moving.type("ada.gif")  # over the stem alone
+    moving.type("ada.gif")  # replaces only the stem
     moving.key("enter")
     finish(moving)
     assert settings.kind == ".gif"
@@ -72,7 +72,7 @@ def test_suffix_typed_over_the_name_chooses_the_kind_of_video(moving, tmp_path):
         assert picture.format == "GIF"
 
 
-def test_preview_is_kept_while_the_panels_still_show_it(moving):
+def test_preview_is_kept_as_long_as_the_panels_show_it(moving):
     moving.menu("menu File", "Record pictures or video…")
     moving.screen()
     moving.state.of(Recording).settings.size = "1080x1920"
@@ -85,7 +85,7 @@ def test_preview_is_kept_while_the_panels_still_show_it(moving):
     assert moving.app.context.error == "GL_NO_ERROR"
 
 
-def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
+def test_numbered_pictures_match_the_view_in_the_window(moving, tmp_path):
     (tmp_path / "out").mkdir()
     start(moving, tmp_path / "out" / "f_{frame:03}.png", kind="pictures", rate=4.0)
     finish(moving)
@@ -107,7 +107,7 @@ def test_numbered_pictures_show_what_the_window_shows(moving, tmp_path):
     assert np.diag(differences).max() < 2.0 < differences[0, 1]
 
 
-def test_annotations_and_legend_are_in_every_frame(moving, tmp_path):
+def test_annotations_and_legend_are_drawn_in_every_frame(moving, tmp_path):
     state = moving.state
     pin_vertex(state, 0, 4)
     state.selected_joint = 1
@@ -153,7 +153,7 @@ def test_annotations_follow_the_pose_of_each_frame(moving):
     assert marks.at(scene, (960, 720)) == []
 
 
-def test_dialog_offers_the_legend_where_there_is_one(moving):
+def test_dialog_offers_the_legend_only_if_there_is_one(moving):
     moving.state.of(Recording).settings = RecordSettings()
     moving.step(2)
     moving.click("Legend in pictures")
@@ -198,7 +198,7 @@ def test_video_has_every_frame(moving, tmp_path):
 
 def test_dialog_shows_the_frames_that_are_recorded(moving):
     state, settings = moving.state, RecordSettings()
-    # 7.6 frames: the last one that begins is number 7, even if the end is in single precision.
+    # In 7.6 frames the last one that begins is number 7, even if the end has single precision.
     for end, n_frames in ((7.6 / 30.0, 8), (float(np.float32(7.0 / 30.0)), 8), (6.9 / 30.0, 7)):
         state.clock.set_range(0.0, end)
         assert playback_frames(state) == (0, n_frames - 1)
@@ -222,7 +222,7 @@ def test_cancelling_leaves_no_files(moving, tmp_path):
     moving.step(3)
     assert moving.state.job is None
     assert list((tmp_path / "out").iterdir()) == []
-    assert moving.scene_picture().std() > 1.0  # the window still draws
+    assert moving.scene_picture().std() > 1.0  # the window keeps drawing
 
 
 def test_window_stays_responsive_while_recording(moving, tmp_path):
@@ -267,7 +267,7 @@ def test_existing_images_are_not_replaced(moving, tmp_path):
 
 
 def test_input_images_are_not_replaced(moving, tmp_path):
-    """Not opened directly: the figure's own file names it."""
+    """The texture is not opened directly; the file of the figure refers to it."""
     texture = tmp_path / "cloth.png"
     texture.write_bytes(b"precious")
     moving.state.scene.files = (texture,)

@@ -43,7 +43,7 @@ def partner(hand, label):
     return shown.source.labels[found] if found >= 0 else "", shown.origins[joint]
 
 
-def test_a_chosen_joint_drives_the_figure_immediately_and_can_be_undone(panel):
+def test_chosen_joint_drives_the_figure_immediately_and_can_be_undone(panel):
     hand, actor = panel, panel.state.actor
     elbow = actor.figure.skeleton.names.index("right_elbow")
     hand.state.clock.seek(0.1)
@@ -80,7 +80,7 @@ def test_a_chosen_joint_drives_the_figure_immediately_and_can_be_undone(panel):
     assert not np.allclose(wanted.rotations[:, elbow], actor.clip.rotations[:, elbow])
 
 
-def test_one_joint_may_drive_two_and_a_joint_may_stay_at_rest(panel):
+def test_one_joint_may_drive_two_joints_and_a_joint_may_stay_at_rest(panel):
     state = panel.state
     shown = shown_match(state)
     joint, arm = (shown.target.labels.index(name) for name in ("right_elbow", "left_elbow"))
@@ -92,14 +92,14 @@ def test_one_joint_may_drive_two_and_a_joint_may_stay_at_rest(panel):
     np.testing.assert_allclose(clip.rotations[:, arm], [[0, 0, 0, 1]] * 5, atol=1e-12)
 
 
-def test_hovering_marks_the_pair_in_table_and_drawing(panel):
+def test_hovering_highlights_the_pair_in_table_and_drawing(panel):
     view = panel.state.of(JointMatch)
     shown = shown_match(panel.state)
     knee, leg = shown.target.labels.index("left_knee"), shown.source.labels.index("LeftLeg")
     panel.move("joint left_knee")
     panel.step(2)
     assert view.hovered == ({knee}, {leg})
-    # The wrists, 0.84 apart, are 1.5 letters from the sides; the head is 1.44 above the ankles.
+    # The wrists, 0.84 apart, are 1.5 font sizes from the edges; the head is 1.44 above the ankles.
     x0, y0, x1, y1 = panel.state.item_rects["preview"]
     letter, half = imgui.get_font_size(), 0.5 * (x1 - x0)
     scale = (half - 3.0 * letter) / 0.84
@@ -142,12 +142,13 @@ def test_figures_without_a_driving_motion_have_no_panel(hand):
     assert "Joint match" not in hand.state.item_rects
 
 
-def test_undo_of_other_edits_keeps_a_motion_that_has_grown(panel):
+def test_undo_of_other_edits_keeps_frames_loaded_since(panel):
     state, actor = panel.state, panel.state.actor
     drive = replace(actor.drive)
     actor.color = (1.0, 0.0, 0.0)
     panel.step(2)
-    actor.clip, actor.drive = replace(actor.clip), drive  # as after another part of a capture
+    # As if another part of a capture had been loaded.
+    actor.clip, actor.drive = replace(actor.clip), drive
     state.history.add_actors(state.scene, state.options)
     panel.key("z", "ctrl")
     panel.step(2)

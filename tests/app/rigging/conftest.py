@@ -13,13 +13,13 @@ from viewer.app.rigging.sources import current_template
 
 @pytest.fixture
 def rigging(drive):
-    """A test driver showing the mesh with its aligned template, the Rig panel open."""
+    """A test driver on the mesh with its aligned template and the Rig panel open."""
 
     def opened(placed=True, **settings):
         hand = drive(scene=rig_scene.scene(**settings), size=SIZE, samples=1)
         hand.menu("menu Window", "Rig")
         hand.step(2)
-        if placed:  # searching takes seconds
+        if placed:  # the search takes seconds
             move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
             hand.step(2)
         return hand

@@ -1,4 +1,4 @@
-"""Contents of the Rig panel."""
+"""Queries and steps for tests of the Rig panel."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def seen(hand, row):
 
 
 def stop(hand):
-    """End the motion that plays after Run: the result has the target's pose."""
+    """Stop the motion that plays after Run, so that the result has the target's pose."""
     hand.state.clock.playing = False
     for label in ("Trial motion", "Move like the template"):
         result = next(iter(hand.state.of(Rigging).results.values()))

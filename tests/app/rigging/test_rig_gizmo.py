@@ -34,12 +34,12 @@ pytestmark = pytest.mark.usefixtures("quick_fits")
 
 @pytest.fixture
 def hand(drive):
-    """A test driver on an app with mesh and template, the panel open; the camera looks along -z."""
+    """A test driver on mesh and template with the panel open and the camera looking along -z."""
     opened = drive(scene=rig_scene.scene(), size=(1000, 1000), samples=1)
     opened.menu("menu Window", "Rig")
     opened.step(2)
     opened.key("_1")
-    opened.key("_5")  # orthographic: screen distances do not depend on depth
+    opened.key("_5")  # orthographic, so that screen distances do not depend on depth
     opened.key("f")
     return opened
 
@@ -101,7 +101,7 @@ def test_arrow_moves_the_template_along_its_axis_and_does_not_orbit(hand):
 def test_ring_rotates_the_template_about_its_middle(hand):
     hand.click("rig tool rotate")
     before, (center, place) = similarity(hand), middle(hand)
-    # The ring about z, which points at the eye, by 90 degrees.
+    # Rotate by 90 degrees with the ring about z, which points at the eye.
     radius = next(
         r for r in range(30, 200, 2) if hovers(hand, place + r * np.array([1, -1]) / 2**0.5)
     )
@@ -151,7 +151,8 @@ def test_drag_is_one_undo_step_including_its_error(hand):
 
 
 def test_moved_template_keeps_its_fitted_pose_but_not_its_residual(hand):
-    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2  # the target's tip is bent more
+    # The tip of the target is bent further.
+    hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
     hand.step(2)
     hand.click("Align")
     hand.finish_job()
@@ -214,7 +215,7 @@ def test_ring_scales_the_template_as_a_whole(hand):
     assert hand.state.camera.azimuth == camera
 
 
-def test_drag_outside_the_gizmo_still_orbits(hand):
+def test_drag_outside_the_gizmo_orbits(hand):
     hand.click("rig tool move")
     azimuth = hand.state.camera.azimuth
     x, y, width, height = hand.state.view_rect
@@ -239,7 +240,7 @@ def test_typed_values_place_the_template(hand):
     assert x1 > x0
 
 
-def test_refining_converges_from_nearby(hand):
+def test_refinement_converges_from_a_nearby_alignment(hand):
     near = TRUE.copy()
     near[:3, 3] += 1.0
     template = current_template(hand.state)
@@ -293,7 +294,7 @@ def faces_eye(hand, mesh, matrix, triangle):
     return depths[beside < size].min() > depths[triangle] - size
 
 
-def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
+def test_landmarks_can_be_clicked_listed_deleted_and_fitted(hand, texts):
     hand.click("rig tool landmarks")
     hand.step(2)
     state, template = hand.state, current_template(hand.state)
@@ -304,12 +305,12 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
         if faces_eye(hand, posed, ghost, triangle)
         and faces_eye(hand, target_mesh(state), np.eye(4), triangle)
     ]
-    assert len(wanted) >= 4  # seen from the front on both
+    assert len(wanted) >= 4  # visible from the front on both meshes
     chosen = [wanted[0], wanted[len(wanted) // 3], wanted[2 * len(wanted) // 3], wanted[-1]]
     orbit = state.camera.azimuth
     for number, triangle in enumerate(chosen, start=1):
         if number == 3:
-            hand.click("Align by landmarks")  # greyed: one more is needed
+            hand.click("Align by landmarks")  # greyed, because one more landmark is needed
             assert state.job is None
         click_pair(hand, triangle)
         assert len(state.of(Rigging).landmarks) == number and state.of(Rigging).pending is None
@@ -318,7 +319,7 @@ def test_landmarks_are_clicked_listed_deleted_and_fitted(hand, texts):
     hand.click("Align by landmarks")
     hand.finish_job()
     assert state.error == "" and state.of(Rigging).placing.alignment.how == "landmarks"
-    # A click hits a point to half a pixel, of some 15 to a unit of a mesh 60 units long.
+    # A click is accurate to half a pixel; 15 pixels are a unit of the mesh, which is 60 units long.
     assert similarity(hand).scale == pytest.approx(30.0, rel=0.03)
     assert_allclose(similarity(hand).rotation, TRUE[:3, :3] / 30.0, atol=0.05)
     hand.click("delete landmark 1")
@@ -347,7 +348,7 @@ def test_clicks_outside_the_meshes_and_escape_add_no_landmark(hand):
     assert hand.state.of(Rigging).tool == ""
 
 
-def test_matrices_are_projected_to_similarities():
+def test_matrices_are_projected_onto_similarities():
     turned = rig_scene.ROTATION
     matrix = translation_matrix(np.array([1.0, 2.0, 3.0]))
     matrix[:3, :3] = 2.0 * turned + 1e-5

@@ -1,4 +1,4 @@
-"""The Rig panel by mouse and keys: choose, align, match, run, compare, save."""
+"""The Rig panel, used by mouse and keys: choose, align, match, run, compare, save."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_alignment_is_found_and_shown_with_its_error(rigging, texts):
 )
 def test_text_next_to_the_error_describes_the_alignment(rigging, texts, factors, own, words):
     hand = rigging()
-    hand.finish_job()  # the error of the alignment is being measured
+    hand.finish_job()  # the error of the alignment is still being measured
     placing = placing_now(hand.state)
     where = replace(placing.similarity, factors=np.array(factors), own_factors=np.array(own))
     found = Alignment(where, 0.0015, 0.002, (0.001, 0.001), "fit")
@@ -106,10 +106,10 @@ def test_template_posed_after_aligning_says_so(rigging, texts):
     assert "the template was posed after the alignment: align it again" in texts
 
 
-def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
+def test_match_is_coloured_before_the_target_is_rigged(rigging, texts):
     hand = rigging(placed=False)
     assert "Colours" not in hand.state.item_rects
-    hand.click("Show match")  # greyed: not aligned yet
+    hand.click("Show match")  # greyed, because the template is not aligned yet
     assert hand.state.job is None
     move_by_hand(hand.state, current_template(hand.state), as_similarity(TRUE))
     hand.step(2)
@@ -133,7 +133,7 @@ def test_match_is_coloured_before_anything_is_rigged(rigging, texts):
 
 def test_match_counts_close_vertices_with_similar_normals(rigging):
     hand = rigging()
-    # The template is offset by a tenth of the target's size: nothing is within 1 %.
+    # The template is offset by a tenth of the target's size, so no vertex is within 1 %.
     placing = hand.state.of(Rigging).placing.similarity
     away = placing.matrix.copy()
     away[:3, 3] += 10.0
@@ -145,7 +145,7 @@ def test_match_counts_close_vertices_with_similar_normals(rigging):
     assert hand.state.of(Rigging).match_fraction < 0.35
 
 
-def test_stretch_is_kept_when_the_template_is_moved_and_run(rigging):
+def test_stretch_is_kept_when_the_template_is_moved_before_run(rigging):
     hand = rigging()
     stretch = np.array([1.25, 1.0, 0.8])
     stretched = replace(placing_now(hand.state).similarity, own_factors=stretch)
@@ -185,7 +185,7 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     first = hand.state.actor.clip.start
     hand.state.clock.seek(first)
     hand.step(2)
-    # The trial motion begins in the target's pose.
+    # The trial motion starts in the target's pose.
     assert_allclose(seen(hand, 0), wanted, atol=1e-8)
     hand.key("z", "ctrl")
     hand.step(2)
@@ -197,7 +197,7 @@ def test_run_replaces_the_target_with_the_rigged_mesh_in_one_step(rigging):
     hand.assert_sane()
 
 
-def test_report_says_how_the_alignment_was_found(rigging, texts):
+def test_report_states_how_the_alignment_was_found(rigging, texts):
     hand = rigging(placed=False)
     hand.state.scene.actors[1].pose.dofs[6:] = 0.2, -0.1, 0.2
     hand.step(2)
@@ -212,7 +212,7 @@ def test_report_says_how_the_alignment_was_found(rigging, texts):
     assert rigged.lines[2:4] == hand.state.of(Rigging).placing.lines
 
 
-def test_stats_count_the_rigged_mesh(rigging, texts):
+def test_stats_include_the_rigged_mesh(rigging, texts):
     hand = rigging()
     hand.click("Run")
     hand.finish_job()
@@ -221,7 +221,7 @@ def test_stats_count_the_rigged_mesh(rigging, texts):
     assert "scan rigged, arm, scan" in texts and "4" in texts  # joints: two of each rig
 
 
-def test_a_toggles_between_mesh_and_rig_without_undo_steps(rigging):
+def test_a_key_toggles_between_mesh_and_rig_without_undo_steps(rigging):
     hand = rigging()
     hand.key("a")
     assert hand.says("A/B: nothing is rigged yet, see Window > Rig")
@@ -255,7 +255,7 @@ def test_both_methods_are_compared(rigging, texts):
     assert visible(hand) == ["scan rigged", "arm"]
     results = hand.state.of(Rigging).results
     assert list(results) == ["robust", "nearest"]
-    # An independent sum over dense rows.
+    # The expected values are an independent sum over dense rows.
     dense = []
     for result in results.values():
         skin = result.rigged.figure.skin
@@ -280,7 +280,7 @@ def names_of(expected):
     return ["scan", "scan rigged", "scan rigged (nearest)"].index(expected)
 
 
-def test_confidence_maps_are_buttons(rigging):
+def test_confidence_maps_are_shown_by_buttons(rigging):
     hand = rigging()
     hand.click("Run")
     hand.finish_job()
@@ -320,7 +320,7 @@ def test_result_plays_the_template_motion_at_the_target_position(rigging):
     assert hand.undo_steps >= 2
 
 
-def test_template_without_motion_says_why_nothing_moves(rigging):
+def test_template_without_motion_states_why_the_result_does_not_move(rigging):
     hand = rigging()
     hand.click("Run")
     hand.finish_job()
@@ -329,7 +329,7 @@ def test_template_without_motion_says_why_nothing_moves(rigging):
     assert hand.state.actor.clip is None
 
 
-def test_cancelled_work_changes_nothing(rigging):
+def test_cancelled_work_does_not_change_the_scene(rigging):
     hand = rigging()
     before = names(hand)
     hand.click("Run")
@@ -353,7 +353,7 @@ def test_result_for_a_removed_mesh_is_discarded(rigging):
     assert names(hand) == ["arm"]
 
 
-def test_new_scene_keeps_only_the_settings(rigging, rig):
+def test_new_scene_keeps_only_the_rig_settings(rigging, rig):
     hand = rigging()
     hand.pick("Method", 1)
     hand.click("Run")

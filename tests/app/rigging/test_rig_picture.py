@@ -33,7 +33,7 @@ def _result(hand):
 @pytest.mark.parametrize(("name", "prepare"), [("rig", _aligned), ("rigged", _result)])
 def test_rig_panel_matches_golden_image(drive, name, prepare):
     hand = drive(scene=rig_scene.scene(), size=SIZE, samples=1, pixels_per_point=1.0)
-    hand.state.of(ShownPanels).closed.add("stats")  # times differ between runs
+    hand.state.of(ShownPanels).closed.add("stats")  # the displayed times differ between runs
     hand.menu("menu Window", "Rig")
     hand.step(2)
     _compare(_shown(hand, prepare), name)

@@ -44,7 +44,7 @@ def test_missing_scipy_shows_a_message(rigging, monkeypatch):
     assert names(hand) == ["scan", "arm"]
 
 
-def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
+def test_settings_are_used_by_alignment_and_transfer(rigging, monkeypatch):
     asked = {}
 
     def placed(template, own, target, settings, fits, tell):
@@ -83,7 +83,7 @@ def test_settings_reach_alignment_and_transfer(rigging, monkeypatch):
     assert (settings.weights.smoothing_rounds, settings.weights.max_influences) == (7, 3)
 
 
-def test_advanced_settings_are_folded_away_and_counted(rigging, texts, monkeypatch):
+def test_advanced_settings_are_collapsed_and_changed_ones_counted(rigging, texts, monkeypatch):
     titles, draw = [], imgui.tree_node
     monkeypatch.setattr(imgui, "tree_node", lambda text: titles.append(text) or draw(text))
     hand = rigging(placed=False)
@@ -118,10 +118,11 @@ def test_progress_shows_step_and_fraction(rigging, texts, monkeypatch):
     hand.finish_job()
 
 
-def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
+def test_template_is_posed_to_fit_and_shown_in_the_fitted_pose(rigging, texts):
     hand = rigging(placed=False)
     actor = hand.state.scene.actors[1]
-    actor.pose.dofs[6:] = 0.2, -0.1, 0.2  # the tip of the target is rotated by another half radian
+    # The tip of the target is rotated by a further half radian.
+    actor.pose.dofs[6:] = 0.2, -0.1, 0.2
     hand.step(2)
     hand.click("Align")
     hand.finish_job()
@@ -136,7 +137,7 @@ def test_template_is_posed_to_fit_and_shown_in_that_pose(rigging, texts):
     wanted = target_mesh(state).positions
     gaps = [np.linalg.norm(points - wanted, axis=1).max() for points in (shown, own)]
     assert gaps[0] < 0.2 * gaps[1]
-    assert actor.pose.dofs[8] == 0.2  # the actor is unchanged
+    assert actor.pose.dofs[8] == 0.2  # the pose of the actor is unchanged
     hand.click("Run")
     hand.finish_job()
     stop(hand)
@@ -169,7 +170,8 @@ def test_mesh_is_added_by_dialog_and_the_body_is_loaded_on_demand(drive, tmp_pat
     assert names(hand) == ["fox", "scan", "fox-2"]
     chosen = hand.state.scene.actors[2]
     assert hand.state.of(Rigging).template_key == f"actor {id(chosen)}"
-    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()  # in addition to the others
+    # The new mesh is placed next to the existing actors.
+    assert seen(hand, 2)[:, 0].min() > seen(hand, 1)[:, 0].max()
     hand.key("z", "ctrl")
     hand.step(2)
     assert names(hand) == ["fox", "scan"]
@@ -183,12 +185,12 @@ def test_template_from_a_file_is_unchanged_by_fitting(drive, tmp_path):
     hand = drive(scene=rig_scene.scene(with_template=False), size=SIZE, samples=1)
     hand.menu("menu Window", "Rig")
     hand.step(2)
-    assert hand.state.of(Rigging).template_key == "body"  # there is no other
+    assert hand.state.of(Rigging).template_key == "body"  # there is no other template
     save(rig_scene.bent()[0], tmp_path / "arm.npz")
     start_reading(hand.state, (tmp_path / "arm.npz",))
     hand.finish_job()
     template = hand.state.of(Rigging).template
-    hand.click("Run")  # aligns the resting template and rotates its joints
+    hand.click("Run")  # aligns the template in its rest pose and rotates its joints
     hand.finish_job()
     assert hand.state.of(Rigging).template is template
     assert placing_now(hand.state).fitted is not None

@@ -1,4 +1,4 @@
-"""Trial motion: one joint after the other, within limits, back to the initial pose."""
+"""Trial motion: each joint in turn bends within its limits and returns to the initial pose."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.app.rigging.trial_motion import trial_clip
 from viewer.rig.motion.clip_sampling import sample
 
 
-def test_joints_bend_in_turn_and_return(tmp_path):
+def test_joints_bend_one_after_another_and_return(tmp_path):
     actor = viewer.load(*write_rig(tmp_path)).actors[0]
     skeleton, pose = actor.figure.skeleton, actor.pose
     clip = trial_clip(skeleton, pose)

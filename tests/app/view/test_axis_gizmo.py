@@ -1,4 +1,4 @@
-"""The axis gizmo: a click looks along an axis within a fifth of a second, a drag orbits."""
+"""The axis gizmo: a click turns the camera to an axis within a fifth of a second; a drag orbits."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def seen(drive, rig):
 
 
 def end_of(hand, axis, sign=1):
-    """Return where the end of an axis is drawn: x to the right, y up as the camera sees them."""
+    """Return the window position of an axis end; the camera sees x to the right and y up."""
     x, y = hand.place("axis gizmo")
     right, up, _ = camera_axes(hand.state.camera)
     return x + sign * ARM * right[axis], y - sign * ARM * up[axis]
@@ -34,7 +34,7 @@ def backward(hand):
 
 
 @pytest.mark.parametrize(("axis", "sign"), [(0, 1), (1, 1), (2, 1), (0, -1), (1, -1), (2, -1)])
-def test_click_on_an_end_looks_from_there(seen, axis, sign):
+def test_click_on_an_axis_end_looks_from_there(seen, axis, sign):
     seen.click(end_of(seen, axis, sign))
     assert seen.state.of(Flight).is_active
     seen.step(12)
@@ -51,7 +51,7 @@ def test_second_click_looks_from_the_other_side(seen):
     assert (seen.state.camera.azimuth, seen.state.camera.inclination) == VIEWS["back"]
 
 
-def test_camera_keeps_fitting_after_the_flight_and_moves_on_the_way(seen):
+def test_camera_moves_gradually_and_fits_the_view_after_its_move(seen):
     seen.key("f")
     angles = []
     seen.menu("menu View", "Left view")
@@ -62,7 +62,7 @@ def test_camera_keeps_fitting_after_the_flight_and_moves_on_the_way(seen):
     assert seen.state.framing.is_fitting
 
 
-def test_orbiting_ends_a_flight(seen):
+def test_orbiting_stops_a_camera_move(seen):
     fly_to(seen.state, "left")
     x, y = seen.middle
     seen.pull((x, y), (x + 40, y))
@@ -77,7 +77,7 @@ def test_drag_orbits_twice_as_fast_as_in_the_view(seen):
     assert seen.state.camera.inclination == pytest.approx(25.0 - 9.0)
 
 
-def test_gizmo_selects_nothing_under_it_and_goes_with_the_panels(seen):
+def test_gizmo_click_selects_nothing_and_hiding_panels_hides_the_gizmo(seen):
     seen.state.selected_joint = 1
     seen.click(seen.place("axis gizmo"))
     assert seen.state.selected_joint == 1
@@ -89,7 +89,7 @@ def test_gizmo_selects_nothing_under_it_and_goes_with_the_panels(seen):
 def test_gizmo_follows_the_up_axis(seen):
     seen.state.camera.up = "z"
     seen.step(2)
-    # z points up wherever the camera stands.
+    # z points up for every camera position.
     assert end_of(seen, 2)[1] < seen.place("axis gizmo")[1] - 20
     seen.click(end_of(seen, 2))
     seen.step(15)

@@ -1,4 +1,4 @@
-"""Outlines and names of objects that a click would select, and joints that are easy to hit."""
+"""Outlines and names of objects that a click would select, and the pick distance of joints."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_joint_near_the_pointer_is_outlined_and_selected_by_a_click(bones):
     assert bones.state.of(Hovered).joint == -1
 
 
-def test_joints_that_are_not_shown_are_not_hovered(hand):
+def test_hidden_joints_are_not_hovered(hand):
     hand.move(beside(hand, 1, 2.0))
     hand.step(10)
     assert hand.state.of(Hovered).joint == -1 and not keys(hand)
@@ -76,7 +76,7 @@ def test_outlines_are_seen_in_the_window_but_not_in_pictures(bones):
     assert (bones.screen()[rows, columns] != with_outline).any()
 
 
-def test_actor_is_outlined_once_it_was_chosen_among_several(pair):
+def test_chosen_actor_among_several_is_outlined(pair):
     assert not keys(pair)
     pair.state.select_actor(1)
     pair.step()
@@ -93,7 +93,7 @@ def test_actor_under_a_resting_pointer_is_outlined(pair):
 
 
 @pytest.mark.parametrize(("away", "orbits"), [(16.0, False), (60.0, True)])
-def test_drag_beside_a_ring_does_not_orbit(bones, away, orbits):
+def test_drag_next_to_a_ring_does_not_orbit(bones, away, orbits):
     bones.state.selected_joint = 1
     bones.key("e")
     bones.step(2)

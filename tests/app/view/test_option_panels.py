@@ -24,7 +24,7 @@ def _show_lights(hand):
 
 
 @pytest.mark.parametrize("shown", SHOWN)
-def test_radio_button_chooses_what_is_shown(tall, shown):
+def test_radio_button_chooses_the_shown_parts(tall, shown):
     tall.state.options.show = "skeleton" if shown == "skin" else "skin"
     tall.step(2)
     before = tall.scene_picture()
@@ -79,7 +79,7 @@ def test_shading_is_chosen_from_a_list(tall):
         assert tall.state.options.shading == name
 
 
-def test_shadings_show_what_they_need(tall):
+def test_shadings_show_the_widgets_they_use(tall):
     tall.pick("Shading", list(SHADING_CHOICES).index("matcap"))
     assert "Roughness" not in tall.state.item_rects
     tall.pick("Matcap", list(MATCAPS).index("chrome"))
@@ -165,7 +165,7 @@ def test_orthographic_box_switches_the_projection(tall):
 
 @pytest.mark.parametrize("light", ["Key", "Rim"])
 @pytest.mark.parametrize("part", ["Strength", "Azimuth", "Elevation"])
-def test_light_slider_changes_its_light_only(tall, light, part):
+def test_light_slider_changes_only_its_light(tall, light, part):
     _show_lights(tall)
     tall.drag(f"{light} {part}", 0.9)
     lights, usual = tall.state.options.lights, Lights()
@@ -190,7 +190,7 @@ def test_light_slider_is_one_step_and_can_be_reset(tall, part):
     assert tall.state.options.lights != Lights()
 
 
-def test_lights_can_stay_with_the_scene(tall):
+def test_lights_can_be_fixed_to_the_scene(tall):
     _show_lights(tall)
     tall.click("Follow the camera")
     assert not tall.state.options.lights.follow_camera
@@ -202,7 +202,7 @@ def test_light_colour_is_picked(tall):
     x0, y0, _x1, y1 = tall.state.item_rects["Key light"]
     tall.click((x0 + 5, (y0 + y1) / 2))
     tall.step(3)
-    x, y = x0 + 60, y1 + 60  # in the square of the picker below
+    x, y = x0 + 60, y1 + 60  # in the square of the colour picker below
     tall.pull((x, y), (x + 30, y + 20))
     assert tall.state.options.lights.key.color != before
     assert tall.state.options.lights.rim == Lights().rim
@@ -230,7 +230,7 @@ def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     assert vertices() == "12"
 
 
-def test_vertex_colours_have_a_check_box_where_there_are_some(drive, tmp_path):
+def test_check_box_of_vertex_colours_appears_if_there_are_any(drive, tmp_path):
     rows = "0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"
     names = [f"float {name}" for name in "xyz"] + [
         f"uchar {name}" for name in ("red", "green", "blue")
@@ -248,5 +248,5 @@ def test_vertex_colours_have_a_check_box_where_there_are_some(drive, tmp_path):
     assert (hand.scene_picture() != before).any()
 
 
-def test_vertex_colours_have_no_check_box_without_any(tall):
+def test_check_box_of_vertex_colours_is_hidden_if_there_are_none(tall):
     assert "Vertex colours" not in tall.state.item_rects

@@ -86,7 +86,7 @@ def test_double_click_aims_the_camera_at_the_surface(pair):
     place = seen_at(pair, middle_of(pair, 1))
     click(pair, place, times=2)
     x, y, width, height = pair.state.view_rect
-    # What was clicked is now in the middle of the view, as far away as the target was.
+    # The clicked point is now in the middle of the view, at the distance of the previous target.
     points = actor_points(pair.state.scene.actors[1])
     size = np.ptp(points, axis=0).max()
     assert pair.state.camera.distance == distance

@@ -14,7 +14,7 @@ from viewer.rendering.camera import eye
 
 @pytest.fixture
 def filmed(drive, tmp_path):
-    """A driver with the Camera panel of a capture: one camera, grey images of 100 of 255."""
+    """A driver on the Camera panel of a capture with one camera and images of grey 100 / 255."""
     driver = drive(write_filmed(tmp_path / "take"), size=(1000, 900), pixels_per_point=1.0)
     driver.state.options.grid = False
     driver.state.options.background = "white"
@@ -51,14 +51,14 @@ def test_image_brightness_dims_the_image_of_the_camera(filmed):
     for value in ("", "1", "0.25", "0"):
         if value:
             filmed.enter_value("Image brightness", value)
-        # The border of the image, where no point is drawn.
+        # The border of the image contains no points.
         shown = picture(filmed)
         grey.append(np.median(shown[:, shown.shape[1] // 2 - 60]))
     # 100 of 255 in the file, dimmed to 60 % at first; without an image the background is white.
     assert grey == [60, 100, 25, 255]
 
 
-def test_the_camera_follows_a_moving_one_while_time_passes(filmed):
+def test_view_follows_a_moving_camera_during_playback(filmed):
     state = filmed.state
     view = moving_camera()
     state.scene.views = (view,)

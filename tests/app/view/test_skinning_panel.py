@@ -11,7 +11,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def skinning(drive, rig):
-    """A test driver on the Skinning panel of the tiny rig, which is bent and rotated."""
+    """A test driver on the Skinning panel of the tiny rig in a bent and rotated pose."""
     hand = drive(*rig, size=(1000, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -20,13 +20,13 @@ def skinning(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A test driver on the Skinning panel of a body with many influences a vertex, posed."""
+    """A test driver on the Skinning panel of a posed body with many influences per vertex."""
     hand = drive_body("smpl", n_vertices=96)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
 
 def _posed(hand, dofs):
-    """Show the panel of a figure that has been in this pose from the start."""
+    """Show the panel of a figure with this initial pose."""
     hand.show_panel("Skinning")
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.history.start(hand.state.scene, hand.state.options)
@@ -48,7 +48,7 @@ def test_radio_buttons_choose_the_method(skinning):
     assert skinning.undo_steps >= 3
 
 
-def test_blend_slider_mixes_from_either_method(skinning):
+def test_blend_slider_mixes_both_methods(skinning):
     for label in ("LBS", "DQS"):
         skinning.click(label)
         skinning.drag("DQS fraction", 0.25)
@@ -92,7 +92,7 @@ def test_influences_slider_acts_only_with_the_box_checked(wide):
     assert _chosen(wide).max_influences == 1 and wide.undo_steps == steps + 1
     assert (wide.scene_picture() != whole).any()
     wide.drag("Influences", 1.0)
-    assert _chosen(wide).max_influences == 4  # no vertex of this model has more
+    assert _chosen(wide).max_influences == 4  # no vertex of this model has more influences
 
 
 def test_normalise_box_is_one_undo_step_and_is_greyed_while_influences_are_limited(skinning):
@@ -113,14 +113,14 @@ def test_normalising_scales_the_drawn_weights(drive, rig):
     stored = hand.scene_picture()
     hand.click("Normalise weights")
     assert (hand.scene_picture() != stored).any()
-    # Halved weights pull the middle square, 1 m up, to half of its height: it is 0.5 m lower.
+    # Halved weights move the middle square from a height of 1 m to half of that, 0.5 m lower.
     hand.state.actor.pose.dofs[:] = 0
     values = compute("normalized", hand.state.actor.figure, hand.state.actor.pose, Skinning())
     half = 0.5 * np.linalg.norm([0.2, 1.0, 0.2])
     np.testing.assert_allclose(values, [0] * 4 + [half] * 4 + [0] * 4, atol=1e-12)
 
 
-def test_panel_of_a_lone_skeleton_says_so(drive, rig, texts):
+def test_panel_of_a_lone_skeleton_shows_a_message(drive, rig, texts):
     hand = drive(rig[0])
     hand.show_panel("Skinning")
     texts.clear()

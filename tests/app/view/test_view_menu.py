@@ -1,4 +1,4 @@
-"""The menu "View", its keys, and the check boxes of the Display panel."""
+"""The View menu, its keys, and the check boxes of the Display panel."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_menu_and_key_toggle_joint_display(hand, name):
     assert (hand.scene_picture() == before).all()
 
 
-def test_display_panel_check_boxes(drive, rig):
+def test_display_panel_has_the_same_check_boxes(drive, rig):
     hand = drive(*rig, size=(1000, 1000), samples=1)
     for short, name in (("X-ray", "xray"), ("Names", "joint_names"), ("Axes", "joint_axes")):
         hand.click(f"{short}###{name}")
@@ -42,7 +42,7 @@ def test_menu_turns_the_heat_map_on_and_off(hand):
     assert hand.state.options.shading == "auto"
 
 
-def test_menu_picks_vertices(hand):
+def test_menu_toggles_picking_of_vertices(hand):
     hand.menu("menu View", "Pick vertices")
     assert hand.state.of(Weights).picks_vertices and hand.says("Clicks pin vertices")
     hand.menu("menu View", "Pick vertices")

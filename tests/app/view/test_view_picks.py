@@ -30,7 +30,7 @@ def column(drive, rig):
 
 
 def vertices(hand, index=0):
-    """Return where the vertices are drawn, in scene space."""
+    """Return the vertices in scene space."""
     actor = hand.state.scene.actors[index]
     return deform(actor.figure, actor.pose, hand.state.options.skinning)[0]
 
@@ -43,9 +43,10 @@ def near(hand, triangle, corner):
 
 
 def facing(hand, row=0):
-    """Return the side of the column that faces the camera most, with a corner from a row on."""
+    """Return the side triangle that faces the camera most, with a corner from the given row on."""
     actor = hand.state.actor
-    corners = actor.figure.mesh.triangles[4:]  # those before are above and below
+    # The first four triangles close the column at both ends.
+    corners = actor.figure.mesh.triangles[4:]
     places, normals = deform(actor.figure, actor.pose, hand.state.options.skinning)
     to_eye = np.linalg.inv(hand.state.camera.view_matrix())[:3, 3] - places[corners].mean(axis=1)
     faces = (normals[corners].sum(axis=1) * to_eye).sum(axis=1)
@@ -73,7 +74,7 @@ def test_vertex_under_a_resting_mouse_is_described(column, texts, corner):
     assert_allclose(column.state.of(Weights).hover.point, [x, y, z], atol=1e-12)
 
 
-def test_nothing_is_picked_while_the_mouse_moves(column, monkeypatch):
+def test_no_vertex_is_picked_while_the_mouse_moves(column, monkeypatch):
     looked = []
     picking = column.app.frame.renderer.pick
     monkeypatch.setattr(
@@ -86,7 +87,7 @@ def test_nothing_is_picked_while_the_mouse_moves(column, monkeypatch):
     column.step(20)
     assert len(looked) == 1 and not column.state.of(Weights).is_waiting
     column.step(60)
-    assert len(looked) == 1  # once is enough
+    assert len(looked) == 1  # one pick is enough
 
 
 def test_text_hides_when_the_mouse_moves_and_follows_a_changed_pose(column, texts):
@@ -152,7 +153,7 @@ def test_reduced_mesh_maps_to_full_mesh_vertices(column):
     assert column.state.of(Weights).hover.lines[0] == f"vertex {corners[2]}"
 
 
-def test_body_part_and_actor_are_named(drive, rig, texts):
+def test_text_contains_body_part_and_actor(drive, rig, texts):
     hand = drive(*rig, *rig, size=(1280, 800), samples=1)
     hand.show_panel("Weights")
     parts = BodyParts(("low", "high"), np.repeat([0, 1], [8, 4]))
@@ -170,7 +171,7 @@ def test_body_part_and_actor_are_named(drive, rig, texts):
     assert lines[0] == "tiny" and lines[1] == f"vertex {vertex}, triangle {triangle}, {part}"
 
 
-def test_alt_click_pins_and_plain_click_does_not(column):
+def test_alt_click_pins_a_vertex_and_plain_click_does_not(column):
     triangle = facing(column)
     place = near(column, triangle, 1)
     click(column, place)
@@ -254,7 +255,7 @@ def test_hover_over_a_dot_names_its_joint(column):
     assert lines and lines[-1] == "click: root"
 
 
-def test_box_lets_plain_clicks_pin(column):
+def test_check_box_lets_plain_clicks_pin(column):
     column.click("Pick vertices")
     click(column, near(column, facing(column), 2))
     assert column.state.of(Weights).pinned is not None
@@ -282,10 +283,10 @@ def test_click_in_x_ray_selects_the_joint_and_its_row(column):
     place = joint_matrices(actor.figure, actor.pose)[1][:3, 3]
     click(column, seen_at(column, place))
     assert column.state.selected_joint == 1
-    assert joint_tree(column.state).scrolls_to == -1  # the tree has followed
+    assert joint_tree(column.state).scrolls_to == -1  # the tree has scrolled to it
 
 
-def test_tree_scrolls_to_a_joint_far_down(drive, tmp_path):
+def test_tree_scrolls_to_a_joint_outside_the_visible_rows(drive, tmp_path):
     path = tmp_path / "long.skel"
     path.write_text(chain(60))
     hand = drive(path)
@@ -316,7 +317,7 @@ def test_selected_joint_is_highlighted_in_x_ray(column):
     assert (column.scene_picture() != before).any()
 
 
-def test_window_stays_awake_only_until_the_mouse_has_rested(column):
+def test_window_stays_awake_only_until_the_mouse_rests(column):
     place = near(column, facing(column), 0)
     column.move(place)
     assert column.state.of(Weights).is_waiting

@@ -1,4 +1,4 @@
-"""The initial heat map shows a joint or field that is not 0 everywhere."""
+"""The initial heat map, which shows a joint or field that is not 0 everywhere."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIP = "balljoint arm {\n        balljoint tip { }"
 
 @pytest.fixture
 def tipped(drive, tmp_path):
-    """A test driver on the tiny rig whose arm has a child that moves no vertex."""
+    """A test driver on the tiny rig with an additional child of the arm that moves no vertex."""
     skel, skin = tmp_path / "tipped.skel", tmp_path / "tipped.skin"
     skel.write_text(SKEL.replace("balljoint arm {", TIP))
     skin.write_text(skin_text(3).replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75"))
@@ -33,7 +33,7 @@ def shown(hand):
 
 def test_influence_of_a_joint_is_the_sum_of_its_weights(tipped):
     figure = tipped.state.actor.figure
-    # Four vertices have the root alone, four the arm, four both.
+    # Four vertices follow the root, four the arm, and four both.
     np.testing.assert_allclose(joint_influences(figure), [5.0, 7.0, 0.0])
     assert most_influential(figure) == 1
     assert informative_quantity("weight", [figure]) == "weight:arm"
@@ -65,7 +65,8 @@ def test_selected_joint_without_influence_is_replaced_with_a_note(tipped):
     toggle_weights(tipped.state)
     assert tipped.state.selected_joint == 1 and shown(tipped) == (0.0, 1.0)
     assert tipped.says("tip has no influence")
-    tipped.state.selected_joint = 2  # chosen explicitly afterwards, although it moves nothing
+    # A later explicit choice is kept, although the joint moves no vertex.
+    tipped.state.selected_joint = 2
     assert shown(tipped) == (0.0, 0.0)
 
 
@@ -85,6 +86,6 @@ def test_field_is_the_first_that_is_not_zero_everywhere(tipped):
     mesh = replace(state.actor.figure, skeleton=None, skin=None, fields=fields)
     state.scene.actors[:] = [Actor(mesh)]
     state.choose_actor(0)
-    start_heat_map(state)  # there are no weights to begin with
+    start_heat_map(state)  # the field is shown because there are no weights
     assert state.options.scalar == "field:full"
     assert shown(tipped) == (0.0, count - 1.0)

@@ -1,4 +1,4 @@
-"""The Vertex panel: a pinned vertex, its skinning terms, its lines in the view, and unpinning."""
+"""The Vertex panel: the skinning terms of a pinned vertex, its lines in the view, and unpinning."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 @pytest.fixture
 def pinned(drive, rig):
-    """A driver on a column whose vertex 4 is pinned: half of it follows the root, half the arm."""
+    """A driver on a column with vertex 4 pinned, which has equal weights for root and arm."""
     hand = drive(*rig, size=(1280, 1000), samples=1)
     hand.state.actor.pose.dofs[hand.dof_index("arm.z")] = 0.9
     hand.state.history.start(hand.state.scene, hand.state.options)
@@ -54,12 +54,12 @@ def rows_of(numbers):
 
 
 def holds(listed, wanted):
-    """Return whether some labels follow one another."""
+    """Return whether the labels occur consecutively."""
     count = len(wanted)
     return any(listed[at : at + count] == wanted for at in range(len(listed) - count + 1))
 
 
-def test_panel_shows_every_step(pinned, texts):
+def test_panel_shows_every_skinning_step(pinned, texts):
     listed = said(pinned, texts)
     actor = pinned.state.actor
     p = actor.figure.mesh.positions[4]
@@ -89,7 +89,7 @@ def test_numbers_follow_the_pose(pinned, texts):
 
 
 @pytest.mark.parametrize("method", ["dqs", "mix"])
-def test_dual_quaternions_are_shown_where_they_are_used(pinned, texts, method):
+def test_dual_quaternions_are_shown_if_they_are_used(pinned, texts, method):
     assert not any(text.startswith("q1:") for text in said(pinned, texts))
     pinned.state.options.skinning.method = method
     pinned.step()
@@ -101,7 +101,7 @@ def test_dual_quaternions_are_shown_where_they_are_used(pinned, texts, method):
     assert ("0.50 of the way from LBS to DQS" in listed) == (method == "mix")
 
 
-def test_figure_placement_is_a_step(pinned, texts):
+def test_figure_placement_is_a_skinning_step(pinned, texts):
     pinned.state.actor.pose.figure_translation[:] = 1.0, 2.0, 3.0
     pinned.state.actor.pose.figure_scale = 2.0
     pinned.step()
@@ -146,7 +146,7 @@ def test_lines_lead_to_the_rigid_images(pinned):
 
 
 def beside(hand, picture, weight_place):
-    """Return the pixels around a fraction of the way from the vertex to its first rigid image."""
+    """Return the pixels around a point between the vertex and its first rigid image."""
     size = picture.shape[1], picture.shape[0]
     explanation = hand.state.of(Weights).explanation
     start, end = explanation.position, explanation.images[0]
@@ -156,12 +156,12 @@ def beside(hand, picture, weight_place):
     return picture[y - 2 : y + 3, x - 2 : x + 3, :3].astype(int)
 
 
-def test_screenshot_has_the_lines_while_they_are_shown(pinned):
+def test_screenshot_includes_the_lines_while_they_are_shown(pinned):
     shown = pinned.scene_picture()
     explanation = pinned.state.of(Weights).explanation
     skeleton = pinned.state.actor.figure.skeleton
     color = 255 * influence_colors(explanation, skeleton)[0]
-    # In the middle of the line the colour of its joint, at its end a white dot.
+    # The middle of the line has the colour of its joint, and its end is a white dot.
     apart = np.abs(beside(pinned, shown, 0.5) - color).max(axis=-1)
     assert apart.min() < 90
     assert beside(pinned, shown, 0.0).min(axis=-1).max() > 240
@@ -188,12 +188,13 @@ def test_annotation_is_rebuilt_only_after_a_change(pinned):
     assert pinned.app.frame.renderer.annotations == ()
 
 
-def test_every_influence_has_a_line_a_dot_and_a_label(pinned):
+def test_every_influence_has_a_line_and_dot_and_label(pinned):
     explanation, actor = pinned.state.of(Weights).explanation, pinned.state.actor
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
     assert found.style.on_top
-    # Weakest first: a dark line, a line, a dark dot, a dot; last the vertex, dark and white.
+    # Weakest influence first: dark line, line, dark dot, dot. The vertex comes last, dark and
+    # white.
     shift = np.array([10.0, 0, 0])
     starts, ends = found.segments.starts - shift, found.segments.ends - shift
     weak, strong = explanation.images[1], explanation.images[0]
@@ -202,7 +203,7 @@ def test_every_influence_has_a_line_a_dot_and_a_label(pinned):
         starts, [vertex, vertex, weak, weak, vertex, vertex, strong, strong, vertex, vertex]
     )
     assert_allclose(ends, [weak] * 4 + [strong] * 4 + [vertex] * 2)
-    # Half of the vertex follows each: widths of 1 + 4 / 2 pixels.
+    # Both weights are 0.5, so the widths are 1 + 4 / 2 pixels.
     assert_allclose(explanation.weights, 0.5)
     assert_allclose(found.segments.widths, [5, 3, 11, 8, 5, 3, 11, 8, 12, 8])
     assert_allclose(found.segments.colors[[1, 5], 3], 0.35 + 0.65 * 0.5)
@@ -219,7 +220,7 @@ def test_vertex_can_be_unpinned(pinned, way):
     if way == "Esc":
         pinned.key("escape")
         assert pinned.says("Vertex unpinned")
-        assert pinned.state.selected_joint == 1  # the next one drops the selection
+        assert pinned.state.selected_joint == 1  # the next Escape clears the selection
     elif way == "Unpin":
         pinned.click("Unpin")
     elif way == "menu":
@@ -237,7 +238,7 @@ def test_pin_is_removed_with_its_figure(pinned, rig):
     assert pinned.state.of(Weights).pinned is None and not pinned.state.error
 
 
-def test_panel_without_a_vertex_says_how_to_pick_one(hand, texts):
+def test_panel_without_a_vertex_explains_how_to_pick_one(hand, texts):
     hand.menu("menu Window", "Vertex")
     hand.step(2)
     assert "Alt+click a vertex to explain its position here." in said(hand, texts)
@@ -245,14 +246,14 @@ def test_panel_without_a_vertex_says_how_to_pick_one(hand, texts):
     assert hand.state.of(Weights).picks_vertices
 
 
-def test_figure_without_a_skin_has_nothing_to_explain(drive, rig):
+def test_figure_without_a_skin_shows_a_message(drive, rig):
     hand = drive(rig[1])
     pin_vertex(hand.state, 0, 3)
     assert hand.state.of(Weights).pinned is None
     assert hand.says("no influences to explain")
 
 
-def test_vertex_without_influence_says_so(drive, rig, texts):
+def test_vertex_without_influence_shows_a_message(drive, rig, texts):
     text = rig[1].read_text().replace("1 1 1\n", "0\n", 1)
     rig[1].write_text(text)
     hand = drive(*rig, samples=1)
@@ -266,7 +267,7 @@ def test_pinning_is_not_an_undo_step(pinned):
 
 
 @pytest.mark.parametrize(("width", "digits"), [(480, 4), (960, 3), (1100, 4), (1280, 4)])
-def test_panel_needs_no_sideways_scrolling(drive, rig, texts, width, digits):
+def test_panel_needs_no_horizontal_scrolling(drive, rig, texts, width, digits):
     hand = drive(*rig, size=(width, 640), samples=1)
     pin_vertex(hand.state, 0, 4)
     hand.step(6)

@@ -19,7 +19,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def bent(drive, rig):
-    """A test driver on the Weights panel of the tiny rig, which is bent and rotated."""
+    """A test driver on the Weights panel of the tiny rig in a bent and rotated pose."""
     hand = drive(*rig, size=(1000, 1000), samples=1)
     dofs = hand.dofs()
     dofs[hand.dof_index("arm.x")], dofs[hand.dof_index("arm.y")] = 1.0, 2.0
@@ -28,13 +28,13 @@ def bent(drive, rig):
 
 @pytest.fixture
 def wide(drive_body):
-    """A test driver on the Weights panel of a body with many influences a vertex, posed."""
+    """A test driver on the Weights panel of a posed body with many influences per vertex."""
     hand = drive_body("smpl", n_vertices=96, pixels_per_point=1.0)
     return _posed(hand, 0.8 * np.sin(np.arange(len(hand.dofs()))))
 
 
 def _posed(hand, dofs):
-    """Show the panel of a figure that was in this pose from the start."""
+    """Show the panel of a figure with this initial pose."""
     hand.show_panel("Weights")
     hand.state.actor.pose.dofs[:] = dofs
     hand.state.options.skinning.max_influences = 4
@@ -49,7 +49,7 @@ def _chosen(hand) -> Skinning:
 
 
 def _legend_colours(hand):
-    """Return where the legend's dark, middle and bright colours are, or None."""
+    """Return the positions of the legend's dark, middle and bright colours, or None."""
     x, y, width, _ = hand.state.view_rect
     screen, colours = hand.screen(), colormap(256)[:, :3].astype(int)
     for row in range(int(y), int(y) + 70):
@@ -77,7 +77,7 @@ def test_heat_map_box_switches_the_shading_and_the_legend(wide, texts):
     assert_array_equal(wide.scene_picture(), plain)
 
 
-def test_heat_map_is_undone(wide):
+def test_heat_map_can_be_undone(wide):
     wide.click("Heat map")
     wide.key("z", "ctrl")
     assert wide.state.options.shading == "auto"
@@ -104,10 +104,10 @@ def test_scalar_range_spans_the_vertices(wide, texts, name):
         assert not shown
         return
     assert shown and shown[0].endswith("mm in this pose")
-    # Three digits, in millimetres.
+    # Three digits in millimetres.
     said = float(shown[0].split()[2].replace(",", ""))
     assert said == pytest.approx(1000 * high, rel=6e-3)
-    # The model has no symmetry map, and its weights are scaled to 1 already.
+    # The model has no symmetry map, and its weights already sum to 1.
     assert high > 0 or name in ("asymmetry", "normalized")
 
 
@@ -121,8 +121,8 @@ def test_scalar_range_follows_the_pose(wide):
     assert wide.state.stats.scalar_range[1] == pytest.approx(0, abs=1e-12)
 
 
-def test_legend_says_if_all_values_are_zero(bent, texts):
-    # The tiny rig has two influences a vertex: four are as good as all.
+def test_legend_states_that_all_values_are_zero(bent, texts):
+    # The tiny rig has two influences per vertex, so a limit of four changes nothing.
     bent.click("Heat map")
     bent.step(2)
     texts.clear()
@@ -141,7 +141,7 @@ def test_lengths_without_a_unit_are_fractions_of_the_size(bent, texts):
     actor = bent.state.actor
     plain = replace(_chosen(bent), method="lbs")
     values = compute("methods", actor.figure, actor.pose, plain)
-    size = np.linalg.norm([0.4, 2.0, 0.4])  # of the column's box
+    size = np.linalg.norm([0.4, 2.0, 0.4])  # the size of the column's bounding box
     found = next(text for text in texts if text.startswith("up to"))
     assert float(found.split()[2]) == pytest.approx(100 * values.max() / size, rel=6e-3)
 
@@ -168,7 +168,7 @@ def choose(hand, name):
     hand.step(2)
 
 
-def test_greyed_view_says_why(wide, tooltips):
+def test_greyed_view_shows_the_reason(wide, tooltips):
     wide.click("##Heat map of")
     wide.step(2)
     wide.move("view parts")
@@ -215,14 +215,14 @@ def test_joint_weight_view_shows_the_selected_joint(wide, texts):
     assert "Click the skin in the view, or a joint in the tree." in texts
 
 
-def test_list_keeps_the_joint_from_the_command_line(wide):
+def test_list_keeps_the_joint_given_on_the_command_line(wide):
     wide.state.options.scalar = "weight:#1"
     wide.click("Heat map")
     wide.step(2)
     assert wide.state.options.scalar == "weight:#1"
 
 
-def test_image_with_a_legend_gets_no_second_one(wide, texts):
+def test_image_with_a_legend_gets_no_second_legend(wide, texts):
     wide.state.options.legend = True
     wide.click("Heat map")
     wide.step(2)
@@ -232,16 +232,16 @@ def test_image_with_a_legend_gets_no_second_one(wide, texts):
     assert _legend_colours(wide) is not None  # drawn into the image
 
 
-def test_fixed_range_starts_as_the_automatic_one_and_stays_ordered(bent):
+def test_fixed_range_starts_with_the_automatic_range_and_stays_ordered(bent):
     choose(bent, "stretch")
-    # Strains are shown from -m to m, in percent; the numbers are percent already.
+    # Strains are shown from -m to m in percent; the range in the statistics is already in percent.
     most = max(map(abs, bent.state.stats.scalar_range))
     bent.click("Fixed")
     low, high = bent.state.options.scalar_range
     assert (low, high) == (-float(f"{most:.3g}"), float(f"{most:.3g}"))
     type_into(bent, "To", "50")
     assert bent.state.options.scalar_range == (low, 50.0)
-    type_into(bent, "From", "60")  # above the other end
+    type_into(bent, "From", "60")  # a value above the other end
     assert bent.state.options.scalar_range == (low, 50.0)
     type_into(bent, "From", "-12.5")
     assert bent.state.options.scalar_range == (-12.5, 50.0)
@@ -262,7 +262,7 @@ def type_into(hand, label, text):
     hand.step(2)
 
 
-def test_changing_the_view_clears_the_range(bent):
+def test_changing_the_view_resets_the_range(bent):
     choose(bent, "stretch")
     bent.click("Fixed")
     choose(bent, "methods")
@@ -279,7 +279,7 @@ def test_range_and_isolines_are_greyed_for_integers(wide):
 def test_isolines_box_shows_the_default_and_keeps_overrides(bent):
     bent.state.selected_joint = 1
     choose(bent, "weight")
-    assert bent.state.stats.legend.lines  # usual for weights
+    assert bent.state.stats.legend.lines  # the default for weights
     bent.click("Isolines")
     assert bent.state.options.isolines is False
     bent.step(2)
@@ -320,7 +320,7 @@ def test_shortcut_toggles_weights_of_the_selected_joint(bent):
     assert bent.state.options.shading == "auto"
 
 
-def test_shortcut_on_a_figure_without_weights_says_so(drive, rig):
+def test_shortcut_on_a_figure_without_weights_shows_a_message(drive, rig):
     hand = drive(rig[0])
     hand.key("v")
     assert hand.says("there is no mesh") and hand.state.options.shading == "auto"

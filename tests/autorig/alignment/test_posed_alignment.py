@@ -135,7 +135,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     unfitted, _ = aligned(figure, target, fits=False)
     (line,) = unfitted.lines
     found = re.fullmatch(
-        rf"warning: the template fits much better stretched by (.+) along {whose} x, y and z, "
+        rf"warning: the template fits much better when stretched by (.+) along {whose} x, y and z, "
         rf"with a fitting error of 0\.\d+ % instead of \d\.\d+ %: if the target was "
         r"stretched, (.+)",
         line.labelled,
@@ -171,20 +171,19 @@ def fit_of(figure, pose, angle):
 @pytest.mark.parametrize(
     ("target", "reached", "lines"),
     [
-        (1.5, 1.38, ("warning: pose: not fitted, as that would give a fitting error of G % of "
-                     "the size, "
-                     "G % before, with tip rotated by 79 degrees; use a template of the same kind "
-                     "as the target",)),
-        (0.9, 0.7, ("pose: template joints rotated to fit, at most tip by 40 degrees; limbs "
-                    "resized, at most base by +0 % in length",
+        (1.5, 1.38, ("warning: pose: not fitted, because that would result in a fitting error of G "
+                     "% of the size, G % before, with tip rotated by 79 degrees; use a template "
+                     "of the same kind as the target",)),
+        (0.9, 0.7, ("pose: template joints rotated to fit, by up to 40 degrees (tip); limb lengths "
+                    "changed by up to +0 % (base)",
                     "warning: poor fit: a fitting error of G % of the size, G % before; use a "
                     "template of "
                     "the same kind as the target")),
-        (1.5, 1.5, ("pose: template joints rotated to fit, at most tip by 86 degrees; limbs "
-                    "resized, at most base by +0 % in length",
+        (1.5, 1.5, ("pose: template joints rotated to fit, by up to 86 degrees (tip); limb lengths "
+                    "changed by up to +0 % (base)",
                     "result: a fitting error of G % of the size, G % before")),
-        (1.5, 0.1, ("pose: not fitted, as that would give a fitting error of G % of the size, "
-                    "G % before",)),
+        (1.5, 0.1, ("pose: not fitted, because that would result in a fitting error of G % of the "
+                    "size, G % before",)),
     ],
 )  # fmt: skip
 def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.tiny import SKEL, skin_text, write_rig
+from formats.bvh_text import person
 
 import viewer
 from viewer.batching.report import read_results
@@ -48,6 +49,22 @@ def test_items_are_written_as_the_command_writes_them(rigs, capsys):
     assert bad.message.startswith("in/b/bad.skel:2: ")
     assert bad.diagnostics[-1]["line"] == 2
     assert {one.outputs for one in by_name.values()} == {("out/a/one.npz",), ("out/b/two.npz",)}
+
+
+def test_joint_maps_are_named_by_their_items(rigs, capsys):
+    for name in ("walk", "run"):
+        (rigs / f"{name}.bvh").write_text(person(100.0))
+    command = ["batch", "convert", "walk.bvh", "run.bvh", "--body", "--to", "bvh", "-o", "out"]
+    named = [*command, "--save-joint-map", "maps/{stem}.txt"]
+    assert run(named) == 0
+    for name in ("walk", "run"):
+        assert "left_knee = left_knee\n" in (rigs / "maps" / f"{name}.txt").read_text()
+    for folder in ("out", "other"):
+        capsys.readouterr()
+        assert run([*named[:-3], folder, *named[-2:]]) != 0
+        said = capsys.readouterr().err
+        assert ("4" if folder == "out" else "2") + " outputs already exist: " in said
+    assert not (rigs / "other").exists()
 
 
 def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
@@ -168,7 +185,7 @@ def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
     assert "s-2.png: already exists" in capsys.readouterr().err
     (rigs / "in" / "b" / "p-2.skel").write_text(SKEL)
     assert run([*command, "out/b/p.png"]) == 2
-    assert "sheet 2: out/b/p-2.png: expected a file of its own" in capsys.readouterr().err
+    assert "sheet 2: out/b/p-2.png: expected a separate file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -201,6 +218,18 @@ def test_python_refuses_limits_below_zero(rigs, wrong):
         ),
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
+        (
+            ["convert", "in", "-o", "out", "--to", "bvh", "--save-joint-map", "map.txt"],
+            "--save-joint-map: 2 outputs would be written twice: map.txt",
+        ),
+        (
+            ["convert", "in", "-o", "{stem}.bvh", "--save-joint-map", "{stem}.bvh"],
+            "--save-joint-map: 3 outputs would be written twice",
+        ),
+        (
+            ["convert", "in", "-o", "out", "--to", "bvh", "--save-joint-map", "{stam}.txt"],
+            "--save-joint-map: no field is called {stam}; did you mean stem?",
+        ),
         (["lint", "in", "--resume"], "--report FILE"),
         (["info", "in", "--limit-memory", "0"], "--limit-memory: expected"),
         (["info", "in", "--report", "in/a/one.skel", "--force"], "--report: in/a/one.skel: exp"),

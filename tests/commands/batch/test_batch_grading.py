@@ -69,7 +69,7 @@ def test_every_submission_has_a_row_and_none_stops_the_others(course, capsys) ->
                 "--tolerance", "1e-6", "--table", "t.csv", "--overview", "o.html"])  # fmt: skip
     assert code == 1
     caught = capsys.readouterr()
-    assert "ignored, as they are neither folders nor archives: grades.json" in caught.err
+    assert "ignored because they are neither folders nor archives: grades.json" in caught.err
     assert caught.out.splitlines()[-2:] == [
         "t.csv: table of 6 items",
         "o.html: overview of 6 items",

@@ -10,6 +10,7 @@ from formats.capture_files import body, points, write_frames
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
+import viewer
 from viewer.cli import run
 
 
@@ -80,7 +81,7 @@ def test_keypoints_at_one_frame_keep_the_frame_number(keypoints, tmp_path, capsy
 @pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
 def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, arguments):
     name, *others = arguments
-    assert convert(keypoints, "-o", tmp_path / name, *others) == 2
+    assert convert(keypoints, "-o", tmp_path / name, "--fps", 30, *others) == 2
     assert capsys.readouterr().err == (
         "viewer: there are only keypoints: a motion of joints cannot be written "
         "(.npz stores points)\n"
@@ -92,19 +93,58 @@ def test_keypoints_omitted_next_to_bodies_are_reported(recording, tmp_path, caps
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+        "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+        "keypoints3d folder"
     )
 
 
-@pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w.glb"])
+@pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w-{person}.glb"])
 def test_absent_people_are_omitted_and_the_others_keep_their_names(
     recording, tmp_path, capsys, name
 ):
     assert convert(*recording, "-o", tmp_path / name, "--frames", "22:24") == 0
-    stem, _, suffix = name.partition(".")
-    assert [path.name for path in tmp_path.glob("w*")] == [f"{stem}-0.{suffix}"]
+    suffix = name.partition(".")[2]
+    assert [path.name for path in tmp_path.glob("w*")] == [f"w-0.{suffix}"]
     lines = capsys.readouterr().out.splitlines()
     assert lines[-1] == "take 7: absent in frames 22 to 23, not written"
+
+
+def test_glb_contains_all_people(recording, tmp_path, capsys):
+    assert convert(*recording, "-o", tmp_path / "w.glb", "--up", "y") == 0
+    assert [path.name for path in tmp_path.glob("w*")] == ["w.glb"]
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0].startswith(f"{tmp_path}/w.glb: 2 figures: take 0, take 7; one animation of 0.1")
+    assert "take 7: missing frames 22 to 23: the last pose is held" in lines
+    figures = [actor.figure for actor in viewer.load(tmp_path / "w.glb").actors]
+    assert [figure.name for figure in figures] == ["take 0", "take 7"]
+    assert [figure.animations[0].name for figure in figures] == ["take", "take"]
+
+
+def test_glb_of_the_only_person_present_keeps_its_name(recording, tmp_path, capsys):
+    assert convert(*recording, "-o", tmp_path / "w.glb", "--frames", "22:24") == 0
+    assert [path.name for path in tmp_path.glob("w*")] == ["w.glb"]
+    assert "96 vertices" in capsys.readouterr().out.splitlines()[0]
+
+
+@pytest.mark.parametrize("kind", ["glb", "bvh"])
+def test_person_in_a_name_is_replaced(recording, tmp_path, kind):
+    assert convert(*recording, "-o", tmp_path / f"p{{person}}_take.{kind}") == 0
+    names = sorted(path.name for path in tmp_path.glob("p*"))
+    assert names == [f"p0_take.{kind}", f"p7_take.{kind}"]
+
+
+def test_meshes_are_numbered_by_person_and_frame(recording, tmp_path):
+    assert convert(*recording, "-o", tmp_path / "p{person}-{frame:03}.obj") == 0
+    names = sorted(path.name for path in tmp_path.glob("p*.obj"))
+    assert names == [
+        *(f"p0-{frame:03}.obj" for frame in range(20, 24)),
+        *(f"p7-{frame:03}.obj" for frame in range(20, 22)),
+    ]
+
+
+def test_split_gaps_write_a_glb_per_person(recording, tmp_path):
+    assert convert(*recording, "-o", tmp_path / "w.glb", "--gaps", "split") == 0
+    assert sorted(path.name for path in tmp_path.glob("w*")) == ["w-0.glb", "w-7.glb"]
 
 
 def test_absent_people_are_omitted_from_folders(recording, tmp_path, capsys):
@@ -120,7 +160,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "nobody is present in frame 23: there is nothing to write"
+    message = "no person is present in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
@@ -128,7 +168,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
 def test_time_at_which_everyone_is_absent_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "nobody is present at that time: there is nothing to write"
+    message = "no person is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 

@@ -24,7 +24,7 @@ SUFFIXES = ", ".join(
 )
 NO_MEMBER = (
     "twist cannot be written as an EasyMocap folder: expected the joints of "
-    "SMPL, SMPL+H, SMPL-X or MANO, found others"
+    "SMPL, SMPL+H, SMPL-X or MANO, found different ones"
 )
 NO_FILE = "cannot be read: No such file or directory"
 

@@ -99,6 +99,8 @@ def test_binary_chunk_may_be_longer_than_its_buffer() -> None:
         ('{"asset": {}}'.encode("utf-16"), "F002.gltf-utf-16"),
         (b"[1]", "F002.gltf-type"),
         (b'{"asset": {"version": "1.0"}}', "F002.gltf-version"),
+        (b'{"asset": {"version": 1}}', "F002.gltf-version"),
+        (b'{"asset": {"version": true}}', "F002.gltf-type"),
         (b'{"asset": {"version": "1.0"}, "buffers": {}, "accessors": {}}', "F002.gltf-version"),
         (b'{"asset": {"version": "2.0", "minVersion": "2.1"}}', "F002.gltf-version"),
         (b'{"asset": {"version": 2.0}}', "F002.gltf-type"),

@@ -16,7 +16,7 @@ from tests.formats.nodes.node_files import (
     vertices,
 )
 from viewer.errors import FormatError
-from viewer.formats._nodes.content import NodeFile, NodeSkin
+from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin
 from viewer.formats._nodes.figures import figure_group
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
@@ -194,3 +194,9 @@ def test_empty_file_is_refused_and_a_skeleton_opens():
     (figure,) = figures_of(file_of(chain))
     assert figure.mesh is None
     assert figure.skeleton.names == ("hip", "knee")
+
+
+def test_files_with_only_points_or_lines_are_refused_as_such():
+    with pytest.raises(FormatError) as caught:
+        figures_of(file_of(tree_of({"name": "cloud", "mesh": 0}), meshes=(NodeMesh("", ()),)))
+    assert caught.value.diagnostic.key == "F002.no-triangles"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from viewer.app.core.calibrated import follow_calibrated
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.follow import followed_point
@@ -35,8 +34,8 @@ class Following:
 def follow_actor(state: AppState) -> None:
     """Keep the camera's target on the followed actor or joint at the same distance.
 
-    The camera moves only with the clock: it stays still while a pose is edited by hand. A camera
-    that looks through a moving calibrated one moves with that one.
+    The camera moves only with the clock: it stays still while a pose is edited by hand. A view
+    through a moving calibrated camera moves with that camera.
     """
     follow_calibrated(state)
     following, n_posed = state.of(Following), state.clock.n_posed

@@ -17,7 +17,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["draw"]
 
-_LONGEST = 60  # characters of a name
+_LONGEST = 60  # maximum length of a name in characters
 
 
 def draw(state: AppState) -> None:

@@ -9,7 +9,7 @@ __all__ = ["no_springs", "toggle_springs"]
 
 
 def no_springs(state: AppState) -> str:
-    """Return why springs cannot be switched; empty if they can."""
+    """Return the reason why springs cannot be switched; empty if they can."""
     return "" if has_springs(state.actor) else f"{state.actor.name} has no spring joints"
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
+from viewer.data_classes import dataclass
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import scene_rate, time_span
 from viewer.rig.motion.instances import pose_actors
@@ -21,10 +22,10 @@ MODES = {
     "ping-pong": "Ping-pong",
     "run on": "Run on",
 }
-"""Playback modes at the end of the range, with their labels."""
+"""Playback modes, which differ at the end of the range, with their labels."""
 
 FASTEST = 4.0
-"""Largest playback speed, forwards and backwards."""
+"""Maximum playback speed, forwards and backwards."""
 
 
 class PosedFor(NamedTuple):
@@ -76,7 +77,7 @@ class Clock:
         Frames per second for scenes without sampled motion: the rate that was set, or else the
         rate of the keys.
     has_frames : bool
-        Whether some motion is sampled: each frame is then shown for its whole duration.
+        Whether any motion is sampled: each frame is then shown for its whole duration.
     interpolate_gaps : bool
         Whether captures are interpolated in their gaps.
     has_motion : bool
@@ -102,8 +103,8 @@ class Clock:
     has_frames: bool = False
     interpolate_gaps: bool = False
     has_motion: bool = False
-    _over: float = 0.0  # seconds since the last frame of the range began
-    _is_returning: bool = False  # in the backward half of ping-pong
+    _over: float = 0.0  # seconds elapsed in the last frame of the range
+    _is_returning: bool = False  # whether ping-pong playback runs backwards
     posed_for: PosedFor | None = None
     n_posed: int = 0
     _grid: tuple[object, ...] = ()  # key of the capture that defines the frames
@@ -128,7 +129,7 @@ class Clock:
         self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, chosen: Actor | None = None) -> None:
-        """Update the range for clips that changed or grew; a full range stays full.
+        """Update the range for changed or longer clips; a range that covered all clips still does.
 
         If only the frame rate changes, time and range stay on their frames.
 
@@ -202,7 +203,7 @@ class Clock:
     def nearest_frame_time(self, time: float) -> float:
         """Return the time of the frame nearest to a time, within the whole range, seconds."""
         low, high = self.frame_range
-        if low > high:  # shorter than a frame
+        if low > high:  # the range is shorter than a frame
             return time
         return self.frame_time(min(max(round((time - self.origin) * self.frame_rate), low), high))
 
@@ -291,7 +292,7 @@ class Clock:
         self.time = self.start + (2.0 * length - place if self._is_returning else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
-        """Pose all actors for the current time if it or a clip has changed; return whether it has.
+        """Pose all actors if the time or a clip has changed; return whether they were posed.
 
         Parameters
         ----------

@@ -1,10 +1,11 @@
-"""Camera fitting state: the points to which the camera is fitted, and whether it still is."""
+"""Camera fitting state: the points to fit, and whether the camera is still fitted to them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.motion_extent import MotionExtent
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 
@@ -29,9 +30,9 @@ class Framing:
     is_fitting: bool = False
     extent: MotionExtent = field(default_factory=MotionExtent)
     points: Floats | None = None
-    _placed: tuple[object, ...] | None = None  # key of the fitted camera
+    _placed: tuple[object, ...] | None = None  # key of the camera's position when it was fitted
     _fitted: tuple[object, ...] | None = None  # size of the view at the last fit
-    _is_stale: bool = True  # more of the motion is known than at the last fit
+    _is_stale: bool = True  # whether more of the motion is known than at the last fit
 
     @property
     def is_settled(self) -> bool:

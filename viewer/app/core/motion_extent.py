@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from viewer.app.core.clock import Clock
+from viewer.data_classes import dataclass
 from viewer.rendering.framing import frames_looked_at, outermost
 from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats
@@ -24,7 +25,7 @@ __all__ = ["MotionExtent"]
 _POINTS_A_TIME = 30_000  # vertices posed per frame of the interface
 _MOST_POINTS = 2_000_000  # maximum number of vertices posed in total
 _MOST_FRAMES = 32
-_MOST_PRODUCTS = 100_000_000  # dot products of points and directions, limited to bound the time
+_MOST_PRODUCTS = 100_000_000  # maximum number of dot products with directions
 _N_DIRECTIONS = (100, 1000)
 
 
@@ -45,7 +46,7 @@ class MotionExtent:
 
     is_done: bool = False
     was_edited: bool = False
-    _clouds: dict[float, Floats] = field(default_factory=dict)  # by time, seconds
+    _clouds: dict[float, Floats] = field(default_factory=dict)  # points by time in seconds
     _kept: dict[float, Floats] = field(default_factory=dict)  # samples taken before an edit
     _shapes: tuple[bytes, ...] = ()
     _motions: tuple[object, ...] = ()
@@ -132,7 +133,7 @@ class MotionExtent:
         """Return the outermost points at one time; none if all actors are absent."""
         seen = copied(scene)
         for actor, shown in zip(seen.actors, scene.actors, strict=True):
-            # Hair and clothes hardly change the size of a motion, but simulating it takes long.
+            # Hair and clothes hardly change the size of a motion, but simulating them takes long.
             actor.springs = None
             if actor.pose is not None:
                 weights = actor.pose.shape_weights

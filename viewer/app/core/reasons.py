@@ -25,7 +25,7 @@ __all__ = [
 
 
 def no_motion(state: AppState) -> str:
-    """Return why the time cannot be changed."""
+    """Return the reason why the time cannot be changed."""
     if state.clock.has_motion:
         return ""
     if any(actor.figure.animations for actor in state.scene.actors):
@@ -34,7 +34,7 @@ def no_motion(state: AppState) -> str:
 
 
 def no_panel(state: AppState, needs: str) -> str:
-    """Return why a panel has nothing to show.
+    """Return the reason why a panel has nothing to show.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def no_panel(state: AppState, needs: str) -> str:
 
 
 def no_drive(state: AppState) -> str:
-    """Return why the chosen actor has no joint match."""
+    """Return the reason why the chosen actor has no joint match."""
     actor = state.actor
     if actor.drive is not None and isinstance(actor.clip, SampledClip):
         return ""
@@ -67,23 +67,23 @@ def no_drive(state: AppState) -> str:
 
 
 def no_parts(state: AppState) -> str:
-    """Return why the parts of the chosen actor cannot be hidden."""
+    """Return the reason why the parts of the chosen actor cannot be hidden."""
     mesh = state.actor.figure.mesh
-    return "" if mesh is not None and len(mesh.parts) > 1 else "this figure has one part only"
+    return "" if mesh is not None and len(mesh.parts) > 1 else "this figure has only one part"
 
 
 def no_pose(state: AppState) -> str:
-    """Return why the chosen actor cannot be posed."""
+    """Return the reason why the chosen actor cannot be posed."""
     return "" if state.actor.pose is not None else f"{_subject(state)} has no joints to pose"
 
 
 def no_new_clip(state: AppState) -> str:
-    """Return why the chosen actor cannot get a clip."""
+    """Return the reason why the chosen actor cannot get a clip."""
     return no_pose(state) or ("it already has a motion" if state.actor.clip is not None else "")
 
 
 def nothing_to_export(state: AppState) -> str:
-    """Return why no motion can be written."""
+    """Return the reason why no motion can be written."""
     if any(isinstance(actor.clip, JointMotion) for actor in state.scene.actors):
         return ""
     if state.clock.has_motion:
@@ -92,40 +92,40 @@ def nothing_to_export(state: AppState) -> str:
 
 
 def no_job_room(state: AppState) -> str:
-    """Return why no job can be started."""
+    """Return the reason why no job can be started."""
     return "" if state.job is None else f"wait for: {state.job.title}"
 
 
 def no_undo(state: AppState) -> str:
-    """Return why there is nothing to undo."""
+    """Return the reason why there is nothing to undo."""
     return "" if state.history.can_undo else "nothing to undo"
 
 
 def no_redo(state: AppState) -> str:
-    """Return why there is nothing to redo."""
+    """Return the reason why there is nothing to redo."""
     return "" if state.history.can_redo else "nothing to redo"
 
 
 def no_mesh(state: AppState) -> str:
-    """Return why settings of the surface have no effect."""
+    """Return the reason why settings of the surface have no effect."""
     has_one = any(actor.figure.mesh is not None for actor in state.scene.actors)
     return "" if has_one else "there is no mesh"
 
 
 def no_skeleton(state: AppState) -> str:
-    """Return why no skeleton can be drawn."""
+    """Return the reason why no skeleton can be drawn."""
     has_one = any(actor.figure.skeleton is not None for actor in state.scene.actors)
     return "" if has_one else "there is no skeleton"
 
 
 def no_skin(state: AppState) -> str:
-    """Return why the bind pose cannot be shown."""
+    """Return the reason why the bind pose cannot be shown."""
     has_one = any(actor.figure.is_attached for actor in state.scene.actors)
     return "" if has_one else "there is no skin attached to a skeleton"
 
 
 def no_texture(state: AppState) -> str:
-    """Return why the texture has no effect."""
+    """Return the reason why the texture has no effect."""
     meshes = [actor.figure.mesh for actor in state.scene.actors]
     has_one = any(
         mesh is not None and any(material.image is not None for material in mesh.materials)

@@ -6,13 +6,14 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
 
 __all__ = [
@@ -38,7 +39,7 @@ __all__ = [
 
 _NUMBER = re.compile(r"%[0-9.+]*[efg]")
 
-# Plain numbers: Python's own flags take a microsecond per operation, a hundred times in a frame.
+# Plain integers: an operation on Python's flags takes a microsecond, and a frame needs a hundred.
 _DISABLED = int(imgui.ItemFlags_.disabled)
 _HOVERED = int(imgui.HoveredFlags_.delay_normal | imgui.HoveredFlags_.allow_when_disabled)
 
@@ -96,7 +97,7 @@ def explain(text: str, why: str = "") -> None:
 
 
 def show_tooltip(text: str) -> None:
-    """Show a tooltip, unless it would cover what is being typed or dragged in the last widget."""
+    """Show a tooltip, unless it would cover text being typed, or a drag, in the last widget."""
     if not imgui.is_item_active():
         imgui.set_tooltip(text)
 
@@ -130,7 +131,7 @@ def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
     title : str
         Text of the title bar.
     size : (float, float)
-        Width and height when it first appears, in font sizes; less in a small window.
+        Width and height when it first appears, in font sizes; smaller if the window is small.
 
     Returns
     -------
@@ -145,7 +146,10 @@ def begin_window(title: str, size: tuple[float, float]) -> tuple[bool, bool]:
     imgui.set_next_window_size(room, imgui.Cond_.appearing)
     imgui.set_next_window_pos(viewport.get_center(), imgui.Cond_.appearing, (0.5, 0.5))
     flags = imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    # Docked panels are separated by their tabs; a window on top of them needs an outline.
+    imgui.push_style_var(imgui.StyleVar_.window_border_size, max(1.0, round(letter / 16.0)))
     shown, stays = imgui.begin(title, True, flags | imgui.WindowFlags_.no_collapse)
+    imgui.pop_style_var()
     return shown, bool(stays)
 
 
@@ -211,14 +215,14 @@ def button(state: AppState, label: str, why: str = "") -> bool:
 
 
 def offer_files(state: AppState, text: str) -> None:
-    """Draw why a panel is empty, and a button that opens files to fill it."""
+    """Draw the reason why a panel is empty, and a button that opens files to fill it."""
     imgui.text_wrapped(text)
     if button(state, "Open files…"):
         state.wants.add("open dialog")
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
-    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must follow then."""
+    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must then follow."""
     opened = imgui.begin_menu(text, enabled)
     if not opened:
         note_item(state, f"menu {text}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui, implot
@@ -13,6 +12,7 @@ from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import Curve
 from viewer.app.curves.state import Curves
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 
 __all__ = [
@@ -31,14 +31,14 @@ Color = tuple[float, float, float, float]
 # Smallest value range that fitted axes magnify to the height of the plot. Rotations and
 # positions in single precision, as files store them, are rounded to far smaller steps.
 _LEAST_ANGLE = math.radians(0.1)
-_LEAST_LENGTH = 5e-4  # relative to the size of the scene
-_LEAST = 1e-3  # scales and weights
-_LEAST_RELATIVE = 1e-5  # relative to the values themselves
-_CONSTANT = 0.02  # of the smallest range: smaller changes are drawn as constants
-_MARGIN = 0.16  # above and below the curves, relative to their height
+_LEAST_LENGTH = 5e-4  # lengths, relative to the size of the scene
+_LEAST = 1e-3  # scale factors and weights
+_LEAST_RELATIVE = 1e-5  # any value, relative to its magnitude
+_CONSTANT = 0.02  # fraction of that range below which a change is drawn as a constant
+_MARGIN = 0.16  # margin above and below the curves, relative to their height
 
 _COLORS = ((0.95, 0.45, 0.42), (0.48, 0.85, 0.45), (0.45, 0.65, 1.0))
-_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness of the same axis of several joints
+_SHADES = (1.0, 0.72, 1.25, 0.85, 1.12)  # brightness factors that distinguish the joints
 
 
 @dataclass(frozen=True, slots=True)

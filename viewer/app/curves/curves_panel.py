@@ -85,7 +85,7 @@ def draw(state: AppState) -> None:
 
 
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Deselect curves and keys that no longer exist, and show those of a newly selected joint."""
+    """Deselect curves and keys that no longer exist; show the curves of a newly selected joint."""
     view, clip = state.of(Curves), state.actor.clip
     kind = f"{type(clip).__name__} {state.actor.animation}"
     owner = (id(state.actor), kind, len(curves))
@@ -104,7 +104,7 @@ def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
 
 
 def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tuple[int, ...]:
-    """Return the curves that a selected joint shows: of keyed transforms its angles with keys."""
+    """Return the curves of a selected joint; for keyed transforms, its angles that have keys."""
     rows = tuple(row for row, curve in enumerate(curves) if curve.number == number)
     keyed = keyed_of(state.actor)
     if not isinstance(keyed, TransformKeys):
@@ -114,7 +114,7 @@ def _first_shown(state: AppState, curves: tuple[Curve, ...], number: int) -> tup
 
 
 def _first_number(state: AppState, curves: tuple[Curve, ...]) -> int:
-    """Return the joint whose curves are shown first: of keyed transforms the first with keys."""
+    """Return the joint whose curves are shown first; for keyed transforms, the first with keys."""
     keyed, numbers = keyed_of(state.actor), [curve.number for curve in curves]
     if isinstance(keyed, TransformKeys):
         moving = (n for row, n in enumerate(numbers) if keyed.channel(row) is not None)
@@ -221,7 +221,7 @@ def _draw_tools(state: AppState) -> None:
         add_key_at(state, view.rows, state.clock.time - state.actor.offset)
     if _button_beside(state, "Key pose", "key the whole pose at the current time"):
         key_present_pose(state)
-    if _button_beside(state, "Key changes", "key only what differs from the clip"):
+    if _button_beside(state, "Key changes", "key only the values that differ from the clip"):
         key_present_pose(state, only_changed=True)
     if isinstance(state.actor.clip, Clip) and _button_beside(
         state, "Save clip…", "save the clip as .anim"

@@ -31,7 +31,7 @@ __all__ = [
     "set_clip_range",
 ]
 
-_GAP = 1e-3  # smallest distance of keys when dragging, seconds
+_GAP = 1e-3  # minimum distance between dragged keys, seconds
 
 
 def drop_missing(view: Curves, keyed: KeyedMotion, n_rows: int) -> None:

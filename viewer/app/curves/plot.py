@@ -35,8 +35,8 @@ __all__ = ["draw_plot", "unit_text"]
 _TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), 0.55
 _OUTSIDE = (0.0, 0.0, 0.0, 0.2)
 _MOST_SAMPLES = 900
-_DASHES = 90  # samples across the plot
-_MARGIN = 0.08  # before and after the clip, relative to its duration
+_DASHES = 90  # number of samples across the plot
+_MARGIN = 0.08  # margin before and after the clip, relative to its duration
 _FARTHEST = 1e9
 _TIME_ID, _START_ID, _END_ID = 1, 2, 3
 
@@ -154,7 +154,7 @@ def _draw_line(plot: Plot, row: int) -> None:
 
 
 def _broken(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return a curve of angles with gaps where it jumps by a rotation."""
+    """Return a curve of angles with gaps where it jumps by a full rotation."""
     jumps = np.flatnonzero(np.abs(np.diff(values)) > math.pi) + 1
     return np.insert(times, jumps, times[jumps]), np.insert(values, jumps, np.nan)
 

@@ -26,9 +26,9 @@ __all__ = ["draw_keys", "edit"]
 
 _HANDLE = 1.0, 0.85, 0.4, 1.0
 _FAINT = (0.75, 0.75, 0.8, 0.8)
-_MOST_KEYS = 300  # largest number of visible keys that can be dragged
+_MOST_KEYS = 300  # if more keys are visible, none can be dragged
 _SAME_KEY = 2.0  # points: keys closer than this cannot be distinguished
-_HANDLE_LENGTH = 4.0  # in font sizes
+_HANDLE_LENGTH = 4.0  # length of a tangent's handle, in font sizes
 _HANDLE_ID = 16
 _FIRST_KEY_ID = 32
 _KEYS_PER_ROW = 1 << 20
@@ -83,7 +83,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
-    """Draw keys as plain dots, which cannot be dragged; for too many keys."""
+    """Draw keys as plain dots, which cannot be dragged, if there are too many keys."""
     for row, times, values, keys in seen:
         if keys:
             color = plot.color(row)

@@ -1,4 +1,4 @@
-"""List of the formats of an export, and the data that each keeps and omits."""
+"""List of the formats of an export, with the data that each of them keeps and omits."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def draw_formats(
     formats : mapping
         Exporters by suffix; ``FOLDER`` for a folder.
     missing : mapping
-        Why formats cannot be written, by suffix.
+        Reasons why formats cannot be written, by suffix.
     """
     typed = Path(dialog.typed_name()).suffix.lower()
     now = typed if typed in formats else dialog.suffix or FOLDER
@@ -94,7 +94,7 @@ def _draw_row(state: AppState, suffix: str, kind: Exporter, is_chosen: bool, why
 
 
 def _choose(dialog: FileDialog, suffix: str, old: str) -> None:
-    """Replace the suffix of the name by that of a format."""
+    """Replace the suffix of the name by a format's suffix."""
     name = dialog.typed_name()
     dialog.suffix = "" if suffix == FOLDER else suffix
     dialog.name = name[: len(name) - len(old)] + dialog.suffix

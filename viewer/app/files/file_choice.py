@@ -122,7 +122,7 @@ class FileDialog:
         """Return the name without the suggested suffix after a typed one: ``ada.gif.mp4``."""
         name = single_suffix(self.name.strip())
         stem = PurePath(name).stem
-        # A name that was not typed is right: the suggested one, and those of existing files.
+        # Names that were not typed are kept: the suggested one, and those of existing files.
         if name == self.suggested or self.folder / name in self.entries:
             return name
         is_typed = PurePath(stem).suffix.lower() in self.suffixes
@@ -183,7 +183,7 @@ def opened_suffixes() -> set[str]:
 
 
 def folder_of(paths: Sequence[Path]) -> Path:
-    """Return a dialog's initial folder: that of the first file, the current folder, or home."""
+    """Return a dialog's initial folder: the first file's folder, the current folder, or home."""
     try:
         return paths[0].resolve().parent if paths else Path.cwd()
     except (OSError, RuntimeError):  # the current folder no longer exists

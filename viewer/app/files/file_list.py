@@ -14,7 +14,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_file_list", "is_confirmed_by_key"]
 
-_PAGE = 12  # rows
+_PAGE = 12  # number of rows skipped by Page Up and Page Down
 
 
 def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Path]:
@@ -37,7 +37,7 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
             name = printable(path.name, 90) + ("/" if is_folder else "")
             flags = imgui.SelectableFlags_.allow_double_click
             flags |= imgui.SelectableFlags_.no_auto_close_popups
-            # The name is drawn as text, because "##" in a label would hide the rest.
+            # The name is drawn as text, because "##" in a label would hide everything after it.
             is_marked = path in dialog.chosen or path == dialog.current
             pressed, _ = imgui.selectable(f"##file{number}", is_marked, flags)
             note_item(state, f"file {path.name}")

@@ -106,13 +106,13 @@ class Loader:
             self.scene, self.builders = begin(contents, self._settings)
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
-        """Apply motions to the open figures; motions that match none are shown on their own."""
+        """Apply motions to the open figures; motions that match none are shown separately."""
         from viewer.loading.driving import is_body
 
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures
         if contents.only_bodies and not any(is_body(figure) for _, figure in figures):
-            figures = []  # the people are drawn with the bundled body and replace the scene
+            figures = []  # people drawn with the bundled body replace the scene
         kept = {path for path, _ in figures} | {path for path, _ in opened.morphs}
         morphs = [*opened.morphs, *contents.morphs]
         joined = replace(contents, figures=figures, groups=opened.groups, morphs=morphs)
@@ -120,7 +120,7 @@ class Loader:
         count = len(begin(replace(joined, captures=[], skeleton_motions=[]))[0].actors)
         self.scene, self.builders = begin(joined, self._settings)
         if contents.skeleton_motions and len(self.scene.actors) > count:
-            # A BVH that drives no open figure is shown on its own.
+            # A BVH that drives no open figure is shown separately.
             kept = set()
             self.scene, self.builders = begin(contents, self._settings)
         self.paths = (*(path for path in self._opened if path in kept), *paths)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pathlib import Path
 
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import choice, explain
 from viewer.app.files.export_formats import N_ROWS, draw_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.motion_export import (
+    is_one_file,
     motion_files,
     motion_formats,
     motion_suffixes,
@@ -17,6 +18,7 @@ from viewer.app.files.motion_export import (
     unsuited_formats,
 )
 from viewer.app.files.state import Files
+from viewer.data_classes import dataclass
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.scene import Actor
@@ -69,6 +71,7 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
             choice(state, "Actors##exported", "all" if selection.everyone else "one", whose, 12.0)
             == "all"
         )
-        explain("" if dialog.suffix == "" else "one file per actor, numbered by actor")
+        is_one = dialog.suffix == "" or is_one_file(Path(f"motion{dialog.suffix}"))
+        explain("one file for all" if is_one else "one file per actor, numbered by actor")
     actor = _first(state, selection)
     draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (
@@ -18,9 +19,11 @@ from viewer.export import (
     animation_for,
     export_animation,
     export_clips,
+    export_figures,
     suited_exporter,
 )
-from viewer.export._motion_paths import motion_paths
+from viewer.export._gltf.sampled import placed_actor
+from viewer.export._motion_paths import is_together, motion_paths
 from viewer.export._vrm.humanoid import is_humanoid
 from viewer.formats import all_or_none, check_folder_target, check_targets
 from viewer.phrases import printable
@@ -28,7 +31,7 @@ from viewer.progress import receiving
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import JointMotion
-from viewer.rig.motion.own_animations import keeps_keys
+from viewer.rig.motion.own_animations import has_own_animations, keeps_keys, own_animations
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.timing import frame_at
@@ -37,10 +40,11 @@ from viewer.rig.motion.upright import upright_actor
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
-_MANY = (".obj",)  # one file per frame: only exported by the command line
+_MANY = (".obj",)  # one file per frame: exported by the command line only
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = [
+    "is_one_file",
     "motion_files",
     "motion_formats",
     "motion_suffixes",
@@ -64,7 +68,7 @@ def motion_suffixes() -> tuple[str, ...]:
 
 
 def motion_formats(actor: Actor) -> dict[str, Exporter]:
-    """Return the exporters of motions by suffix; of several the one that suits the actor."""
+    """Return exporters of motions by suffix: if there are several, the one that suits the actor."""
     found = {
         suffix: EXPORTERS[suited_exporter(f"motion{suffix}", actor.figure)]
         for suffix in motion_suffixes()
@@ -73,7 +77,7 @@ def motion_formats(actor: Actor) -> dict[str, Exporter]:
 
 
 def unsuited_formats(actor: Actor) -> dict[str, str]:
-    """Return why formats cannot hold the motion of an actor, by suffix."""
+    """Return the reasons why formats cannot store the motion of an actor, by suffix."""
     skeleton = actor.figure.skeleton
     is_body = skeleton is not None and member_of(tuple(skeleton.parents.tolist())) is not None
     found = {} if is_body else {FOLDER: "for bodies of the SMPL family only"}
@@ -97,15 +101,26 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
     Returns
     -------
     list of Path
-        One file per actor, and a ``.bin`` next to each ``.gltf``; for a folder, its folder of
-        frames.
+        One file per actor, or one for all if the format holds several figures, and a ``.bin`` next
+        to each ``.gltf``; for a folder, its folder of frames.
     """
     if not path.suffix:
         return [path / _FRAMES]
     actors = moving_actors(state) if everyone else [state.actor]
-    paths = motion_paths(path, actors) if actors else []
+    paths = _paths(path, actors) if actors else []
     beside = [file.with_suffix(".bin") for file in paths if file.suffix.lower() == ".gltf"]
     return [*paths, *beside]
+
+
+def is_one_file(path: Path) -> bool:
+    """Return whether a name selects one file with all actors."""
+    kinds = [kind for kind in EXPORTERS.values() if path.suffix.lower() in kind.suffixes]
+    return any(kind.writes_several for kind in kinds) and is_together(path, MotionOptions())
+
+
+def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
+    """Return the distinct files of actors."""
+    return [path] if is_one_file(path) else motion_paths(path, actors)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -132,8 +147,9 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         Target, whose suffix selects the format; without a suffix, it is an EasyMocap folder. Either
         all files are written or none.
     everyone : bool
-        Whether all actors are written, one file each (or one folder for all), or only the chosen
-        one.
+        Whether all actors are written, or only the chosen one. Folders, and formats that hold
+        several figures, contain all of them, including those that do not move; other formats get
+        one file per actor.
     """
     try:
         parts, left_out = _parts(state, path, everyone)
@@ -147,9 +163,11 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
-    scene = Scene([], world_up=state.scene.up)
+    scene = Scene([], world_up=state.scene.up, views=state.scene.views)
+    still = [each.copy() for each in state.scene.actors if everyone and each.clip is None]
     options = MotionOptions(skinning=replace(state.options.skinning))
-    more = f" and {len(parts) - 1} more" if path.suffix and len(parts) > 1 else ""
+    n_paths = len({part.path for part in parts})
+    more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
     title = f"Writing {printable(parts[0].path.name, 60)}{more}"
 
     def write(report: Report) -> list[str]:
@@ -160,7 +178,11 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
             if key == "easymocap":
                 return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
             with all_or_none(files):
-                return [*map(str, [*_write(scene, parts, key, options), *left_out])]
+                if is_one_file(path) and len(parts) + len(still) > 1:
+                    notes = _write_together(scene, parts, still, path, options)
+                else:
+                    notes = _write(scene, parts, key, options)
+                return [*map(str, [*notes, *left_out])]
 
     state.job = CountedJob(title, write)
 
@@ -168,14 +190,15 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
     """Return the parts to write, and notes about omitted actors."""
     actors = moving_actors(state) if everyone else [state.actor]
-    paths = motion_paths(path, actors) if path.suffix else [path] * len(actors)
+    is_one = not path.suffix or is_one_file(path)
+    paths = [path] * len(actors) if is_one else motion_paths(path, actors)
     parts, notes = list[_Part](), list[Diagnostic]()
     for number, (actor, file) in enumerate(zip(actors, paths, strict=True)):
         frames = _range(state, actor)
         if frames is not None and frames[0] >= frames[1]:
             notes.append(Diagnostic("X003.absent-in-range", values={"figure": actor.name}))
             continue
-        # Edits made during the export must not change what is written.
+        # Edits made during the export must not change the written motion.
         copied = actor.copy()
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None
@@ -208,6 +231,29 @@ def _write(
         animation, up = animation_for(key, options, scene, part.actor, part.rate, part.frames)
         notes += export_animation(animation, part.path, key, replace(options, world_up=up))
     return notes
+
+
+def _write_together(
+    scene: Scene,
+    parts: Sequence[_Part],
+    still: Sequence[Actor],
+    path: Path,
+    options: MotionOptions,
+) -> list[Diagnostic]:
+    """Write all actors into one file, with their own keys if all of them have keys."""
+    from viewer.export.gltf import export_animations
+
+    if all(part.frames is None and keeps_keys(scene, part.actor) for part in parts):
+        actors = [placed_actor(scene, each) for each in (*(part.actor for part in parts), *still)]
+        clips = [
+            own_animations(each) or None if has_own_animations(each) else None for each in actors
+        ]
+        return export_figures(actors, path, options.skinning, clips, scene)
+    found = [
+        (part.actor, *animation_for("gltf", options, scene, part.actor, part.rate, part.frames))
+        for part in parts
+    ]
+    return export_animations(found, path, options, scene, still)
 
 
 def _write_capture(

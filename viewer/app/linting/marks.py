@@ -21,12 +21,12 @@ from viewer.rig.scene import actor_points
 
 __all__ = ["aim", "marks_of", "show_finding"]
 
-_MOST = 3000  # largest number of marked vertices, and of marked edges of triangles
-_FEW = 200  # up to this many triangles also get a mark at the centre: tiny edges cover no pixel
-_AROUND, _AROUND_JOINTS = 0.06, 0.15  # shown around a finding, relative to the actor's size
+_MOST = 3000  # maximum number of marked vertices, and of marked triangle edges
+_FEW = 200  # up to this number, triangles also have a central mark: tiny edges cover no pixel
+_AROUND, _AROUND_JOINTS = 0.06, 0.15  # extents shown around a finding, relative to the actor's size
 _ONE_WAY = 0.5  # minimum length of the mean normal of a location with a front side
 _AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
-_STEEPEST = 70.0  # degrees
+_STEEPEST = 70.0  # maximum inclination of the camera, degrees
 _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
 
@@ -131,18 +131,18 @@ def _radius(count: int) -> float:
 
 
 def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
-    """Aim the camera at some points, from the front if it would see them from behind.
+    """Aim the camera at some points, and move it to the front if it would see them from behind.
 
     Parameters
     ----------
     state : AppState
-        State with the camera, which moves at once.
+        State with the camera, which moves immediately.
     points : (N, 3)
         Scene space.
     facing : (3,)
         Mean normal, as in ``Places``.
     around : float
-        Smallest extent to show around their centre, as a fraction of the actor's size.
+        Minimum extent to show around their centre, as a fraction of the actor's size.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -11,11 +11,12 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, overlay_rect
 from viewer.app.palette.entries import Entry, entries
 from viewer.app.palette.matching import ranked
+from viewer.data_classes import dataclass
 
 __all__ = ["Palette", "draw_palette", "toggle_palette"]
 
 _WIDTH, _ROWS = 34.0, 12  # in font sizes; maximum number of rows without scrolling
-_TOP = 0.14  # fraction of the window's height
+_TOP = 0.14  # upper edge, as a fraction of the window's height
 _KEY_COLOR = (1.0, 0.78, 0.45, 1.0)
 _K = imgui.Key
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.phrases import printable
 from viewer.rig.motion.animation_choice import (
@@ -30,7 +31,7 @@ __all__ = [
 NOT_ONE = -2
 """Index of a motion that is not one of the figure's animations."""
 
-_LONGEST = 48  # characters of a name
+_LONGEST = 48  # maximum length of a name in characters
 
 
 @dataclass(slots=True)
@@ -117,7 +118,7 @@ def _clips(
         if index >= 0:
             number = counterpart(actor.figure, chosen.figure.animations[index])
             if number < 0 and own_first(actor.figure, [chosen.figure]) == 0:
-                continue  # another character of the file keeps playing its own
+                continue  # another character of the file keeps playing its own animation
         if actor is not chosen and played(actor) == NOT_ONE:
             continue  # the actor has a motion from another file
         clip = None if number < 0 else actor.figure.animations[number].clip()

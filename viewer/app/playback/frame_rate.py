@@ -25,11 +25,11 @@ def rate_of(state: AppState) -> float:
 
 
 def foreign_rate(state: AppState) -> str:
-    """Return why the rate cannot be set for the chosen actor: another actor defines the frames."""
+    """Return the reason why the actor's rate cannot be set: another actor defines the frames."""
     clock = state.clock
     if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
-    return "the frames are those of another motion: select its actor"
+    return "the frames belong to another motion: select its actor"
 
 
 def set_rate(state: AppState, rate: float) -> None:

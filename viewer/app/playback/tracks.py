@@ -21,17 +21,17 @@ from viewer.rig.srgb import encode_color
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
-_NAME_WIDTH = 9.0  # in font sizes
+_NAME_WIDTH = 9.0  # width of the actors' names, in font sizes
 _TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler
 _TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
-_PLAIN = (0.44, 0.62, 0.80)  # colour of actors without a colour, sRGB
+_PLAIN = (0.44, 0.62, 0.80)  # sRGB colour of the tracks of actors without their own colour
 _QUIET = 0.6  # opacity of the tracks of unchosen actors
-_CHOSEN_EDGE = 0.85  # opacities
-_NARROWEST = 0.35  # smallest width of a bar, in font sizes: single frames must be visible
-_NARROWEST_GAP = 1.0  # points between two bars of that width
+_CHOSEN_EDGE = 0.85  # opacity of the edge of the chosen actor's track
+_NARROWEST = 0.35  # minimum width of a bar, in font sizes: single frames must be visible
+_NARROWEST_GAP = 1.0  # points between two bars of minimum width
 _OUTSIDE = (0.0, 0.0, 0.0, 0.35)
-_KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # size relative to the height of a track
+_KEY, _KEY_SIZE = (0.0, 0.0, 0.0, 0.55), 0.16  # RGBA colour; size relative to the height of a track
 _LINE, _TEXT, _BACK = 0.13, 0.6, 0.03
 
 
@@ -138,7 +138,7 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     places : sequence of float
         Start and end of each bar, alternating, in points.
     narrowest : float
-        Smallest width of a bar, unless its neighbours leave less room.
+        Minimum width of a bar, unless its neighbours leave less room.
     end : float
         Right end of the track.
 

@@ -27,7 +27,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["draw_own_numbers", "draw_vector_component", "is_ball"]
 
-_SAME = 1e-9  # tolerance within which rotations are equal
+_SAME = 1e-9  # tolerance for equal rotations
 _rotations: Memo[Skeleton, Floats] = Memo()
 _numbers: Memo[Skeleton, Floats] = Memo()
 

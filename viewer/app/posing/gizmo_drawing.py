@@ -43,8 +43,8 @@ _HOT = (1.0, 0.92, 0.55)
 _LIMIT = (1.0, 0.70, 0.10)
 _CHAIN = (0.45, 0.90, 0.95)
 _BEHIND = 0.28  # opacity of the far side of a ring
-_MOST_DOTS = 300  # maximum number of joints drawn as dots
-_ARC_RADIUS = 0.62  # relative to the radius of the rings
+_MOST_DOTS = 300  # maximum number of joints for which dots are drawn
+_ARC_RADIUS = 0.62  # radius of an arc, relative to that of the rings
 _GAP = 10.0  # points between a ring and its text
 
 
@@ -168,7 +168,7 @@ def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
 
 
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
-    """Draw the rings of the joint; during a drag only the grabbed ring and the angle."""
+    """Draw the rings of the joint; during a drag, draw only the grabbed ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
     if drag is not None and isinstance(drag.handle, RotateHandle):
         _draw_rotation(pen, posed, drag.handle, drag.outcome.angle or 0.0)

@@ -21,7 +21,7 @@ OWN_NUMBERS = -2
 TRANSLATION, SCALE = -3, -4
 """Values used instead of a DOF for the rows with the translation and the scale of a joint."""
 
-_LONGEST = 60  # characters of a name
+_LONGEST = 60  # maximum length of a name in characters
 _known_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
 _known_rows: Memo[Skeleton, Rows] = Memo(kept=4)
 

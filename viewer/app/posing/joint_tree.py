@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 
 __all__ = ["JointTree", "joint_tree", "select_joint"]
 
-_MOST_OPENED = 128  # maximum number of joints of a rig that is initially expanded
+_MOST_OPENED = 128  # rigs with more joints are initially collapsed
 
 
 @dataclass(slots=True)
@@ -72,5 +73,5 @@ def select_joint(state: AppState, joint: int) -> None:
     if tree.filter.lower() not in joint_label(skeleton, joint).lower():
         tree.filter = ""
     while joint >= 0:
-        tree.opened.add(joint)  # so that the rows below it are visible
+        tree.opened.add(joint)  # shows the rows of its DOFs
         joint = int(skeleton.parents[joint])

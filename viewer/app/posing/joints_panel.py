@@ -60,8 +60,8 @@ from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton
 
 __all__ = ["draw"]
 
-_LABEL_WIDTH = 1.6  # in font sizes
-_INDENT = 0.6  # font sizes per level
+_LABEL_WIDTH = 1.6  # width of a label, in font sizes
+_INDENT = 0.6  # indentation per level, in font sizes
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))
 _MAY_TYPE_BEYOND = imgui.SliderFlags_.none
@@ -223,7 +223,7 @@ def _draw_dof(
     imgui.align_text_to_frame_padding()
     start = imgui.get_cursor_pos_x()
     imgui.text_colored(ink(_AXIS_COLORS[kind % 3]), name)
-    # All sliders of a joint begin at one place, whatever the width of their labels.
+    # All sliders of a joint begin at the same position, regardless of the widths of their labels.
     imgui.same_line(start + _LABEL_WIDTH * imgui.get_font_size())
     imgui.set_next_item_width(-1.0)
     low, high = skeleton.dof_limits[dof]

@@ -1,18 +1,18 @@
 """Arcs of rotation limits, about the current axes of a joint.
 
 An arc covers the directions that the bone can reach: it starts at the bone's current direction
-perpendicular to the axis, and its ends are the limits. If the bone lies along the axis, as for a
-twist, one of the joint's own axes is used instead.
+perpendicular to the axis, and its ends are the limits. If the bone is parallel to the axis, as for
+a twist, one of the joint's own axes is used instead.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.app.posing.posed_joint import PosedJoint
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.pose import Pose

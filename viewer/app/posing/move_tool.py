@@ -7,13 +7,12 @@ translation DOFs, are translated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
 from viewer.app.posing.state import Outcome
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.number_text import number_text
@@ -38,11 +37,11 @@ __all__ = [
 LENGTH = 72.0
 """Length of the arrows, points."""
 
-_REACH = 7.0  # points around an arrow within which it is grabbed
-_SHORTEST = 12.0  # points: a shorter arrow points almost at the eye
-_BARE = 14.0  # points at an arrow's base that belong to the joint's handle
-_ITERATIONS = 40  # iterations of the solver: bounds the time per frame
-_MET = 1e-3  # smallest remaining distance that is shown, relative to the figure's size
+_REACH = 7.0  # distance in points within which an arrow can be grabbed
+_SHORTEST = 12.0  # points: arrows that appear shorter point almost at the eye
+_BARE = 14.0  # points from the joint within which an arrow belongs to the joint's handle
+_ITERATIONS = 40  # maximum number of iterations of the solver, which bounds the time per frame
+_MET = 1e-3  # remaining distance above which it is shown, relative to the figure's size
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +75,7 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     joint : int
         Index of the dragged joint.
     asked : int
-        Maximum number; 0 means two, with a root, which would rotate the whole figure, only if
+        Maximum number; 0 means two, without the root, which would rotate the whole figure, unless
         nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)
@@ -264,5 +263,5 @@ def _nearest_to(center: Floats, axis: Floats, origin: Floats, direction: Floats)
 
 
 def shift_text(name: str, way: Floats) -> str:
-    """Return the text beside the mouse: what has been moved, and how far along each axis."""
+    """Return the text next to the pointer: name of the moved item, and distance along each axis."""
     return f"{name}   {' '.join(number_text(part, '+.3g') for part in way.tolist())}"

@@ -34,7 +34,7 @@ from viewer.rig.shape import shaped
 __all__ = ["draw"]
 
 _REACH = 5.0  # range of a slider in standard deviations; larger values can be typed
-_SEARCHED = 60  # longer lists of shapes have a filter
+_SEARCHED = 60  # lists with more shapes have a filter
 _LABELS = 0.55  # maximum width of the names, relative to the width of the panel
 _HEADINGS = {
     "shape": "Shape",
@@ -129,9 +129,9 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
 
 
 def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
-    """Return the shapes whose names contain a text, below the headings of their groups.
+    """Return the shapes whose names contain the given text, below the headings of their groups.
 
-    A heading is a row like the others, so that long lists can be clipped.
+    Headings are rows too, so that long lists can be clipped.
     """
     rows: list[int | str] = []
     last = ""

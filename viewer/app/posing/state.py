@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from viewer.app.core.view_frame import ViewFrame
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor
@@ -111,7 +111,7 @@ class Drag:
 class HeldVector:
     """A joint's rotation vector as edited, which may be longer than pi.
 
-    Beyond pi, a shorter vector gives the same rotation, so the rotation does not determine the
+    Beyond pi, a shorter vector describes the same rotation, so the rotation does not determine the
     vector.
 
     Attributes
@@ -154,7 +154,7 @@ class Posing:
     held_vector : HeldVector or None
         The rotation vector being edited.
     shape_filter : str
-        Text that the names of listed shapes contain, for figures with many.
+        Text that the names of listed shapes must contain, for figures with many shapes.
     shape_seed : int
         Seed of the last random shape.
     n_hand_components : int

@@ -78,7 +78,7 @@ def selected(state: AppState) -> PosedJoint | None:
 
 
 def no_tool(state: AppState) -> str:
-    """Return why nothing can be posed in the view."""
+    """Return the reason why nothing can be posed in the view."""
     if state.options.show == "binding" and state.actor.figure.is_attached:
         return "the skin is shown in its bind pose: press K to show the pose"
     if not state.actor.is_drawn:
@@ -87,7 +87,7 @@ def no_tool(state: AppState) -> str:
 
 
 def no_orientation(state: AppState) -> str:
-    """Return why the choice of axes has no effect on the selected joint."""
+    """Return the reason why the choice of axes has no effect on the selected joint."""
     skeleton, joint = state.actor.figure.skeleton, state.selected_joint
     if skeleton is None or joint < 0:
         return ""
@@ -116,7 +116,7 @@ def chain_length(state: AppState) -> int:
 
 
 def no_chain(state: AppState) -> str:
-    """Return why the length of the chain cannot be chosen."""
+    """Return the reason why the length of the chain cannot be chosen."""
     if state.of(Posing).tool != "move":
         return with_key(state, "chains apply only to the Move tool", "D")
     skeleton = state.actor.figure.skeleton
@@ -128,7 +128,7 @@ def no_chain(state: AppState) -> str:
 
 
 def no_keys(state: AppState) -> str:
-    """Return why the pose cannot be keyed."""
+    """Return the reason why the pose cannot be keyed."""
     clip = state.actor.clip
     if clip is None:
         return no_pose(state) or "there is no clip: create one with Edit > New clip"

@@ -27,7 +27,7 @@ __all__ = ["draw_toolbar"]
 
 _GAP = 10.0  # points from the edges of the view
 _NARROWEST, _LOWEST = 250.0, 140.0  # points: a smaller view has no room for tools
-_WIDTH = 14.5  # width of each row, in font sizes: buttons must not move when rows appear
+_WIDTH = 14.5  # fixed width of each row, in font sizes: buttons must not move when rows appear
 
 
 def draw_toolbar(state: AppState, legend: Rect | None) -> Rect | None:
@@ -131,7 +131,7 @@ def _draw_chain(state: AppState) -> None:
 def _draw_actions(state: AppState) -> None:
     """Draw the buttons of actions on the whole pose."""
     why = no_pose(state)
-    paste = "paste a pose, also from another figure"
+    paste = "paste a pose, even from another figure"
     rows = (
         ("Mirror", mirror, with_key(state, "mirror the pose left to right", "M"), why),
         ("Copy", copy_pose, with_key(state, "copy the pose", "Ctrl+C"), why),

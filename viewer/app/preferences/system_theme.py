@@ -8,7 +8,7 @@ import sys
 
 __all__ = ["system_theme"]
 
-_PATIENCE = 1.0  # seconds: the window must not wait for a desktop that does not respond
+_PATIENCE = 1.0  # time limit in seconds: some desktops do not respond
 _GSETTINGS = ("gsettings", "get", "org.gnome.desktop.interface", "color-scheme")
 _DEFAULTS = ("defaults", "read", "-g", "AppleInterfaceStyle")
 _PERSONALIZE = r"Software\Microsoft\Windows\CurrentVersion\Themes\Personalize"

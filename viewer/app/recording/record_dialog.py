@@ -57,7 +57,7 @@ _BACKGROUNDS = {
     "transparent": "transparent",
 }
 _TITLE = "Record"
-_WINDOW = (30.0, 42.5)  # in font sizes
+_WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
 
@@ -118,7 +118,7 @@ def _draw_file(state: AppState, settings: RecordSettings) -> None:
             state, "Compression quality###Quality", settings.quality, (0, 100)
         )
         settings.quality = min(max(settings.quality, 0), 100)
-        explain("higher quality gives larger files")
+        explain("higher quality results in larger files")
 
 
 def _draw_picture(state: AppState, settings: RecordSettings) -> None:
@@ -175,7 +175,7 @@ def _draw_frames(state: AppState, settings: RecordSettings) -> None:
 
 
 def _draw_range(state: AppState, settings: RecordSettings) -> None:
-    """Draw the first and last frame, which are those of the playback range unless edited."""
+    """Draw the first and last frame, by default the ends of the playback range."""
     clock = state.clock
     lowest, highest = (clock.first_frame + frame for frame in clock.frame_range)
     shown = settings.frames or playback_frames(state)
@@ -187,7 +187,7 @@ def _draw_range(state: AppState, settings: RecordSettings) -> None:
 
 
 def _pair_field(state: AppState, label: str, values: tuple[int, int]) -> tuple[int, int] | None:
-    """Draw two fields for whole numbers; return both once one was entered."""
+    """Draw two fields for whole numbers; return both when either has been entered."""
     found = list(values)
     entered = []
 
@@ -203,7 +203,7 @@ def _pair_field(state: AppState, label: str, values: tuple[int, int]) -> tuple[i
 
 
 def _within(state: AppState, value: float, low: float, high: float) -> float:
-    """Return a value limited to a range, and say so if it was not within it."""
+    """Return a value limited to a range; show a message if it was outside."""
     limited = min(max(value, low), high)
     if limited != value:
         state.say_status(f"limited to {number_text(limited)}")
@@ -238,5 +238,5 @@ def ask_where(state: AppState, settings: RecordSettings) -> None:
 def _start(state: AppState, paths: list[Path]) -> None:
     recording, suffix = state.of(Recording), paths[0].suffix.lower()
     if recording.settings is not None and {suffix, recording.settings.kind} <= {*VIDEO_KINDS}:
-        recording.settings.kind = suffix  # a suffix that was typed over the suggested one
+        recording.settings.kind = suffix  # the user typed a different suffix
     recording.wanted = paths[0]

@@ -16,7 +16,7 @@ __all__ = ["draw_preview", "hover_pair"]
 
 _MATCHED = (0.45, 0.78, 1.0, 1.0)
 _HOVERED = (1.0, 0.86, 0.35, 1.0)
-_NEAR = 0.7  # font sizes; joints this close to the mouse are hovered
+_NEAR = 0.7  # distance in font sizes within which a joint is hovered
 _DOT = 0.16  # radius of a joint, font sizes
 _DRAG = 0.01  # radians per pixel
 
@@ -70,7 +70,7 @@ def hover_pair(state: AppState, shown: Shown, joint: int) -> None:
 
 
 def _hover(state: AppState, shown: Shown, placed: list[Floats]) -> None:
-    """Highlight the joint under the mouse and its partners; a click selects that of the figure."""
+    """Highlight the joint under the mouse and its partners; a click selects the figure's joint."""
     view = state.of(JointMatch)
     near = _NEAR * imgui.get_font_size()
     mouse = np.array([imgui.get_mouse_pos().x, imgui.get_mouse_pos().y])

@@ -44,7 +44,7 @@ from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler
 
 __all__ = ["draw_alignment"]
 
-_FEWEST = 3  # smallest number of landmarks
+_FEWEST = 3  # minimum number of landmarks
 _DOUBTFUL = 0.03  # error relative to the target's size, as in the report
 _STRETCHED = "stretched, pose kept"
 _METHODS = {
@@ -102,7 +102,7 @@ def draw_alignment(state: AppState) -> None:
 
 
 def _draw_placing(placing: Placing | None) -> None:
-    """Draw the distance between the template and the target as they are aligned."""
+    """Draw the distance between the aligned template and the target."""
     if placing is None:
         imgui.text_disabled("not aligned yet")
         return
@@ -135,14 +135,14 @@ def _method_text(found: Alignment) -> str:
 
 
 def _refine(state: AppState) -> None:
-    """Refine the current alignment by closest points; it is given as landmarks at box corners."""
+    """Refine the current alignment by closest points; box corners as landmarks represent it."""
     rigging = state.of(Rigging)
     template = aligned_template(state)
     if template is None:
         return
     low, high = (f(posed_template(rigging, template).positions, axis=0) for f in (np.min, np.max))
     corners = np.array([low, *(np.where(np.eye(3)[axis] > 0, high, low) for axis in range(3))])
-    corners[1:] += (high == low) * np.eye(3)  # flat meshes also need four different corners
+    corners[1:] += (high == low) * np.eye(3)  # keeps the four corners of flat meshes distinct
     pairs = np.stack([corners, similarity_now(state, template).apply(corners)], axis=1)
     start_align(state, AlignmentSettings(landmarks=pairs, scale=rigging.choices.scale))
 

@@ -51,11 +51,11 @@ def posed_template(view: Rigging, template: Template) -> Mesh:
     key = (template.figure, pose_key(template.pose))
     if view.ghost_figure is None or view.ghost_key != key:
         positions, normals = deform(template.figure, template.pose)
-        assert template.figure.mesh is not None  # it is attached
+        assert template.figure.mesh is not None  # templates have meshes
         mesh = Mesh(positions, normals, template.figure.mesh.triangles)
         view.ghost_key, view.ghost_figure = key, Figure(template.figure.name, mesh)
     mesh_now = view.ghost_figure.mesh
-    assert mesh_now is not None  # it was built from a mesh
+    assert mesh_now is not None  # the figure has a mesh
     return mesh_now
 
 
@@ -92,7 +92,7 @@ def aligned_template(state: AppState) -> Template | None:
 
 
 def similarity_now(state: AppState, template: Template) -> Similarity:
-    """Return the similarity that places the template; it is based on boxes until the alignment."""
+    """Return the similarity that places the template, from bounding boxes until it is aligned."""
     placing = placing_now(state)
     if placing is not None:
         return placing.similarity
@@ -107,8 +107,8 @@ def as_similarity(matrix: Floats, like: Similarity | None = None) -> Similarity:
     matrix : (4, 4)
         Matrix that is nearly a similarity, without reflection; rounding errors are removed.
     like : Similarity or None
-        Similarity before the change. If it stretches the template along its own axes, so does the
-        result.
+        Similarity before the change. If it stretches the template along the template's axes, the
+        result does so too.
     """
     linear = np.asarray(matrix, dtype=np.float64)[:3, :3]
     own = np.ones(3)
@@ -175,7 +175,7 @@ def ghost_of(state: AppState) -> Ghost | None:
         return None
     posed_template(view, template)
     figure, place, old = view.ghost_figure, ghost_place(state, template), view.shown
-    assert figure is not None  # it was just posed
+    assert figure is not None  # the template has just been posed
     if old is None or (old.figure, old.style) != (figure, style) or (old.placement != place).any():
         return Ghost(figure, place, style)
     return old

@@ -72,7 +72,7 @@ TARGET = "target"
 def compare(first: Result, second: Result) -> Comparison:
     """Return the differences between the weights of two results for one target."""
     one, other = first.rigged.figure.skin, second.rigged.figure.skin
-    assert one is not None and other is not None  # both are rigged
+    assert one is not None and other is not None  # both figures are rigged
     joints = np.arange(one.n_joints, dtype=np.int32)
     distances = row_distances(one, other, Pairs(joints, joints, ()))
     same = _dominant(one) == _dominant(other)
@@ -125,7 +125,7 @@ def put_results(state: AppState, results: list[Result], comparison: Comparison |
 
 
 def _play(state: AppState, result: Result) -> None:
-    """Show the joints of a result, and play the template's motion, or a trial motion."""
+    """Show the joints of a result, and play the template's motion or a trial motion."""
     state.options.xray = True
     set_motion(state, result, plays=not no_motion_of(result))
     if result.actor.clip is None:
@@ -228,7 +228,7 @@ def plays_trial(result: Result) -> bool:
 
 
 def no_trial_of(result: Result) -> str:
-    """Return why a result cannot play the trial motion."""
+    """Return the reason why a result cannot play the trial motion."""
     skeleton = result.rigged.figure.skeleton
     found = None if skeleton is None else trial_clip(skeleton, result.rigged.pose)
     return "" if found is not None else "no joint of the template can rotate"
@@ -244,7 +244,7 @@ def set_trial(state: AppState, result: Result, plays: bool) -> None:
 
 
 def no_motion_of(result: Result | None) -> str:
-    """Return why a result cannot play the motion of its template."""
+    """Return the reason why a result cannot play the motion of its template."""
     if result is None:
         return "nothing is rigged yet: press Run"
     if isinstance(result.template.clip, JointMotion):

@@ -37,7 +37,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_results"]
 
-_LINES_HEIGHT = 9.0  # visible lines of the report
+_LINES_HEIGHT = 9.0  # number of visible lines of the report
 
 
 def draw_results(state: AppState) -> None:
@@ -106,7 +106,7 @@ def _draw_table(state: AppState) -> None:
     _row("", "", [one.method for one in found])
     _row(
         "matched",
-        "vertices with weights taken from the closest points of the template",
+        "vertices whose weights come from the closest points of the template",
         [f"{100.0 * one.weights.matched.mean():.1f} %" for one in rigged],
     )
     _row(

@@ -63,7 +63,7 @@ def draw(state: AppState) -> None:
     with disabled(state, why):
         if _section("Align", "align the template with the target"):
             draw_alignment(state)
-        if _section("Match", "conditions for taking the template's weights unchanged"):
+        if _section("Match", "conditions for using the template's weights unchanged"):
             _draw_match(state)
         if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)
@@ -117,7 +117,7 @@ def _draw_sources(state: AppState) -> None:
             else:
                 _add_template(state)
         if not refuses:
-            explain("add the template next to the target, to pose it like the target")
+            explain("add the template next to the target in order to pose it like the target")
     imgui.push_text_wrap_pos(0.0)
     imgui.text_disabled(_template_text(template))
     imgui.pop_text_wrap_pos()
@@ -128,7 +128,7 @@ def _template_text(template: Template | None) -> str:
     if template is None:
         return "read on first use"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
-    assert skeleton is not None and mesh is not None  # it is attached
+    assert skeleton is not None and mesh is not None  # templates have a mesh and a skeleton
     pose = "in its current pose" if template.actor is not None else "in its file's pose"
     return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 
@@ -150,7 +150,7 @@ def _read_template(state: AppState, paths: list[Path]) -> None:
 def _add_template(state: AppState) -> None:
     """Add the template to the scene, to the right of the other actors."""
     template = current_template(state)
-    assert template is not None  # it was read
+    assert template is not None  # the template has been read
     actor = Actor(template.figure, template.pose.copy(), template.clip)
     actor.called = free_title(state.scene.actors, actor.title)
     span = bounding_box(actor_points(actor))[:, 0]
@@ -205,7 +205,7 @@ def _draw_run(state: AppState) -> None:
     if button(state, "Run", why):
         start_run(state, (choices.method,))
     if not why:
-        explain("rig the target, after aligning the template if necessary")
+        explain("rig the target; aligns the template first if necessary")
     same_line_if_room("Compare methods")
     if button(state, "Compare methods", why):
         start_run(state, tuple(METHODS))
@@ -214,7 +214,7 @@ def _draw_run(state: AppState) -> None:
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
-    """Draw the rarely used settings, collapsed; the label gives the number of changed ones."""
+    """Draw the rarely used settings, collapsed; the label shows the number of changed settings."""
     usual = RigChoices()
     changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
     text = f"Advanced ({changed} changed)" if changed else "Advanced"
@@ -244,7 +244,7 @@ def _draw_advanced_choices(state: AppState, choices: RigChoices) -> None:
         text = "%d" if choices.max_influences else "all"
         limits = (0, _MOST_INFLUENCES)
         most = count_slider(state, "Max. influences", choices.max_influences, limits, text)
-        explain("largest influences to keep per vertex; 0 keeps all", why)
+        explain("number of influences to keep per vertex, largest first; 0 keeps all", why)
         choices.max_influences = max(most, 0)
         choices.correctives = checkbox(state, "Pose correctives", choices.correctives)
         explain("transfer the template's pose correctives, if any", why)

@@ -130,19 +130,19 @@ def read_template(paths: tuple[Path, ...], key: str = _FILE) -> Template:
         names = ", ".join(printable(path.name, 60) for path in paths)
         raise RigError(f"{names}: expected a figure with mesh, skeleton and skin, found none")
     actor = attached[0]
-    assert actor.pose is not None  # it has a skeleton
+    assert actor.pose is not None  # rigged actors have poses
     return Template(key, actor.figure, actor.pose, actor.clip, None, paths)
 
 
 def no_target(state: AppState) -> str:
-    """Return why there is nothing to rig."""
+    """Return the reason why there is nothing to rig."""
     if state.of(Rigging).target is not None:
         return ""
     return f"every mesh in the scene has a rig: add a mesh without one, {one_of(MESHES)}"
 
 
 def no_results(state: AppState) -> str:
-    """Return why there is no rigged mesh to show."""
+    """Return the reason why there is no rigged mesh to show."""
     there = {id(actor) for actor in state.scene.actors}
     if any(id(result.actor) in there for result in state.of(Rigging).results.values()):
         return ""

@@ -66,7 +66,7 @@ def align_template(
         As for ``align``.
     """
     plain = template.pose.copy()
-    plain.shape_weights = np.zeros(0)  # from here on, the shape is part of the figure
+    plain.shape_weights = np.zeros(0)  # the shape is now part of the figure
     figure = shaped(template.figure, template.pose.shape_weights)
     found = align_posed(figure, plain, target, settings, fits, progress)
     is_other = template.figure is not own.figure or pose_key(template.pose) != pose_key(own.pose)
@@ -126,7 +126,7 @@ def match_fields(
     fraction : float
         Fraction of the vertices that match.
     """
-    assert template.figure.mesh is not None  # it is attached
+    assert template.figure.mesh is not None  # templates have meshes
     posed = similarity.apply(deform(template.figure, template.pose)[0])
     welded = weld(mesh.positions, mesh.triangles)
     size = box_size(bounding_box(mesh.positions))
@@ -178,6 +178,6 @@ def transfer_settings(
             max_influences=choices.max_influences or None,
         ),
         joints=choices.joints,
-        fits=False,  # it was fitted during the alignment
+        fits=False,  # the template was fitted during the alignment
         correctives=choices.correctives,
     )

@@ -34,9 +34,9 @@ RADIUS = 80.0
 _G = imguizmo.im_guizmo
 _OPERATIONS = {"move": _G.OPERATION.translate, "rotate": _G.OPERATION.rotate}
 _SIZE = 0.22  # size of the gizmo, in clip space
-_FAR = 50.0  # distance of the eye that replaces a parallel projection, in half heights of the view
-_REACH = 8.0  # window coordinates around the ring within which it is grabbed
-_LEAST = 0.02  # minimum factor: a pointer at the centre must not make the template vanish
+_FAR = 50.0  # eye distance of the substitute for a parallel projection, in half heights of the view
+_REACH = 8.0  # distance within which the ring can be grabbed, window coordinates
+_LEAST = 0.02  # minimum factor: dragging to the centre must not make the template vanish
 _INK, _HOT = (0.92, 0.92, 0.92, 0.9), (1.0, 0.92, 0.55, 1.0)
 
 
@@ -71,7 +71,7 @@ def _manipulated(state: AppState, before: Floats) -> Floats | None:
     view = state.of(Rigging)
     size = float(np.cbrt(np.linalg.det(before[:3, :3])))
     rigid = before.copy()
-    rigid[:3, :3] /= size  # the handles must not grow with the template
+    rigid[:3, :3] /= size  # the size of the handles does not depend on that of the template
     now = _matrix(rigid)
     _G.begin_frame()
     _G.set_drawlist(imgui.get_background_draw_list())

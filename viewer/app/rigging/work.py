@@ -72,7 +72,7 @@ _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the
 
 
 def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> None:
-    """Start a job in a thread; the function that it returns is later called in the frame loop."""
+    """Start a job in a thread; the frame loop later calls the function that the job returns."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
         return
@@ -114,7 +114,7 @@ def start_adding(state: AppState, path: Path) -> None:
             actor.called = free_title(state.scene.actors, actor.title)
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
-            state.of(Rigging).target = None  # so that the panel chooses again
+            state.of(Rigging).target = None  # makes the panel choose again
             state.say(*scene.diagnostics)
             _show_added(state, actor)
 
@@ -152,7 +152,7 @@ def start_reading(
 
         def finish(state: AppState) -> None:
             state.of(Rigging).template = template
-            state.of(Rigging).template_key = ""  # another file has the same key
+            state.of(Rigging).template_key = ""  # forces a change if the key is equal
             choose_template(state, key)
             if then is not None:
                 then(state)
@@ -163,7 +163,7 @@ def start_reading(
 
 
 def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
-    """Return a function that gives a thread the template in its current or aligned pose.
+    """Return a function that provides a thread with the template in its current or aligned pose.
 
     The thread reads the template first if necessary.
     """
@@ -183,7 +183,7 @@ def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
 
 
 def _keep(state: AppState, template: Template) -> None:
-    """Keep a template that was read by a job."""
+    """Store a template that was read by a job."""
     view = state.of(Rigging)
     is_new = view.template is None or view.template.key != template.key
     if is_new and template.actor is None and view.template_key == template.key:
@@ -222,7 +222,7 @@ def start_align(state: AppState, settings: AlignmentSettings | None = None) -> N
                 return
             state.of(Rigging).placing = found
             if state.of(Rigging).tool == "landmarks":
-                state.of(Rigging).tool = ""  # show the template aligned, not next to the target
+                state.of(Rigging).tool = ""  # the template is shown aligned, not next to the target
 
         return finish
 

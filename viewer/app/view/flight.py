@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.app.core.fitting import fit_again
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 
@@ -89,7 +88,7 @@ def advance_flight(state: AppState, seconds: float) -> None:
         flight.ends = None
         _put(state, flight, end)
         if state.framing.is_fitting:
-            fit_again(state)  # the view or the scene may have changed meanwhile
+            fit_again(state)  # the view or the scene may have changed during the animation
     else:
         _put(state, flight, _between(start, end, share * share * (3.0 - 2.0 * share)))
 

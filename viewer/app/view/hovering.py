@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
@@ -12,6 +10,7 @@ from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_tool
 from viewer.app.view.axis_gizmo import is_over_gizmo
 from viewer.app.weights.state import Weights, wants_vertex
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.shown import has_joint_marks, shows_skeleton
@@ -20,7 +19,7 @@ from viewer.rig.skeleton import joint_label
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]
 
 _REST = 0.06  # seconds for which the mouse must rest before actors are picked
-_MOST = 16  # maximum number of actors for this: with more, picking is slow in software
+_MOST = 16  # maximum number of actors for picking, which is slow on software drivers
 _AWAY = 14.0  # points between the pointer and the name
 
 

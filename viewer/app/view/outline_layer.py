@@ -1,7 +1,7 @@
-"""Image of the outlines over the view, separate from that of the scene.
+"""Image of the outlines over the view, separate from the image of the scene.
 
 The item under the pointer changes often, whereas the image of the scene, which may be the average
-of many passes, is kept.
+of many passes, is cached.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class OutlineLayer:
                 self.release()
                 self._target = Target(self.context, size, 1)
             if key != self._key:
-                self._key = key  # even if drawing fails: it is retried only after a change
+                self._key = key  # set even if drawing fails, which is retried only after a change
                 renderer.draw_outlines(
                     outlined, state.scene, state.camera, state.options, self._target, state.box
                 )

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
@@ -18,6 +17,7 @@ from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import shows_vertex_info
 from viewer.app.weights.state import Hover, Weights, wants_vertex
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions
@@ -33,7 +33,7 @@ from viewer.rig.skinning import Skinning
 
 __all__ = ["Spot", "answer_picks", "spot_at", "take_pick", "vertex_at"]
 
-_LONGEST = 40  # characters of a name
+_LONGEST = 40  # maximum length of a name in characters
 _REST = 0.2  # seconds without mouse movement before a vertex is described
 
 
@@ -88,7 +88,7 @@ def _take_click(
     if not aims and (pick is None or pick.joint < 0):
         x, y, width, _ = state.view_rect
         near = joint_near(state, (x + pixel[0] * width / size[0], y + pixel[1] * width / size[0]))
-        if near >= 0:  # a near miss
+        if near >= 0:  # a joint is close to the click
             select_joint(state, near)
             return
     if pick is None:
@@ -236,21 +236,20 @@ def _vertex_of(state: AppState, found: Pick) -> tuple[int, int, int]:
     options = state.options
     actor = state.scene.actors[found.actor]
     figure = actor.figure
-    assert figure.mesh is not None  # it has a triangle
+    assert figure.mesh is not None  # a triangle was hit
     corners, triangle = figure.mesh.triangles[found.triangle], found.triangle
     if options.reduced and figure.reduced is not None:
         corners = figure.reduced.vertices[figure.reduced.triangles[found.triangle]]
         triangle = -1
     positions = _drawn_positions(actor, options, corners)
-    back = np.linalg.inv(actor.placement).astype(np.float64)
-    point = apply_transform(back, found.point)
-    return found.actor, nearest_corner(positions, corners, point), triangle
+    placed = apply_transform(actor.placement, positions)
+    return found.actor, nearest_corner(placed, corners, found.point), triangle
 
 
 def _drawn_positions(actor: Actor, options: DisplayOptions, vertices: Ints) -> Floats:
     """Return the drawn positions of vertices, before the actor's placement: (N, 3)."""
     mesh = actor.figure.mesh
-    assert mesh is not None  # it has vertices
+    assert mesh is not None  # the figure has vertices
     if options.show == "binding":
         return mesh.positions[vertices]
     return deform_vertices(actor.figure, actor.pose, options.skinning, vertices)[0]
@@ -280,7 +279,7 @@ def _look_under_mouse(
     on_skin = pick is not None and pick.joint < 0 and pick.triangle >= 0
     if pick is not None and on_skin:
         found: tuple[int, int, int] | None = _vertex_of(state, pick)
-    else:  # something is drawn over the surface
+    else:  # something else is drawn over the surface
         found = vertex_at(state, renderer, size, pixel)
     if found is not None:
         _describe(state, hover, *found)
@@ -310,7 +309,7 @@ def _describe(state: AppState, hover: Hover, index: int, vertex: int, triangle: 
     facts = vertex_facts(actor.figure, actor.pose, skinning, vertex, triangle)
     if options.show == "binding":
         mesh = actor.figure.mesh
-        assert mesh is not None  # it has this vertex
+        assert mesh is not None  # the vertex belongs to this mesh
         facts = replace(facts, position=mesh.positions[vertex], normal=mesh.normals[vertex])
     hover.point = apply_transform(actor.placement, facts.position)
     title = (actor.name,) if len(state.scene.actors) > 1 else ()

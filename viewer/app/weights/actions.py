@@ -37,7 +37,7 @@ _FIRST = ("weight", "field", "class", "parts")
 
 
 def no_view(state: AppState, key: str) -> str:
-    """Return why a scalar quantity cannot be shown; a joint or field may still have to be chosen.
+    """Return the reason why a scalar quantity cannot be shown; a joint or field may yet be chosen.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def explained(state: AppState) -> Explanation | None:
     if pinned is None:
         return None
     if not is_open(state, "vertex"):
-        unpin(state)  # the panel was closed
+        unpin(state)  # the user has closed the panel
         return None
     is_there = pinned.actor < len(actors) and actors[pinned.actor].figure is pinned.figure
     pose = actors[pinned.actor].pose if is_there else None

@@ -25,10 +25,10 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["draw_hovered", "influence_colors", "pinned_annotations", "vertex_annotation"]
 
 # Pixels in an image of standard height.
-_THINNEST, _THICKEST = 1.0, 5.0  # lines of the smallest and largest weight
+_THINNEST, _THICKEST = 1.0, 5.0  # line widths for the smallest and largest weight
 _DOT, _RIM, _BORDER = 8.0, 3.0, 2.0  # diameter of a dot; dark borders of dots and lines
 _FAINTEST = 0.35
-_LONGEST = 24  # characters of a name
+_LONGEST = 24  # maximum length of a name in characters
 _DARK, _LIGHT = (0.05, 0.06, 0.08, 0.8), (1.0, 1.0, 1.0, 1.0)
 _palettes: Memo[Skeleton, Bytes] = Memo()
 

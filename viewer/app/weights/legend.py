@@ -15,8 +15,8 @@ __all__ = ["draw_legend"]
 _GAP = 10.0  # points from the edges of the view
 _BAR = (40.0 / 3.0, 0.8)  # width and height of the bar, in font sizes
 _TALL, _WIDE = 0.8, 0.4  # fractions of the view's height and width available for names
-_MANY, _SMALLER = 12, 0.8  # number of names above which the font is scaled, and its scale
-_LONGEST = 40  # characters of a name
+_MANY, _SMALLER = 12, 0.8  # maximum number of names at normal font size; scale with more
+_LONGEST = 40  # maximum length of a name in characters
 _LINE = (0.05, 0.05, 0.06, 1.0)
 
 

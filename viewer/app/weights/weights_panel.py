@@ -30,7 +30,7 @@ from viewer.rig.scalars import SCALARS, length_unit, menu_title, shown_unit, spl
 
 __all__ = ["draw"]
 
-_LONGEST = 40  # characters of a name
+_LONGEST = 40  # maximum length of a name in characters
 _FIELD = 7.0  # width of a field, in font sizes
 _WHOLE = ("discrete", "categorical")
 
@@ -126,8 +126,8 @@ def _draw_range(state: AppState, key: str) -> None:
             options.scalar_range = None
         note_item(state, "Automatic")
         explain(
-            f"the colours span {TYPICAL:.0%} of the nonzero values; values outside get the "
-            "end colours"
+            f"the colours span {TYPICAL:.0%} of the nonzero values; values outside have the end "
+            f"colours"
             if SCALARS[key].robust
             else "the colours span all values",
             why,
@@ -136,7 +136,7 @@ def _draw_range(state: AppState, key: str) -> None:
         if imgui.radio_button("Fixed", options.scalar_range is not None):
             options.scalar_range = options.scalar_range or _present_range(state)
         note_item(state, "Fixed")
-        explain("the range does not change with the pose; values outside it get the end "
+        explain("the range does not change with the pose; values outside it have the end "
                 "colours", why)  # fmt: skip
     if options.scalar_range is not None and not why:
         low, high = options.scalar_range

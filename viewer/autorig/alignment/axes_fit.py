@@ -42,8 +42,8 @@ def fit_axes(
     Returns
     -------
     Similarity
-        Alignment with factors; the best so far if a fit would be a reflection, or too few pairs are
-        left.
+        Alignment with factors; the best one so far if a fit would be a reflection or too few pairs
+        are left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):

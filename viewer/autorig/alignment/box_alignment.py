@@ -10,7 +10,7 @@ from viewer.rig.mesh import bounding_box
 
 __all__ = ["align_boxes"]
 
-_FLAT = 1e-9  # fraction of the longest side; a thinner box cannot be scaled to another
+_FLAT = 1e-9  # fraction of the longest side; a thinner box cannot be scaled to another box
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:

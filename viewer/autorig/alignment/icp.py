@@ -2,19 +2,20 @@
 
 Besl and McKay 1992, with pairs from both surfaces, so that neither the scale nor a part
 missing from one of them biases the result. Near convergence, surfaces may slide along each other
-(point-to-plane distances, Chen and Medioni 1992), which needs far fewer iterations.
+(point-to-plane distances, Chen and Medioni 1992), which requires far fewer iterations.
 """
 
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import SurfaceSamples, sample_surface, triangle_normals
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface
@@ -38,11 +39,11 @@ __all__ = [
     "trimmed_rms",
 ]
 
-_FAR = 3.0  # multiple of the median distance; pairs farther apart are rejected
+_FAR = 3.0  # multiple of the median distance, above which pairs are rejected
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 SETTLED = 1e-5  # relative change of the error, or of scales, at which iterations end
-_EXACT = 1e-12  # error over size that counts as zero
-_ON_EDGE = 1e-9  # barycentric coordinate of a point on an edge
+_EXACT = 1e-12  # ratio of error to size below which an alignment is exact
+_ON_EDGE = 1e-9  # barycentric coordinate below which a point is on an edge
 HOLD = 3e-3  # weight of point-to-point relative to point-to-plane distances, before squaring
 _PATIENCE = 3  # iterations without improvement; new pairs may raise the error for a while
 FEWEST = 8  # minimum number of pairs for seven unknowns
@@ -132,7 +133,7 @@ def _size(points: Floats) -> float:
 def _border_edges(positions: Floats, triangles: Ints) -> Bools:
     """Return for each corner whether the opposite edge belongs to only one triangle: (T, 3).
 
-    Coincident vertices count as one: a texture seam is not a border.
+    Coincident vertices are treated as one: a texture seam is not a border.
     """
     _, place = np.unique(positions, axis=0, return_inverse=True)
     corners = place.reshape(-1)[triangles].astype(np.int64)
@@ -168,7 +169,7 @@ def iterate(
     template, target : Side
         The surface to move, and the surface with which to align it.
     start : Similarity
-        Approximate alignment; its factors are kept.
+        Approximate alignment; its factors are preserved.
     rounds : int
         Maximum number of iterations; fewer if the relative change of the error is below 1e-5.
     scales : bool
@@ -269,7 +270,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
 
 
 def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
-    """Match samples of both sides with the other side, and reject incompatible pairs."""
+    """Match samples of each mesh with the other mesh, and reject incompatible pairs."""
     ours, theirs = template.samples, target.samples
     found = template.find(similarity.undo(theirs.positions))
     towards = _kept(similarity, found.positions, found.normals, theirs.positions, theirs.normals)
@@ -293,7 +294,7 @@ def _kept(
 
 
 def _rotated(similarity: Similarity, normals: Floats) -> Floats:
-    # Normals transform by the inverse transpose.
+    # Normals are transformed by the inverse transpose.
     return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 
@@ -311,7 +312,7 @@ def capped_rms(distances: Floats, cap: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """Distances of samples from the other side's surface, in the target's unit.
+    """Distances of samples from the surface of the other mesh, in the target's unit.
 
     Attributes
     ----------
@@ -320,8 +321,8 @@ class Gaps:
     away : (M,)
         From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
-        The same without the median offset along the normals, so that a jacket at a constant
-        distance of two centimetres from the skin fits well.
+        The same distances without the median offset along the normals, so that a jacket at a
+        constant distance of two centimetres from the skin has a small error.
     """
 
     towards: Floats
@@ -331,7 +332,7 @@ class Gaps:
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
-    """Return the distances of samples from the other side's surface.
+    """Return the distances of samples from the surface of the other mesh.
 
     Parameters
     ----------

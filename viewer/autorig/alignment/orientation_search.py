@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from viewer.autorig.alignment.icp import Cloud, gaps_between, iterate
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import SurfaceSamples
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 
@@ -31,12 +31,13 @@ _UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
 """Ratios between metres and centimetres, millimetres and inches, in both directions."""
 
 _NEAR_UNIT = 0.15  # relative tolerance for interpreting a ratio of sizes as a ratio of units
-_TRIM = 0.8  # fraction of the distances that are used: excludes hair, skirts and cropped parts
-_QUICK, _LONG = 12, 60  # iterations for every candidate, and for the best few
+# Fraction of the distances that are used, which excludes hair, skirts and cropped parts.
+_TRIM = 0.8
+_QUICK, _LONG = 12, 60  # numbers of iterations for every candidate, and for the best few
 _FINALISTS = 4
 # A mesh that is already in place is rotated only if that reduces the error below this fraction.
 _NO_BETTER = 0.7
-_IN_PLACE = 300  # number of samples that determine whether a mesh is already in place
+_IN_PLACE = 300  # number of samples from which it is determined whether a mesh is already in place
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,8 +49,8 @@ class Candidate:
     similarity : Similarity
         Template to target.
     error : float
-        Trimmed mean distance over the target's size: both ways in a search; from the target to
-        the template only for a mesh that is in place, as it may be a part of the template.
+        Trimmed mean distance over the target's size: in both directions in a search; only from the
+        target to the template for a mesh that is in place, as it may be a part of the template.
     """
 
     similarity: Similarity
@@ -130,8 +131,8 @@ def in_place(template: Cloud, target: Cloud, rotations: list[Floats], scaled: bo
     -------
     Candidate
         The first of several candidates with similar errors, so that nothing is rotated
-        unnecessarily: most figures look nearly the same from behind. The error is one-way: a shirt
-        that lies on the body fits, regardless of the parts it leaves uncovered.
+        unnecessarily: most figures look nearly the same from behind. The error is measured in one
+        direction: a shirt on the body fits, regardless of the parts that it does not cover.
     """
     few = target.samples.positions[:: max(1, len(target.samples.positions) // _IN_PLACE)]
     found = []

@@ -2,14 +2,13 @@
 
 Articulated iterative closest points (Pellegrini et al. 2008): vertices of the template are matched
 with the target's surface, points of the target with the template's vertices, and every iteration
-moves all joints at once (``pose_step``). Corresponding points may be far apart at first, as for
-lowered and outstretched arms, and come closer with every iteration.
+moves all joints simultaneously (``pose_step``). Corresponding points may be far apart at first, as
+for lowered and outstretched arms, and come closer with every iteration.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from viewer.autorig.alignment.pose_step import AlignedTemplate, Pairs, PoseStep,
 from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -39,13 +39,13 @@ from viewer.rig.skinning.lbs import move
 __all__ = ["Fitted", "fit_pose"]
 
 _ROUNDS = 32
-_NEARING = 16  # iterations over which the search radius shrinks
+_NEARING = 16  # number of iterations over which the search radius shrinks
 _VERTICES = 1500  # number of template vertices that are matched with the target
-_FAR, _NEAR = 0.25, 0.03  # search radius at the start and at the end, over the size
+_FAR, _NEAR = 0.25, 0.03  # ratio of the search radius to the size, at the start and at the end
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
 _STILL = 2e-3  # radians; iterations end when no joint rotates by more than this
 _FEWEST = 50  # minimum number of pairs for fitting a pose
-_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # logarithms of limb scales
+_SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # limits of the logarithms of limb scales
 
 
 @dataclass(frozen=True, slots=True, eq=False)

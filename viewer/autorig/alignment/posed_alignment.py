@@ -10,7 +10,7 @@ are fitted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from viewer.autorig.alignment.surface_alignment import (
     misfit,
 )
 from viewer.autorig.surface.samples import sample_surface
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -39,19 +40,19 @@ from viewer.rig.skinning import deform
 
 __all__ = ["PosedAlignment", "align_posed"]
 
-_CLOSE = 0.002  # misfit over size up to which joints are not rotated
+_CLOSE = 0.002  # ratio of misfit to size up to which joints are not rotated
 # Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
 # little better with a bent body, but only a figure in a different pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first value, after a joint was rotated by more than the second, indicates a
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_SURE = 0.004  # misfit after the fit up to which the opposite facing is not tried
+_SURE = 0.004  # misfit after the fit, over the size, up to which the opposite facing is not tried
 _ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
 _CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach after the fit
-_ROUNDS = 30  # iterations to align the template facing the other way
+_ROUNDS = 30  # number of iterations to align the template facing the other way
 _AXES_ROUNDS = 20
-_FOUND = ("search", "in place")  # alignments that were not given by the user
+_FOUND = ("search", "in place")  # origins of alignments that were not given by the user
 # Separate scales are tried if the error exceeds the first value, and kept if they reduce it to at
 # most the second fraction and differ by more than the third value.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
@@ -68,7 +69,7 @@ class PosedAlignment:
     figure : Figure
         The template, with scaled limbs if needed.
     pose : Pose
-        The template's own pose, or the fitted pose.
+        The given pose of the template, or the fitted pose.
     positions : (V, 3)
         The template's vertices in that pose, in the template's frame.
     lines : tuple of Diagnostic
@@ -117,7 +118,7 @@ def align_posed(
         Mesh with triangles.
     settings : AlignmentSettings
         Known facts about the alignment. With a separate scale per axis, nothing is fitted; with a
-        known scale, only the pose is.
+        known scale, only the pose is fitted.
     fits : bool
         Whether pose and proportions may change.
     report : callable

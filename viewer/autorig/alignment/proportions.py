@@ -8,10 +8,11 @@ c'_k = c'_j + S_j (c_k - c_j).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -76,7 +77,8 @@ def limbs_of(figure: Figure) -> Limbs:
     try:
         partners = joint_partners(figure)
     except RigError:
-        partners = np.arange(len(parents), dtype=np.int32)  # not symmetric: no symmetry to preserve
+        # The figure is not symmetric, so there is no symmetry to preserve.
+        partners = np.arange(len(parents), dtype=np.int32)
     return Limbs(weights, fractions, unit(ways), partners)
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
 
 __all__ = ["Similarity", "fit_similarity"]
 
-# Ratio of the second to the first extent below which points are collinear, so that a rotation is
+# Ratio of the second to the first extent below which points are collinear, so that the rotation is
 # undetermined.
 _ON_LINE = 1e-6
 
@@ -31,7 +32,7 @@ class Similarity:
     factors : (3,)
         Additional scales along the axes of the target space; their product is 1.
     own_factors : (3,)
-        The same along the axes of the points' own space.
+        Additional scales along the axes of the source space.
     """
 
     scale: float

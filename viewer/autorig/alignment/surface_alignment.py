@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from viewer.autorig.alignment.icp import (
 from viewer.autorig.alignment.orientation_search import axis_rotations, in_place, search
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import sample_surface
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
@@ -39,24 +40,25 @@ __all__ = [
 ]
 
 SCALES = ("uniform", "axes", "none")
-"""A common scale; one along each axis of the target; or the template's size unchanged."""
+"""One common scale, one scale along each axis of the target, or the template's size unchanged."""
 
 SAMPLES = 2_000
 """Default number of points of each surface that an alignment uses."""
 
-_ROUNDS, _SLIDES = 60, 25  # iterations of point-to-point and of point-to-plane fits
+_ROUNDS, _SLIDES = 60, 25  # numbers of iterations of point-to-point and of point-to-plane fits
 _AXES_ROUNDS = 20
-_IN_PLACE = 0.03  # misfit over size up to which a mesh may already be in place
-_SURELY = 0.003  # mean distance over size up to which no search is performed
-_SLIDING = 0.02  # misfit over size up to which sliding refines the fit
+_IN_PLACE = 0.03  # ratio of misfit to size up to which a mesh may already be in place
+_SURELY = 0.003  # ratio of mean distance to size up to which no search is performed
+_SLIDING = 0.02  # ratio of misfit to size up to which sliding refines the fit
 # Fraction of that misfit that a search must reach to move the mesh: a part of a figure fits nearly
 # as well in many other positions, whereas a whole figure does not.
 _BETTER, _PART_BETTER = 0.8, 0.35
 PART = 0.05
-"""Fraction of the size: if template points are farther than this, the target is only a part."""
+"""Fraction of the size: if template points are farther away, the target is only a part."""
 
-_CAP = 0.05  # fraction of the size; larger distances, as of hair or a missing hand, are clamped
-_BAD = 0.03  # RMS over size above which a warning is given
+# Fraction of the size to which larger distances, as of hair or a missing hand, are clamped.
+_CAP = 0.05
+_BAD = 0.03  # ratio of RMS error to size above which a warning is given
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -136,8 +138,8 @@ class Alignment:
         figure.
     uneven : (float, float)
         RMS distances over the size in the same two directions, without the median offset between
-        the surfaces. All distances count, each clamped to 5 %, so that protruding ends of limbs are
-        included.
+        the surfaces. All distances are included, each clamped to 5 %, so that protruding ends of
+        limbs are included.
     how : str
         ``"in place"``, ``"search"``, ``"landmarks"``, ``"given"``, or ``"fit"`` if pose and
         proportions were also fitted, unless landmarks were given.
@@ -200,7 +202,7 @@ def align(
     """Find the similarity that aligns the template with the target.
 
     A target that is already in place, up to its unit and rotations by multiples of 90 degrees, is
-    left there: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
+    not moved: fitting a part (a shirt, an open shell) would only move it away. Otherwise all
     rotations by 90 degrees are tried, each with a few iterations of closest points; the best is
     refined on the surfaces.
 
@@ -257,7 +259,7 @@ def align(
         similarity = _refined(fine, best.similarity, settings, report)
         slid = Alignment.of(ours, theirs, similarity, "search")
         is_part &= slid.away > PART
-        # It considers only surfaces that face the same way, and may miss the ends of limbs.
+        # Sliding considers only surfaces that face the same way, and may miss the ends of limbs.
         if settings.scale == "axes" or misfit(slid, is_part) <= misfit(found, is_part):
             found = slid
     fraction = _PART_BETTER if is_part else _BETTER

@@ -1,7 +1,7 @@
 """Detection and reversal of parts of a target whose triangles are wound the wrong way.
 
 A part whose normals are opposite to the template's may be a lining, which is correct. It is an
-error if it encloses a volume, or makes up most of the target.
+error if it encloses a volume, or if it makes up most of the target.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 
 __all__ = ["with_reversed_winding", "wound_backwards"]
 
-# Squared number of border edges over triangles; with smaller holes the volume's sign is reliable.
+# Squared number of border edges per triangle, below which the volume's sign is reliable.
 _CLOSED = 0.25
 _MOST = 0.5  # fraction of the target's area above which an island is reversed
 

@@ -8,7 +8,6 @@ is close to the wrong part but faces the other way: its weights are inpainted.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from viewer.autorig.correspondence.same_vertices import at_vertices, same_vertices
 from viewer.autorig.surface.welding import Welded, weld
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate
@@ -26,14 +26,15 @@ __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
 _INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
-_TOGETHER = math.radians(80.0)  # between a normal and the centre of its group; see _sides
+# Maximum angle between a normal and the centre of its group; see _sides.
+_TOGETHER = math.radians(80.0)
 # Two sides of a sheet cancel out if less than this fraction of the area around a vertex remains.
 _CANCELLED = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """Criteria by which a vertex counts as lying on the template.
+    """Criteria by which a vertex is matched with the template.
 
     Attributes
     ----------
@@ -69,12 +70,12 @@ class Matches:
     Attributes
     ----------
     points : SurfacePoints
-        W points of the template: for each matched vertex, the closest with an agreeing normal; for
-        others, the closest.
+        W points of the template: for each matched vertex, the closest point with an agreeing
+        normal; for other vertices, the closest point.
     matched : (W,) bool
         Whether each vertex lies on the template.
     angles : (W,)
-        Angles between the normals, radians; 0 where the target has no normal.
+        Angles between the normals, radians; 0 if the target has no normal.
     inside_out : (I,) int32
         Islands of the target that were reversed.
     """
@@ -114,7 +115,7 @@ class Template:
 
 
 def sheet_normals(mesh: Welded) -> Floats:
-    """Return the unit normal of each vertex, 0 where there is none.
+    """Return the unit normal of each vertex, 0 if there is none.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def sheet_normals(mesh: Welded) -> Floats:
     Returns
     -------
     (W, 3)
-        0 for vertices without triangles, and where the two sides of a sheet cancel out.
+        0 for vertices without triangles, and if the two sides of a sheet cancel out.
     """
     a, b, c = (mesh.positions[mesh.triangles[:, corner]] for corner in range(3))
     vectors = np.cross(b - a, c - a)
@@ -175,7 +176,7 @@ def match(template: Template, target: Welded, size: float, settings: MatchSettin
 
 
 def _closest(template: Template, target: Welded) -> SurfacePoints:
-    """Return the closest points, or the vertices identical to the target's own."""
+    """Return the closest points, or the template vertices that are identical to the target's."""
     points, welded = template.surface.closest(target.positions), template.welded
     same = same_vertices(welded, target, points.distances)
     corners = welded.vertices[template.triangles]
@@ -232,7 +233,8 @@ def _sides(template: Template, positions: Floats, normals: Floats) -> SurfacePoi
         triangles[inside] = facing[part.triangles]
         barycentric[inside], found[inside] = part.barycentric, part.positions
         distances[inside] = part.distances
-    # If no triangle faces that way, the distance is infinite, but the coordinates are valid.
+    # If no triangle faces in that direction, the distance is infinite, but the coordinates are
+    # valid.
     distances[np.isinf(distances)] = np.finfo(float).max
     return SurfacePoints(triangles, barycentric, found, distances)
 

@@ -4,7 +4,7 @@ If a vertex was moved along the surface, its closest point has interpolated weig
 original vertex has the exact ones. A target's vertex is identified with a vertex of the template if
 each is the other's nearest, it moved along the surface by less than half the length of its edges,
 and nearly all of its edges correspond to edges of the template. A different tessellation of the
-same surface has hardly any such vertices.
+same surface has very few such vertices.
 """
 
 from __future__ import annotations
@@ -20,9 +20,9 @@ from viewer.rig.geometry.closest_point import SurfacePoints
 
 __all__ = ["at_vertices", "same_vertices"]
 
-_EDGES = 0.8  # fraction of a vertex's edges that must also be edges of the template
-_SLID = 0.5  # maximum slide along the surface, over the mean length of a vertex's edges
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_EDGES = 0.8  # minimum fraction of a vertex's edges that are also edges of the template
+_SLID = 0.5  # maximum shift along the surface, relative to the mean length of a vertex's edges
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:

@@ -12,10 +12,10 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas"]
 
-_STEEPEST = 100.0  # cotangent of 0.6 degrees: angles of thinner triangles are meaningless
+_STEEPEST = 100.0  # cotangent of 0.6 degrees; angles of thinner triangles are meaningless
 _FLAT = 1e-12  # minimum of twice a triangle's area over its squared longest edge
 _EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
-_LIGHTEST = 1e-9  # minimum area of a vertex over the mean, as areas are divisors
+_LIGHTEST = 1e-9  # minimum area of a vertex relative to the mean, as areas are divisors
 
 
 def laplacian(mesh: Welded) -> tuple[Any, Floats]:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.geometry.vectors import unit
@@ -45,7 +44,7 @@ def sample_surface(positions: Floats, triangles: Ints, count: int) -> SurfaceSam
     """Return evenly distributed points of a surface, deterministically.
 
     Positions along the cumulative area are evenly spaced, so every triangle gets points in
-    proportion to its area, rounded up or down. Within a triangle the point is a (1 - sqrt u) + b
+    proportion to its area, rounded up or down. Within a triangle, the point is a (1 - sqrt u) + b
     sqrt u (1 - v) + c v sqrt u (Turk 1990), with u and v from the R2 sequence (multiples of the
     plastic number's powers).
 

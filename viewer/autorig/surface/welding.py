@@ -6,11 +6,11 @@ these as borders, or the mesh would tear there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 
@@ -33,8 +33,8 @@ class Welded:
     vertices : (V,) int32
         The welded vertex of each vertex of the mesh.
     islands : (W,) int32
-        Connected component of each welded vertex, counted from 0. A vertex without a
-        triangle is an island of its own.
+        Connected component of each welded vertex, counted from 0. A vertex without a triangle is a
+        separate island.
     """
 
     positions: Floats
@@ -54,7 +54,7 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
     Parameters
     ----------
     positions : (V, 3)
-        Any unit. Vertices closer than 1e-4 of the median edge count as coincident.
+        Any unit. Vertices closer than 1e-4 of the median edge are treated as coincident.
     triangles : (T, 3)
         Vertex indices.
 
@@ -132,7 +132,7 @@ def _counted_edges(triangles: Ints) -> tuple[Ints, Any]:
 
 def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
     """Return the first vertex at each position, in vertex order, and each vertex's position."""
-    # Adding 0 turns -0.0 into 0.0: equal positions must have equal bytes.
+    # Adding 0 replaces -0.0 by 0.0, as equal positions must have equal bytes.
     rows = np.ascontiguousarray(positions + 0.0).view(np.dtype((np.void, 24))).ravel()
     _, first, inverse = np.unique(rows, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)
@@ -144,7 +144,7 @@ def _joined_nearby(positions: Floats, tolerance: float) -> Any:
     """Return a label for each position, the same for those within the tolerance.
 
     Each round merges every position with its nearest neighbour, so the size of clusters at least
-    halves per round; finding all pairs at once would take memory quadratic in a cluster's size.
+    halves per round; finding all pairs in one pass would take memory quadratic in a cluster's size.
     """
     sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
     spatial = scipy_part("spatial")

@@ -24,8 +24,8 @@ def transfer_clip(
 ) -> Clip | SampledClip:
     """Return a clip of the template for the rigged target.
 
-    Angles are unchanged; lengths are scaled with the figure, so that a path takes the same number
-    of footsteps. The clip keeps the template's own axes, including its up axis.
+    Angles are unchanged; lengths are scaled with the figure, so that a path requires the same
+    number of footsteps. The clip keeps the template's own axes, including its up axis.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def transfer_clip(
     Returns
     -------
     Clip or SampledClip
-        Clip with the same type, name and timing. Shape weights of captures are dropped: the target
-        has its own.
+        Clip with the same type, name and timing. Shape weights of captures are dropped, as the
+        target has a different shape.
 
     Raises
     ------

@@ -14,7 +14,7 @@ __all__ = ["MOST_NUMBERS", "transfer_correctives"]
 MOST_NUMBERS = 120_000_000
 """Maximum size of all transferred correctives, 1 GB: larger ones are dropped."""
 
-_ROUNDS = 10  # smoothing iterations where correctives fade out
+_ROUNDS = 10  # number of smoothing iterations of the region in which correctives fade out
 
 
 def transfer_correctives(

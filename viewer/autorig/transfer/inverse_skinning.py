@@ -1,13 +1,13 @@
-"""Inverse skinning: transforms a posed mesh to rest by each vertex's inverse blended matrix."""
+"""Inverse skinning: transformation of a posed mesh to rest by inverse blended matrices."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from viewer.autorig.surface.welding import edges, weld
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import nearest_rotations
@@ -17,10 +17,10 @@ from viewer.rig.skinning.lbs import blended_matrices
 __all__ = ["SMALLEST_STRETCH", "InvertedSkinning", "invert_skinning", "repair_tears"]
 
 SMALLEST_STRETCH = 0.2
-"""Singular value below which a blended matrix counts as singular: two joints rotated apart by an
-angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
+"""Singular value below which a blended matrix is treated as singular: two joints rotated apart by
+an angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
 
-_RINGS = 2  # rings of neighbours around guarded vertices that may move to repair a tear
+_RINGS = 2  # number of rings around guarded vertices whose vertices may move to repair a tear
 _SMOOTH = 0.01  # weight of smoothness relative to reproducing the pose when a tear is repaired
 
 
@@ -47,9 +47,9 @@ class InvertedSkinning:
 def invert_skinning(positions: Floats, skin: Skin, palette: Floats) -> InvertedSkinning:
     """Undo linear blend skinning: rest = B^-1 (t - d), with sum_j w_j A_j = [B | d].
 
-    Only the 3 x 3 part is inverted. Where its smallest singular value is below
-    ``SMALLEST_STRETCH`` the nearest rotation (polar factor) replaces it, as dividing by
-    a tiny value would tear the mesh; a vertex without influences is unchanged.
+    Only the 3 x 3 part is inverted. If its smallest singular value is below ``SMALLEST_STRETCH``,
+    the nearest rotation (polar factor) replaces it, as dividing by a tiny value would tear the
+    mesh; a vertex without influences is unchanged.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def _is_singular(linear: Floats) -> Bools:
     """Return the matrices whose smallest singular value is too small: (V,) bool.
 
     As |det| = s1 s2 s3 and s1 s2 <= (s1^2 + s2^2) / 2 <= |B|^2 / 2, s3 >= 2 |det| / |B|^2; singular
-    values are computed only where that bound is inconclusive.
+    values are computed only if that bound is inconclusive.
     """
     squares = np.einsum("vab,vab->v", linear, linear)
     bound = 2.0 * np.abs(np.linalg.det(linear)) / np.where(squares > 0.0, squares, 1.0)
@@ -96,8 +96,8 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     """Smooth the neighbourhoods of guarded vertices by least squares.
 
     It minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
-    two-ring, all others fixed, with the graph Laplacian L and lambda = 0.01. The problem is linear
-    in x, so one linear system solves it.
+    two-ring, with all others fixed, with the graph Laplacian L and lambda = 0.01. The problem is
+    linear in x, so one linear system solves it.
 
     Parameters
     ----------

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.autorig.surface.samples import triangle_normals
 from viewer.autorig.surface.winding import winding_numbers
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.geometry.closest_point import Surface
@@ -15,8 +14,8 @@ from viewer.rig.skin import Skin, influence_counts
 
 __all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts", "transfer_joints"]
 
-_ENOUGH = 0.5  # fraction of a joint's weights that must be matched
-_SAME_WAY = 0.5  # cosine of 60 degrees between the surfaces
+_ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
+_SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees
 _INSIDE = 0.5  # winding number that separates outside from inside
 
 
@@ -104,7 +103,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
     shared = (above >= 0) & (unique[place] == wanted) if len(unique) else np.zeros(0, np.bool_)
     product = weights[shared] * weights[place[shared]]
     rows, columns = joints[shared], vertices[shared]
-    # The boundary with a child also marks the end of the root's own region.
+    # The boundary with a child also marks the end of the root's region.
     at_root = parents[above[shared]] < 0
     return JointRegressor(
         count,

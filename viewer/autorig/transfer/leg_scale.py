@@ -16,7 +16,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["leg_scale"]
 
-_LOW = 0.1  # fraction of the joints' vertical extent; joints this close to the lowest are feet
+_LOW = 0.1  # fraction of the joints' vertical extent; joints this close to the lowest one are feet
 _LEGS = 0.2  # fraction of the vertical extent; if the root is closer to the feet, there are no legs
 
 

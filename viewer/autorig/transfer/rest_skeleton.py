@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.transfer.leg_scale import leg_scale
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -129,7 +130,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
     ways = joints[below] - joints[above]
-    # Solved instead of multiplied by the transpose, as poses may scale joints.
+    # A linear system is solved, as the transpose is not the inverse if poses scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
     return offsets
 
@@ -143,7 +144,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     try:
         partners = joint_partners(template)
     except RigError:
-        return offsets  # not symmetric: no symmetry to preserve
+        return offsets  # the template is not symmetric, so there is no symmetry to preserve
     flip = np.ones(3)
     flip[mirror_axis(template)] = -1.0
     zero = _zero_pose(skeleton)
@@ -190,7 +191,7 @@ def _dof_scales(skeleton: Skeleton, joint_scales: Floats) -> Floats:
 
 
 def _scaled_pose(skeleton: Skeleton, pose: Pose, joint_scales: Floats) -> Pose:
-    """Return a pose in the target's unit, without shape, scale and translation of its own."""
+    """Return a pose in the target's unit, without the figure's shape, scale and translation."""
     posed = pose.copy()
     posed.dofs *= _dof_scales(skeleton, joint_scales)
     posed.translations *= joint_scales[:, None]
@@ -236,7 +237,7 @@ def _rotate_roots(
 
 
 def _angles_within(rotations: Floats, low: Floats, high: Floats) -> Floats:
-    """Return angles about x, y, z: of the two triples for a rotation, the one within the limits.
+    """Return angles about x, y, z: the triple of the two for a rotation that is within the limits.
 
     (x, y, z) and (x + pi, pi - y, z + pi) are the same rotation.
     """

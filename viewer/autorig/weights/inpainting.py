@@ -24,12 +24,12 @@ __all__ = ["NEGLIGIBLE", "Report", "inpaint"]
 
 Report = Callable[[float, str], None]
 
-NEGLIGIBLE = 1e-6  # smaller solved weights count as 0, as solutions decay without reaching 0
+NEGLIGIBLE = 1e-6  # smaller solved weights are treated as 0, as solutions decay without reaching 0
 _BLOCK = 1 << 22  # unknowns per batch, 32 MB
 _TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
-_SHIFT = 1e-10  # fraction of the mean diagonal, added to a matrix that cannot be factorised
+_SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
 _STEPS = 2000  # maximum iterations of conjugate gradients
-_CONVERGED = 1e-9  # relative residual
+_CONVERGED = 1e-9  # relative residual at which iterations end
 
 _Solve = Callable[[Floats], Floats]
 
@@ -91,7 +91,7 @@ def inpaint(
 def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
     """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
     sparse = scipy_part("sparse")
-    used = np.unique(border.indices)  # matched vertices within two edges of an unknown one
+    used = np.unique(border.indices)  # matched vertices within two edges of an unknown vertex
     right = sparse.csc_array(-border[:, used] @ weights[used])
     joints = np.nonzero(np.diff(right.indptr))[0]
     step = max(1, _BLOCK // right.shape[0])
@@ -131,7 +131,7 @@ def _factorised(matrix: Any) -> _Solve | None:
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
-    except (RuntimeError, MemoryError):  # singular, or too large
+    except (RuntimeError, MemoryError):  # the matrix is singular or too large
         return None
     return lambda right: factors.solve(right)
 
@@ -162,5 +162,5 @@ def _iterative(matrix: Any) -> _Solve:
 
 
 def _ratio(a: Floats, b: Floats) -> Floats:
-    """Return a / b, 0 where b is not positive: columns already solved are unchanged."""
+    """Return a / b, 0 if b is not positive: columns already solved are unchanged."""
     return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)

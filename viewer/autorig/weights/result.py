@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.autorig.correspondence.matching import Matches
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints
@@ -21,7 +20,7 @@ __all__ = [
     "template_lines",
 ]
 
-_LISTED = 5  # islands listed individually
+_LISTED = 5  # maximum number of islands that are listed individually
 _FEW = 0.75  # fraction of matched vertices below which too many weights are estimates
 
 
@@ -34,7 +33,7 @@ class RigidIslands:
     vertices : (R,) int32
         The first vertex of each island.
     counts : (R,) int32
-        Number of vertices of each island; coincident vertices count once.
+        Number of vertices of each island; coincident vertices are counted once.
     joints : (R,) int32
         The joint with the largest weight in each island.
     distances : (R,)
@@ -63,7 +62,7 @@ class WeightTransfer:
     distances : (V,)
         Distances to the template, in the target's unit.
     angles : (V,)
-        Radians between the normals of both meshes; 0 where the target has none.
+        Radians between the normals of both meshes; 0 if the target has none.
     points : SurfacePoints or None
         The V points of the template that were compared; None if only its vertices were compared.
     backwards : (V,) bool

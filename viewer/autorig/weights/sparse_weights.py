@@ -13,7 +13,7 @@ from viewer.rig.skin import Skin, limit_influences
 
 __all__ = ["put_rows", "scaled_rows", "skin_of", "weight_matrix"]
 
-_NO_SUM = 1e-12  # weights with a smaller sum cannot be normalised
+_NO_SUM = 1e-12  # weights whose sum is smaller cannot be normalised
 
 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:

@@ -9,22 +9,22 @@ the generator cancels the running items.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 
 __all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
 
 IN_FLIGHT = 4
-"""Items handed out per worker, including the one that runs."""
+"""Number of items assigned to each worker, including the one that runs."""
 
 
 class Job(Protocol):
     """The job that is applied to each item: a callable that can be pickled.
 
-    It returns a result for any item, even for bad input; see ``attempts.attempt``.
+    It returns a result for any item, even for invalid input; see ``attempts.attempt``.
     """
 
     def __call__(self, item: Item) -> Result:
@@ -45,7 +45,7 @@ class Limits:
     workers : int
         Number of worker processes; engines that run in this process ignore it.
     retries : int
-        How often an item is retried after its worker crashed, hung or ran out of memory.
+        Number of times an item is retried after its worker crashed, hung or ran out of memory.
     timeout : float or None
         Seconds after which the worker of an attempt is terminated; None for no limit.
     memory : int or None

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["connected", "slurm_cluster"]
 
-_CONNECT = 10.0  # seconds
+_CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
 _MEMORY = 4 << 30  # bytes per worker that a SLURM job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
 _ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
@@ -32,9 +32,10 @@ _CONFIG = {
     "distributed.worker.memory.target": False,
     "distributed.worker.memory.spill": False,
     "distributed.worker.memory.pause": False,
-    # Omits Dask's MALLOC_TRIM_THRESHOLD_, which returns freed memory: new arrays would page-fault.
+    # Without Dask's MALLOC_TRIM_THRESHOLD_: it returns freed memory, so new arrays cause page
+    # faults.
     "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
-    # These poll the workers many times a second, which takes a tenth or more of the time of short
+    # These poll the workers many times a second, which takes at least a tenth of the time of short
     # items.
     "distributed.worker.profile.enabled": False,
     "distributed.admin.system-monitor.interval": "10s",
@@ -123,7 +124,7 @@ def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
         If dask-jobqueue is missing, or ``cpus`` is not a positive integer.
     """
     try:
-        with _handlers_kept():  # importing it replaces the handler of Ctrl-C
+        with _handlers_kept():  # the import replaces the handler of Ctrl-C
             from dask_jobqueue import SLURMCluster
     except ImportError:
         raise ViewerError(

@@ -13,7 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.engines._process_limits import limit_memory, signals_blocked
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.phrases import printable
@@ -36,8 +37,8 @@ __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _NO_MEMORY = 99  # exit code of a worker that reached its memory limit
-_PATIENCE = 120.0  # seconds until a pool in which no item runs is replaced; doubled each time
-_MOST_BREAKS = 3  # pools that may end without a result before the batch fails
+_PATIENCE = 120.0  # seconds until a pool without a running item is replaced; doubled each time
+_MOST_BREAKS = 3  # maximum number of pools that end without a result before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
 
 
@@ -84,7 +85,7 @@ def _check_pickles(job: Job) -> None:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item and how often it has been started before."""
+    """An item, and the number of times it has been started before."""
 
     item: Item
     earlier: int = 0
@@ -97,7 +98,7 @@ class _Worker(SpawnProcess):
 
     def start(self) -> None:
         """Start the process; raise OSError if the pool is closing, which ends the pool's thread."""
-        owner, self.owner = self.owner, None  # it is sent to the new process
+        owner, self.owner = self.owner, None  # the object is sent to the new process
         if owner is None:
             super().start()
             return
@@ -146,7 +147,7 @@ class _Workers:
         self.flying: dict[ProcessFuture[Result], _Attempt] = {}
         self._done: SimpleQueue[ProcessFuture[Result]] = SimpleQueue()
         self._context = _Context()
-        with signals_blocked():  # starts a process that tracks semaphores
+        with signals_blocked():  # creates a process that tracks semaphores
             self._is_stopping = self._context.Event()
         self._n_breaks = 0
         self._patience, self._moved = _PATIENCE, time.monotonic()
@@ -159,7 +160,7 @@ class _Workers:
         return self._is_stopping.is_set()
 
     def schedule(self, attempt: _Attempt) -> None:
-        """Hand an item to the pool."""
+        """Submit an item to the pool."""
         try:
             future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
         except RuntimeError:  # the pool broke after its last result
@@ -181,7 +182,7 @@ class _Workers:
         attempt = self.flying.pop(future)
         result = self._result(future, attempt)
         if result.status == "cancelled" and not result.message:
-            return  # it was never started
+            return  # the item was never started
         if result.status in _RETRIED and attempt.earlier < self.limits.retries and not self.stops():
             self.schedule(_Attempt(attempt.item, attempt.earlier + 1))
             return
@@ -190,7 +191,7 @@ class _Workers:
     def close(self) -> None:
         """Terminate the workers and their items."""
         self._pool.stop()  # type: ignore[no-untyped-call]
-        # Before the queue is closed, because workers that are starting would report errors.
+        # Done before the queue is closed, because workers that are starting would report errors.
         self._context.end_workers()
         self._pool.join()
         self._context.is_closing = False
@@ -264,15 +265,16 @@ class _Workers:
         pool = ProcessPool(
             self.limits.workers, initializer=_prepare, initargs=given, context=self._context
         )
-        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides what to
-        # end. Workers inherit the signal mask, as do the threads that start further workers.
+        # Ctrl-C and closing the terminal signal all of its processes, but the batch decides which
+        # processes to end. Workers inherit the signal mask, as do the threads that start further
+        # workers.
         with signals_blocked():
-            _ = pool.active  # starts it
+            _ = pool.active  # starts the pool
         return pool
 
 
 def _end_of(code: int | None) -> str:
-    """Return how a process ended, for a message."""
+    """Return a description of how a process ended, for a message."""
     if code is not None and code < 0:
         name = signal.Signals(-code).name if -code in signal.valid_signals() else str(-code)
         often = ", probably because the system ran out of memory" if -code == signal.SIGKILL else ""
@@ -280,7 +282,7 @@ def _end_of(code: int | None) -> str:
     return f"exited with {code}"
 
 
-# The rest runs in the workers.
+# The following functions run in the workers.
 
 _job: Job | None = None
 _stopping: Event | None = None
@@ -288,7 +290,7 @@ _is_terminated = False
 
 
 def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
-    """Begin a worker."""
+    """Initialise a worker process."""
     global _job, _stopping
     _job, _stopping = job, stopping
     # Between items, a worker may hold the lock of the queue, which would never be released: only

@@ -12,7 +12,7 @@ from viewer.phrases import printable
 __all__ = ["PAGES", "check_overview", "overview_files", "save_overview"]
 
 PAGES = (".html", ".htm")
-"""Suffixes of pages; all others are those of pictures."""
+"""Suffixes of pages; all other suffixes are those of pictures."""
 
 _PICTURES = (".png", ".jpg", ".jpeg", ".webp", ".bmp", ".tif", ".tiff")
 
@@ -59,7 +59,7 @@ def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list
     path : str or Path
         A page (``PAGES``), or a picture; several pictures are written if one cannot hold all.
     job : str
-        Name of the job, for titles, and to choose what is shown of each item.
+        Name of the job, which determines the title and the data shown for each item.
     results : sequence of Result
         Results in any order.
 

@@ -16,12 +16,12 @@ from viewer.phrases import counted, printable
 __all__ = ["MOST_SHEETS", "PER_SHEET", "save_sheets", "sheet_path"]
 
 PER_SHEET = 120
-"""Cells of one sheet."""
+"""Maximum number of cells on a sheet."""
 
 MOST_SHEETS = 50
-"""Largest number of sheets; further items are not shown."""
+"""Maximum number of sheets; further items are not shown."""
 
-_CELL = (240, 320)  # pixels
+_CELL = (240, 320)  # maximum size of a picture, pixels
 _FINISHED = ("done", "unchanged")
 
 

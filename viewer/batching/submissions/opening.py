@@ -6,19 +6,19 @@ import os
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from viewer.batching.submissions.choosing import Chosen, choose, is_junk, suffix_of
 from viewer.batching.submissions.unpacking import Archive, open_archive
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES
 
 __all__ = ["Submission", "opened"]
 
-_DEEPEST = 3  # levels of nested archives
-_COMPANIONS = {  # files that models refer to
+_DEEPEST = 3  # maximum number of levels of nested archives
+_COMPANIONS = {  # suffixes of files that models refer to
     *(".bin", ".mtl", ".png", ".jpg", ".jpeg", ".bmp", ".tga", ".gif", ".webp", ".tif", ".tiff"),
     *SUFFIXES,
 }
@@ -49,7 +49,7 @@ def opened(
 ) -> Iterator[Submission]:
     """Open a folder or a zip archive; unpacked files are removed at the end.
 
-    Links that lead out of the folder count as missing files: a submission can't use those of
+    Links that lead out of the folder count as missing files: a submission can't use the files of
     others.
 
     Parameters
@@ -59,7 +59,7 @@ def opened(
     expected, alike : sequence of str
         Patterns of its files; see ``choose``.
     temporary : Path, optional
-        Folder for unpacked files; that of the system if omitted or missing.
+        Folder for unpacked files; the system's temporary folder if omitted or missing.
 
     Raises
     ------
@@ -138,7 +138,7 @@ def _lone_archive(names: Sequence[str]) -> str | None:
 
 
 def _needed(archive: Archive, chosen: Chosen) -> Iterable[str]:
-    """Return the chosen files and what they may refer to: textures and buffers next to them."""
+    """Return the chosen files, and textures and buffers next to them, which they may need."""
     files = [name for name in chosen if name in archive.members]
     folders = {PurePosixPath(name).parent for name in files} or {
         PurePosixPath(name) for name in chosen

@@ -88,7 +88,7 @@ def batch(
     force : bool
         Whether existing files may be replaced.
     retries : int
-        How often an input is retried after its worker failed.
+        Number of times an input is retried after its worker has failed.
     timeout : float, optional
         Seconds per attempt, 600 by default; 0 for no limit. Applies to worker processes only.
     memory : int, optional
@@ -145,7 +145,7 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
     try:
         found = run_batch(plan.items, job, plan.settings, on_result)
     except Interrupted as stop:
-        # The caller's own handler handles it, as if the signal had arrived only now.
+        # The caller's own handler handles it, as if the signal had just arrived.
         signal.raise_signal(stop.number)
         raise KeyboardInterrupt from None
     if found.signal:
@@ -167,7 +167,7 @@ def _function(job: Callable[[Item], Any], request: Request) -> tuple[Job, Reques
 def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, Request]:
     """Return a command as a job, and the request extended by its options."""
     if job not in JOBS:
-        near = did_you_mean(job, JOBS) or f"there are {', '.join(JOBS)}"
+        near = did_you_mean(job, JOBS) or f"available jobs: {', '.join(JOBS)}"
         raise ViewerError(f'no job is called "{printable(job, 60)}"; {near}')
     parser = job_parser(job)
     _check_options(parser, job, options)

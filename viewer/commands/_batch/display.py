@@ -16,14 +16,14 @@ from viewer.phrases import counted, printable
 __all__ = ["Display", "summary_lines"]
 
 _MINUTE = 60.0  # seconds between lines if there is no terminal
-_MOST = 20  # failures listed
+_MOST = 20  # maximum number of failures listed
 
 
 class Display:
     """Progress of a batch: a bar in a terminal, otherwise one line per minute.
 
     ``title``: name of the work.
-    ``items``: those of the batch.
+    ``items``: the items of the batch.
     ``prints``: whether the text of items is printed, in their order.
     """
 
@@ -32,7 +32,7 @@ class Display:
         self._progress = Progress(title, self.total)
         self._start = self._said = time.monotonic()
         self._n_done = self._n_failed = self._n_unchanged = 0
-        self._texts: dict[int, str] = {}  # of items that must wait for earlier ones
+        self._texts: dict[int, str] = {}  # text that waits for earlier items, by index
         self._order = deque(item.index for item in items if prints)
 
     def show(self, result: Result) -> None:
@@ -43,7 +43,7 @@ class Display:
         now = time.monotonic()
         rate = (self._n_done - self._n_unchanged) / max(now - self._start, 1e-3)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
-        if not (self._order and sys.stdout.isatty()):  # if the text is printed in the same terminal
+        if not (self._order and sys.stdout.isatty()):  # the text uses the same terminal
             self._progress.title = f"{self._title}, {rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
         if not sys.stderr.isatty() and now > self._said + _MINUTE:

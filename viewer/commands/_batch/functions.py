@@ -15,7 +15,7 @@ __all__ = ["identity_of"]
 
 
 def identity_of(function: Callable[..., Any]) -> str:
-    """Return a text that is the same in all processes, and changes if the function does.
+    """Return a string that is the same in all processes, and changes if the function does.
 
     It covers code, defaults, bound arguments, variables of enclosing functions and the program's
     version, but not the code of other functions that it calls.
@@ -28,7 +28,7 @@ def identity_of(function: Callable[..., Any]) -> str:
 
 def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
     yield VERSION.encode()
-    if id(value) in seen:  # a recursive function
+    if id(value) in seen:  # the function is recursive
         return
     seen.add(id(value))
     if isinstance(value, partial):
@@ -36,7 +36,7 @@ def _parts(value: Any, seen: set[int]) -> Iterator[bytes]:
             yield from _parts(one, seen)
         return
     inner = getattr(value, "__func__", value)
-    if inner is not value:  # a method
+    if inner is not value:  # the value is a method
         yield from _parts(value.__self__, seen)
     code = getattr(inner, "__code__", None)
     if not isinstance(code, CodeType):

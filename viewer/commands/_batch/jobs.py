@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 
 from viewer.batching.attempts import attempt
 from viewer.batching.items import Item, Result
+from viewer.batching.naming import filled
 from viewer.batching.worker import worker_rank
 from viewer.commands._batch.options import add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
+from viewer.data_classes import dataclass
 from viewer.formats._kept import keeping_figures
 from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
@@ -31,7 +33,7 @@ class JobKind:
     ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
     ``writes``: ``always``, ``maybe`` or ``never``.
     ``prints``: whether its text is the result and is therefore printed.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
     """
 
@@ -146,6 +148,9 @@ class CommandJob:
             arguments.gpu = _device()
         if "output" in given:
             arguments.output = item.output or None
+        if given.get("save_joint_map"):
+            arguments.save_joint_map = filled(arguments.save_joint_map, item)
+            Path(arguments.save_joint_map).parent.mkdir(parents=True, exist_ok=True)
         if item.output:
             Path(item.output).parent.mkdir(parents=True, exist_ok=True)
         code: int = import_module(f"viewer.commands.{self.command}").run(arguments)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,6 +14,7 @@ from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.inputs import find_inputs
 from viewer.batching.items import Item
 from viewer.batching.naming import (
+    check_further_outputs,
     check_outputs,
     check_summaries,
     items_of,
@@ -23,24 +24,26 @@ from viewer.batching.naming import (
 from viewer.batching.overview import overview_files
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
+from viewer.data_classes import dataclass
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import counted, listed, printable
 
 __all__ = ["Plan", "Request", "plan_of"]
 
-_SMALL = 50e6  # bytes of all inputs; above this, even a few inputs are run by workers
-_LISTED = 10  # names in a message
+_SMALL = 50e6  # total bytes of inputs above which workers run even a few inputs
+_LISTED = 10  # maximum number of names in a message
 
 
 @dataclass(frozen=True)
 class Request:
-    """The user's request; the options of the same names describe it.
+    """The user's request; see the options of the same names.
 
     ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
     ``notes``: messages about the paths.
+    ``joint_map``: template for the joint map of each item.
     """
 
     paths: Sequence[str]
@@ -63,6 +66,7 @@ class Request:
     notes: Sequence[str] = ()
     table: str = ""
     overview: str = ""
+    joint_map: str = ""
 
 
 @dataclass(frozen=True)
@@ -92,16 +96,18 @@ def plan_of(request: Request) -> Plan:
     template = template_of(request.output, request.to) if request.output else ""
     items = items_of(inputs, template)
     check_outputs(items, request.shared)
+    maps = _joint_maps(request, items)
     report = _report_of(request)
     mine = shard_of(items, request.shard) if request.shard else items
     names = {"--report": str(report or ""), "--table": request.table}
     names |= _overview_names(request, len(mine))
-    check_summaries(names, items, request.shared)
+    check_summaries(names, [*items, *maps], request.shared)
     items = mine
     if request.resume and report is None:
         raise ViewerError("--resume: expected --report FILE, or a folder for the outputs")
     if not (request.force or request.resume):
-        _check_free(items)
+        numbers = {item.index for item in items}
+        _check_free([*items, *(each for each in maps if each.index in numbers)])
     engine, limits, note = _processes(request, items)
     settings = Settings(
         engine, limits, report, _existing(request), request.identity, tuple(request.shared)
@@ -109,8 +115,16 @@ def plan_of(request: Request) -> Plan:
     return Plan(items, settings, (*request.notes, *inputs.notes, *note))
 
 
+def _joint_maps(request: Request, items: Sequence[Item]) -> list[Item]:
+    """Return the items with their joint maps as outputs; empty if none are written."""
+    if not request.joint_map:
+        return []
+    option = "--save-joint-map"
+    return check_further_outputs(option, request.joint_map, items, request.shared)
+
+
 def _overview_names(request: Request, count: int) -> dict[str, str]:
-    """Return the files of the overview; raise OutputError if a further sheet exists."""
+    """Return the files of the overview; raise OutputError if one of its sheets exists."""
     if not request.overview:
         return {}
     first, *others = overview_files(request.overview, count)
@@ -159,7 +173,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
     Few small inputs are run in this process, because starting workers takes about a second.
     """
     timeout = TIMEOUT if request.timeout is None else request.timeout or None
-    if timeout is not None and not timeout >= 0.0:  # NaN too
+    if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
     for name, value in (("workers", request.workers), ("retries", request.retries)):
         if value is not None and value < 0:

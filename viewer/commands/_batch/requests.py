@@ -24,7 +24,7 @@ from viewer.version import VERSION
 __all__ = ["request_of"]
 
 _NOT_RESULTS = ("files", "output", "force", "model_path", "json")
-"""Arguments on which the content of the outputs does not depend."""
+"""Arguments that do not affect the content of the outputs."""
 
 
 def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
@@ -45,9 +45,6 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    memory = (
-        parse_bytes(arguments.limit_memory, "--limit-memory") if arguments.limit_memory else None
-    )
     paths, notes = _inputs(arguments)
     request = Request(
         paths=paths,
@@ -65,11 +62,12 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
-        memory=memory,
+        memory=_memory(arguments),
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
         overview=name_in_shard(getattr(arguments, "overview", ""), arguments.shard),
+        joint_map=getattr(arguments, "save_joint_map", None) or "",
     )
     may_replace = arguments.force or arguments.resume
     check_results(name, request.table, request.overview, may_replace, output)
@@ -89,13 +87,19 @@ def _fixed(arguments: argparse.Namespace) -> list[str]:
 
 
 def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
-    """Return the paths of the batch, and messages about those that are left out."""
+    """Return the paths of the batch, and messages about omitted paths."""
     if arguments.job != "diff" or not all(map(os.path.lexists, arguments.files)):
         return arguments.files, []
     found = find_submissions(arguments.files)
     names = listed([printable(path.name, 60) for path in found.ignored])
-    note = f"ignored, as they are neither folders nor archives: {names}"
+    note = f"ignored because they are neither folders nor archives: {names}"
     return [*map(str, found.submissions)], [note] if found.ignored else []
+
+
+def _memory(arguments: argparse.Namespace) -> int | None:
+    """Return the bytes that a worker may use; None for no limit."""
+    given = arguments.limit_memory
+    return parse_bytes(given, "--limit-memory") if given else None
 
 
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
@@ -112,13 +116,13 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
     names |= parser._defaults.keys()
     command = argparse.Namespace(**{name: getattr(arguments, name) for name in names})
     if getattr(command, "model_path", None) is not None:
-        save_model_folder(command.model_path)  # once, not for each item
+        save_model_folder(command.model_path)  # saved once, not for each item
         command.model_path = None
     return command
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return a text that identifies job, options and version: equal texts give equal results."""
+    """Return a string that identifies job, options and version, on which results depend."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
@@ -126,7 +130,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS:
+        if name in _NOT_RESULTS or name == "save_joint_map":  # this file is an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

@@ -60,7 +60,7 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
     ``table``, ``overview``: the files; empty for none.
     ``may_replace``: whether they may exist.
     ``output``: folder that the batch creates if it is missing.
-    Raises ViewerError if a suffix is wrong, or a file exists or has no folder.
+    Raises ViewerError if a suffix is wrong, a file exists, or its folder is missing.
     """
     if table and Path(table).suffix.lower() != ".csv":
         raise UnsupportedFormatError(

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.commands._printing import table_lines
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, described
 from viewer.phrases import printable
 from viewer.rig.comparison import Difference, Measure
@@ -24,7 +25,7 @@ class Compared:
     differences : tuple of (str, Difference)
         One per actor, with the actor's name in the reference.
     mismatches : tuple of Diagnostic
-        Actors without a counterpart, and the side they are on.
+        Actors without a counterpart, and the scene that contains them.
     error : str
         Reason why the input could not be opened; empty if it was.
     diagnostics : tuple of Diagnostic

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.commands._numbers import number
-from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note, posed_actors
+from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.commands._writing.baked_springs import add_spring_argument
+from viewer.commands._writing.written_actors import left_out_notes, written_actors
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
@@ -18,10 +19,11 @@ from viewer.export import (
     MotionOptions,
     animation_for,
     export_animation,
+    files_written,
     motion_exporters,
     suited_exporter,
 )
-from viewer.export._motion_paths import animation_files, motion_paths
+from viewer.export._motion_paths import PERSON, animation_files, is_together, motion_paths
 from viewer.export._options import QUATERNIONS, ROTATION_ORDERS
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
@@ -145,19 +147,22 @@ def write_motions(
 ) -> list[Diagnostic]:
     """Write every actor's motion; return notes about what was written and what was lost.
 
-    If one pose is requested, or nothing moves, a motion of one frame is written. People absent
+    Formats that hold several figures get one file, which includes the figures that do not move. If
+    one pose is requested, or nothing moves, a motion of one frame is written. People absent
     from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can store, or nobody is present
-      in the frames; nothing is written then.
+    Raises ViewerError if no actor has a motion that the format can store, or no person is present
+    in the frames; in that case, nothing is written.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
     actors = written_actors(arguments, output, scene)
     is_pose = asks_one_pose(arguments, output, scene)
+    is_one = EXPORTERS[key].writes_several and is_together(output, options)
+    paths = [output] * len(actors) if is_one else motion_paths(output, actors)
     parts = []
-    for actor, path in zip(actors, motion_paths(output, actors), strict=True):
+    for actor, path in zip(actors, paths, strict=True):
         if is_pose:
             animation: SampledAnimation | SampledPoints
             animation, up = animation_of_pose(arguments, key, options, scene, actor)
@@ -166,13 +171,18 @@ def write_motions(
         parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
-        raise RigError(f"nobody is present in {parts[0].span}: there is nothing to write")
-    notes = _write(there, output, key, options, check) + _untracked_notes(there, key)
+        raise RigError(f"no person is present in {parts[0].span}: there is nothing to write")
+    still = [each for each in scene.actors if is_one and each.clip is None and each not in actors]
+    if is_one and len(there) + len(still) > 1:
+        notes = _write_together(there, scene, output, options, still, check)
+    else:
+        notes = _write(there, output, key, options, check)
+    notes += _untracked_notes(there, key)
     for part in parts:
         if not part.present.any():
             values = {"figure": part.animation.name, "frames": part.span}
             notes.append(Diagnostic("X003.absent", values=values))
-    return [*notes, *[pose_note(arguments)] * is_pose, *left_out_notes(scene, actors)]
+    return [*notes, *[pose_note(arguments)] * is_pose, *left_out_notes(scene, actors + still)]
 
 
 def _whole_animation(
@@ -243,6 +253,27 @@ def _write_one(part: _Part, key: str, options: MotionOptions) -> list[Diagnostic
     return export_points(part.animation, part.path, options)
 
 
+def _write_together(
+    parts: list[_Part],
+    scene: Scene,
+    output: Path,
+    options: MotionOptions,
+    still: list[Actor],
+    check: Callable[[list[Path]], None],
+) -> list[Diagnostic]:
+    """Write the people present and the figures that do not move into one file."""
+    from viewer.export.gltf import export_animations
+
+    check(files_written(output))
+    motions = [
+        (part.actor, part.animation, part.up)
+        for part in parts
+        if isinstance(part.animation, SampledAnimation)
+    ]
+    with raising():
+        return export_animations(motions, output, options, scene, still)
+
+
 def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> list[Diagnostic]:
     """Write all people into one folder."""
     from viewer.export.easymocap import export_animations
@@ -267,47 +298,6 @@ def _untracked_notes(parts: list[_Part], key: str) -> list[Diagnostic]:
     if not names:
         return []
     return [Diagnostic("X005.untracked", values={"names": names})]
-
-
-def left_out_notes(scene: Scene, written: list[Actor]) -> list[Diagnostic]:
-    """Return notes about omitted data: still figures, and keypoints of people with bodies."""
-    left = [actor for actor in scene.actors if actor not in written]
-    still = [actor.name for actor in left if actor.clip is None]
-    points = [actor.name for actor in left if isinstance(actor.clip, PointClip)]
-    moves = any(actor.clip is not None for actor in written)
-    key = "X003.no-motion" if moves else "X003.no-joints"
-    notes = [Diagnostic(key, values={"figure": name}) for name in still]
-    if points:
-        notes.append(Diagnostic("X003.keypoints", values={"names": points}))
-    return notes
-
-
-def pose_or_point_actors(scene: Scene) -> list[Actor]:
-    """Return the actors whose current pose is written: captured points only if there is no body."""
-    figures = [actor for actor in scene.actors if not isinstance(actor.clip, PointClip)]
-    return figures or list(scene.actors)
-
-
-def written_actors(arguments: argparse.Namespace, output: Path, scene: Scene) -> list[Actor]:
-    """Return the actors whose motion is written, or whose pose is written as a one-frame motion.
-
-    Raises RigError if there are none.
-    """
-    if asks_one_pose(arguments, output, scene):
-        return posed_actors(scene)
-    return moving_actors(scene)
-
-
-def moving_actors(scene: Scene) -> list[Actor]:
-    """Return the actors whose motions are written: bodies, or captured points if there are none.
-
-    Raises RigError if nothing moves.
-    """
-    moving = [actor for actor in scene.actors if actor.clip is not None]
-    bodies = [actor for actor in moving if not isinstance(actor.clip, PointClip)]
-    if not moving:
-        raise RigError("no file has a motion: a motion cannot be written")
-    return bodies or moving
 
 
 def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
@@ -367,7 +357,8 @@ def check_numbered(arguments: argparse.Namespace, output: Path) -> None:
 def check_frame_field(output: Path) -> None:
     """Raise for a name of numbered files without a valid frame field."""
     try:
-        first, second = (output.name.format(frame=frame) for frame in (0, 1))
+        name = output.name.replace(PERSON, "")
+        first, second = (name.format(frame=frame) for frame in (0, 1))
     except (ValueError, KeyError, IndexError, AttributeError):
         first = second = ""
     if first == second:

@@ -22,7 +22,7 @@ def add_joint_map_argument(group: argparse._ArgumentGroup) -> None:
         "--save-joint-map",
         metavar="FILE",
         help="also write which joint of the motion drives each joint of the figure, as a text file "
-        "for --joint-map",
+        "for --joint-map (in a batch, a template such as maps/{stem}.txt)",
     )
 
 
@@ -48,13 +48,14 @@ def saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[No
             texts.setdefault(joint_map_text(full_map(actor.drive, actor.figure), titles), actor)
     if not texts:
         raise RigError(
-            "--save-joint-map: expected a motion that drives a figure with other joints, found none"
+            "--save-joint-map: expected a motion that drives a figure with different joints, found "
+            "none"
         )
     files = motion_paths(Path(arguments.save_joint_map), [*texts.values()])
     check_targets(files, inputs_of(arguments, scene), arguments.force)
     output = Path(arguments.output)
     if output.suffix and "{frame" not in output.name:
-        check_targets([*files, output], (), force=True)  # they must be different files
+        check_targets([*files, output], (), force=True)  # the files must be different
     with all_or_none(files):
         for file, text in zip(files, texts, strict=True):
             save_text(file, text)

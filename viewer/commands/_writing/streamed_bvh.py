@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from viewer.commands._pose import apply_pose
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import motion_settings, print_warnings, scene_files, size_limit
 from viewer.commands._writing.motion_export import motion_options, requested_frames
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError, RigError, ViewerError
 from viewer.export import MotionOptions, animation_for

@@ -48,7 +48,7 @@ MESSAGES = {
     "F002.torch-kind": "expected a torch file of tensors, found a compiled module "
     "(`torch.jit.save`), which is a program",
     "F006.pickle-rest": "ignored {n:#byte} after the end of the pickle",
-    # Submissions that are graded: folders and zip archives
+    # Graded submissions: folders and zip archives
     "F001.submission": "{reason:text}",
     "F001.submission-size": "expected at most {most} bytes of files, found {found}",
     "F001.submission-count": "expected at most {most:#file}, found {found}",
@@ -198,21 +198,21 @@ PHRASES = {
     "with strides {strides} from element {offset}",
     "tensor-ratio": "expected a tensor of at most {most} times the size of its storage, found "
     "{shape:axes} elements",
-    "tensor-persistent": "expected the persistent id of a storage, found another one",
+    "tensor-persistent": "expected the persistent id of a storage, found a different one",
     "tensor-key": "expected a storage with the key {item:quoted}, found none",
     "tensor-member": "expected a storage {item:quoted} of {expected} bytes, found {found}",
     "tensor-count": "expected {expected:#element} in the storage {item:quoted}, found {found}",
     "tensor-storages": "expected one storage {item:quoted}, found two of different types or sizes",
     "tensor-no-storage": "expected a storage for each tensor, found none",
     "torch-bytes": "expected a storage saved by torch, found {found}",
-    "torch-magic": "expected a torch file, found another pickle",
-    "torch-protocol": "expected torch protocol {expected}, found another one",
+    "torch-magic": "expected a torch file, found a pickle of a different kind",
+    "torch-protocol": "expected torch protocol {expected}, found a different one",
     # Arrays of joblib
     "joblib-old": "expected arrays in the file, found {name}, which keeps them in other files: "
     "load and save it again with joblib 0.10 or later",
     "joblib-wrapper": "expected a standard array description, found an unusual {name}",
     "joblib-dtype": "expected an array of numbers or strings, found {shape:axes} of {dtype}",
-    "joblib-objects": "expected an array of objects, found another value",
+    "joblib-objects": "expected an array of objects, found a different value",
     "pickle-other": "unexpected object in the pickle",
     "pickle-selection": "expected {expected:text} indices in {name}, found {found}",
     "pickle-selection-range": "expected indices 0 to {last}, found {low} to {high}",

@@ -37,13 +37,13 @@ MESSAGES = {
     # MHR
     "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "
     "writes them, and its `download_assets.py --lod 1` downloads them",
-    "F002.mhr-no-lod": "expected lod0.npz to lod6.npz beside rig.npz, found none",
-    "F002.mhr-lod": "--lod: no level of detail {found:quoted}; there are {known:list12}",
+    "F002.mhr-no-lod": "expected lod0.npz to lod6.npz next to rig.npz, found none",
+    "F002.mhr-lod": "--lod: no level of detail {found:quoted}; available levels: {known:list12}",
     "F002.mhr-keys": "expected MHR's portable files; keys missing: {missing:list12}; keys found: "
     "{found:list12}",
     "F002.mhr-version": "{item:text}: expected version 1, found {found}",
-    "F002.mhr-parameters": "{item:text}: expected the parameters of {n} blend shapes last, without "
-    "effect on joints, found {found} columns",
+    "F002.mhr-parameters": "{item:text}: expected the parameters of {n} blend shapes at the end, "
+    "without effect on joints, found {found} columns",
     "F002.mhr-index": "{item:text}: expected indices from 0 to {last}",
     "F002.mhr-quaternion": "{item:text}: expected quaternions, found 0 0 0 0",
     "F007.mhr-correctives": "no pose correctives: plain linear blend skinning",
@@ -89,7 +89,7 @@ MESSAGES = {
     "F007.motion-angles": "{item:text}: angles used as stored, without the mean hand pose",
     "F007.motion-place": "no trans: the body stays in place",
     "F007.motion-rates": "conflicting frame rates ({rates:list}): the first one is used",
-    "F007.motion-no-rate": "no frame rate: the usual {rate:g} fps assumed",
+    "F007.motion-no-rate": "no frame rate: the common {rate:g} fps assumed (--fps sets it)",
     "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",
     "F007.motion-tissue": "dmpls (soft tissue) of {n:#frame} omitted",
     "F007.motion-keys": "ignored unknown keys: {keys:list12}",

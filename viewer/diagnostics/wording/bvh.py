@@ -26,13 +26,14 @@ PHRASES = {
     "bvh-position": "frame {frame}: {axis}position of joint {joint:name}",
     "bvh-frames": "{n:#frame}",
     "bvh-part": "{n} of {width} numbers for the next",
-    # Estimates of unit and up axis; in inches, 0 if that would be no likely size
-    "unit-from-size": "{unit} assumed (skeleton {size:.4g} high{metres:+; inches would be "
+    # Estimates of unit and up axis; ``metres`` is 0 if inches would give an unlikely size
+    "unit-from-size": "{unit} assumed (skeleton {size:.4g} high{metres:+; if in inches, "
     "{metres:.3g} m})",
-    "unit-unknown": "unit unknown (skeleton {size:.4g} high{metres:+; inches would be "
+    "unit-unknown": "unit unknown (skeleton {size:.4g} high{metres:+; if in inches, "
     "{metres:.3g} m})",
     "up-of-longest": "{up} up assumed: the rest skeleton is longest along {up}",
     "up-of-head": "{up} up assumed: the head is above the feet along {up}",
-    "up-against-rest": "{up} up assumed, although the rest skeleton stands along {axis}",
-    "up-against-frames": "{up} up assumed, although the skeleton stands along {axis} in the frames",
+    "up-against-rest": "{up} up assumed, although the rest skeleton is upright along {axis}",
+    "up-against-frames": "{up} up assumed, although the skeleton is upright along {axis} in the "
+    "frames",
 }

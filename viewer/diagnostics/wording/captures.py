@@ -27,17 +27,17 @@ MESSAGES = {
     "F003.record": _RECORD,
     "F002.record-twice": "{item:text} occurs twice: the first one is used",
     "F007.record": "{problem}",
-    "F007.records": "{name:text}: {n} more errors in frame files",
+    "F007.records": "{name:text}: {n:#more error} in frame files",
     "F007.record-untracked": 'untracked people (id -1) are named "untracked" and numbered '
     "within each frame: they cannot be matched between frames",
-    "F007.record-no-id": "people without id: numbered in list order",
-    "F007.record-ids": "people with different id and personID: id is used",
+    "F007.record-no-id": "people without an id are numbered in list order",
+    "F007.record-ids": "id and personID of people differ: id is used",
     "F007.record-points": "keypoints3d in this record and in the folder keypoints3d: those in the "
     "folder are used",
     "F007.record-poses": "poses in this record and in a separate folder: those in the folder are "
     "used",
-    "F007.record-vertices": "vertices are not needed: ignored",
-    "F007.record-first": "no earlier record has {keys:or}: 0 is used until one does",
+    "F007.record-vertices": "vertices are ignored: they are not needed",
+    "F007.record-first": "no earlier record has {keys:or}: 0 is used until a record does",
     "F007.record-last": "no {item} in this record: the person's last known values are used",
     "F007.record-no-last": "no {item} in this or earlier records of the same person: 0 is used",
     "F007.record-unseen": "{name:text}: no keypoint of {people:list} is ever visible: every "
@@ -53,7 +53,8 @@ MESSAGES = {
     "F003.camera-limit": "{item:text}: expected numbers within ±{limit:g}, found {found:g}",
     "F002.camera-rotation": "{item:text}: not a rotation matrix",
     "F002.camera-no-key": "{item:text}: key not found",
-    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found no matrix of numbers",
+    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found a value that is not a "
+    "numeric matrix",
     "F002.camera-shape": "{item:text}: expected {shape:axes} numbers, found {found:axes}",
     "F002.camera-twice": 'expected unique keys, found "{found:text}" again',
     "F002.camera-value": "expected `name: value`, found {found:quoted}",
@@ -68,29 +69,34 @@ MESSAGES = {
     "F002.video-space": "expected people in {space} space, found them only in {found:list} space "
     "({tool})",
     "F002.video-rows": "expected at most {most} frames of all people, found more",
-    "F002.video-frames": "expected frames from 0, and at most {most}, found {low} to {high}",
-    "F002.video-frame-numbers": "{item:text}: expected integer frame numbers, found other values",
+    "F002.video-frames": "expected at most {most} frames, numbered from 0 or above, found {low} to "
+    "{high}",
+    "F002.video-frame-numbers": "{item:text}: expected integer frame numbers, found values of a "
+    "different type",
     "F002.video-rotation": "{item:text}: expected rotations, found a matrix or vector of size "
     "{found:.3g}",
     "F002.video-count": "{item:text}: expected {expected:#number}, found {found}",
-    "F002.video-whole": "{item:text}: expected a list of integers, found another value",
-    "F002.video-frame": "{item:text}: expected the detections of a frame, found another value",
-    "F002.video-person": "{item:text}: expected a person with an ID, found another value",
+    "F002.video-whole": "{item:text}: expected a list of integers, found a different value",
+    "F002.video-frame": "{item:text}: expected the detections of a frame, found a different value",
+    "F002.video-person": "{item:text}: expected a person with an ID, found a different value",
     "F002.video-lists": "{item:text}: expected as many bodies and cameras as tracks, found "
     "{counts:list}",
     "F002.video-camera": "{item:text}: expected a camera in each frame of person {person}, found "
     "{n:#frame}",
     "F002.video-points": "{item:text}: expected {expected:list} keypoints, joints and vertices, as "
-    "in the first frame, found others",
+    "in the first frame, found different numbers",
     "F007.video-vertices": "{n} of {all} vertices kept because there are many frames",
     "F007.video-focal": "camera omitted: expected a positive focal length, found {found:g} pixels",
-    "F007.video-ghosts": "{n:#detection} of people out of sight omitted",
+    "F007.video-ghosts": "{n:#detection} of people who are not visible omitted",
     "F007.video-last": "{n:#result} in the folder: opened {name:text}, the last iteration",
-    "F007.video-tracks": "ignored because it does not match the people: all are in every frame",
+    "F007.video-tracks": "ignored because it does not match the people in the results: all are "
+    "treated as present in every frame",
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
     "their order in the list",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
+    "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "
+    "sets it)",
     "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
     "sets it)",
 }
@@ -111,7 +117,7 @@ PHRASES = {
     "record-vposer": "expected rotations, found {found} numbers, a VPoser latent vector, which "
     "needs the VPoser network to decode: export full poses from EasyMocap",
     "record-rows": "expected rows of 3 or 4 numbers, found {found}",
-    "record-other-rows": "expected rows of 3 or 4 numbers, found rows of other lengths",
+    "record-other-rows": "expected rows of 3 or 4 numbers, found rows of different lengths",
     "record-no-rows": "expected rows of 3 or 4 finite numbers, found none",
     "record-most-points": "expected at most {most} keypoints, found {found}",
     "record-points": "expected {expected:#keypoint}, found {found}",

@@ -25,7 +25,7 @@ CODES = {
     "C016": Code(
         "warning",
         "floating feet",
-        "lower the motion (--ground), none if the person stands on something",
+        "lower the motion (--ground); none if the person stands on something",
     ),
 }
 
@@ -57,8 +57,8 @@ MESSAGES = {
     "checked",
     "C014.jitter": "{n:#frame/{all}}: {joint:text} jitters by {noise} from frame to frame (limit "
     "{limit}), most around frame {frame}",
-    "C015.exchanged": "jumps by {distance} to the position of {other}, who jumps to that of this "
-    "person, in {n:#frame}: {frames_text:list}",
+    "C015.exchanged": "swaps positions with {other}, {distance} away, in {n:#frame}: "
+    "{frames_text:list}",
     "C015.continued": "appears in frame {first}, {distance} from where {other} disappears in frame "
     "{last}: may be one person (--merge-ids {ids} of viewer convert)",
     "C016.foot": "{n:#frame/{all}}: both feet rest up to {height} above the ground, highest "
@@ -66,7 +66,7 @@ MESSAGES = {
 }
 
 PHRASES = {
-    # Why a clip cannot drive a skeleton, after the skeleton's name
+    # Reasons why a clip cannot drive a skeleton, worded to follow the skeleton's name
     "clip-needs": "needs {n} (3 + 3 x {joints} joints)",
     "not-course-rig": "is not a .skel-style rig, in which clips translate the root along x, y, z "
     "and rotate each joint about x, y, z: {reason}",

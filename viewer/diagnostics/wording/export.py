@@ -9,7 +9,7 @@ CODES = {
     ),
     "X003": Code("note", "data that is not written", "choose a format that can store it"),
     "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
-    "X005": Code("note", "data that is written in another form", "none if intentional"),
+    "X005": Code("note", "data that is written in a different form", "none if intentional"),
     "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
 }
 
@@ -27,6 +27,8 @@ MESSAGES = {
     "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
     "bytes",
     "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size} bytes",
+    "X001.gltf-motions": "{n_figures:#figure}: {figures:list}; one animation of {seconds:.4g} s"
+    "{others:+; {}}, {size} bytes",
     "X001.vrm": "VRM {version}: {parts:all}",
     "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, {size} "
     "bytes",
@@ -88,13 +90,15 @@ MESSAGES = {
     "X003.no-motion": "{figure:text}: no motion, not written",
     "X003.no-joints": "{figure:text}: no joints, not written",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
-    "X003.keypoints": "keypoints next to bodies are not written ({names:all}): open only the "
-    "keypoints3d folder",
+    "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
+    "only the keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "
     "of the clip; viewer convert --bake-springs writes the simulated ones",
     "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
     "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
+    "X003.vrm-upgrade": "{n:#member} of the VRM 0.x file {n:?has|have} no counterpart in VRM 1.0: "
+    "{names:list8}",
     "X003.vrma-joints": "{n:#joint} without a human bone {n:?is|are} omitted",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
@@ -112,6 +116,7 @@ MESSAGES = {
     "X004.closed": "missing {n:?frame|frames} {gaps:list}: {how}",
     "X004.kept": "{n:?frame|frames} {gaps:list} missing, as in the original motion",
     "X004.of-person": "{person}: {remark}",
+    "X004.of-figure": "{figure:text}: {remark}",
     # Changed data
     "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
@@ -130,8 +135,9 @@ MESSAGES = {
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
-    "X005.as-smplx": "{figure:text} is not SMPL-X, whose pelvis is elsewhere at rest and whose "
-    "shape coefficients differ: for exact translations and shapes use --model with an SMPL-X model",
+    "X005.as-smplx": "{figure:text} is not SMPL-X, which has another rest position of the pelvis "
+    "and different shape coefficients: for exact translations and shapes use --model with an "
+    "SMPL-X model",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
@@ -146,7 +152,8 @@ MESSAGES = {
     "X005.own-shape": "shape and translation are those of {figure:text}, which is not an SMPL "
     "model: other models are offset by the distance between the rest positions of the pelvis",
     "X005.own-root": "translations are relative to the skeleton's root at rest, ({x:z.4g}, "
-    "{y:z.4g}, {z:z.4g}) m: a model with another rest root is offset by the difference (use "
+    "{y:z.4g}, {z:z.4g}) m: a model with a different root position at rest is offset by the "
+    "difference (use "
     "--model for exact translations)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",

@@ -130,7 +130,7 @@ MESSAGES = {
     "G004.no-common-root": "expected joints with a common root, found joints below nodes "
     "{nodes:list12}",
     "G004.not-a-root": "expected a common ancestor of all joints, found node {node}, with "
-    "{n:#joint} outside of it",
+    "{n:#joint} outside its subtree",
     "G005.matrix": "expected a node without a matrix, found node {node} with one: its matrix is "
     "decomposed",
     "G005.negative": "{n:#key} at negative times (earliest: {found:.6g} s)",

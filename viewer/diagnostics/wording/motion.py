@@ -13,8 +13,8 @@ MESSAGES = {
     "F004.mapping-again": "expected each joint of {figure:text} at most once, found {joint:quoted} "
     "again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
-    "or an arm in both, found {n} joints that match; unknown in {motion:text}: {unused:list8}; in "
-    "{figure:text}: {idle:list8}; --joint-map can match them",
+    "or an arm in both, found {n:#matching joint}; not recognised in {motion:text}: "
+    "{unused:list8}; in {figure:text}: {idle:list8}; match them with --joint-map",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
@@ -44,8 +44,8 @@ MESSAGES = {
     "its feet is assumed; --source-rest overrides it",
     "F007.feet-planted": "feet of {figure:text} planted during {n:#contact} of {motion:text}: they "
     "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
-    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "
-    "disables this",
+    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}{ground:+; the "
+    "ground moves at {}}; --feet off disables this",
     "F007.feet-kept": "feet of {figure:text} not planted: they already slide as little as "
     "those of {motion:text}",
     "F007.feet-no-contacts": "feet of {figure:text} not planted: no ground contacts found in "
@@ -85,7 +85,7 @@ MESSAGES = {
     "X006.merged": "{other}: {n:#frame} joined to {kept}",
     "X006.renumbered": "{part} of {other} assigned to {kept}",
     "X006.overlap": "{other} and {kept} are both present in {n:#frame} ({frames:list}), {distance} "
-    "apart: those of {kept} are used",
+    "apart: the frames of {kept} are used",
     "X006.keys": "{figure:text}: its motion has keys instead of captured frames and is unchanged",
 }
 
@@ -96,7 +96,7 @@ PHRASES = {
     "ratio-of-legs": "the ratio of leg lengths",
     "ratio-of-arms": "the ratio of arm lengths",
     "ratio-of-bones": "the ratio of bone lengths",
-    "ratio-of-nothing": "as no lengths can be compared",
+    "ratio-of-nothing": "because no lengths can be compared",
     "left-moves": "joint translations",
     "left-place": "figure translation",
     "left-size": "figure scale",

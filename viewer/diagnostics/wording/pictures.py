@@ -6,6 +6,8 @@ MESSAGES = {
     "F001.video": "unreadable video: {reason:text}",
     "F001.video-camera": "a video needs a camera of the capture, which has none: expected people "
     "in camera space (--space camera) or calibrated cameras",
+    "F001.several-captures": "expected one capture with {option:text}, found {n}: {paths:list}; "
+    "open them one at a time",
     "F001.video-cameras": "expected a video with the name of one of the cameras ({names:list})",
     "F002.video": "unsupported or damaged video",
     "F002.video-picture": "expected a video, found a picture (--images takes a folder of pictures)",

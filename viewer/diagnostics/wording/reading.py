@@ -37,7 +37,7 @@ MESSAGES = {
     "F002.unclosed": 'expected "}}" to close {section} (line {line}), found {found:quoted}',
     "F002.width-end": "{item}: expected {expected:#number}, found {found} before the end of the "
     "file",
-    "F002.more": "{item}: expected {expected:#number}, found another: {found:quoted}",
+    "F002.more": "{item}: expected {expected:#number}, found an additional one: {found:quoted}",
     "F002.count": "{item}: expected a count, found {found:quoted}",
     "F002.open": 'expected "}}" to close {word:quoted}, found the end of the file',
     "F003.beyond": "{item}: expected numbers within ±{most:.2g}, found {found:g}",

@@ -43,18 +43,19 @@ MESSAGES = {
     "R002.error": "unreliable alignment, error above {limit:g} %: specify --up, --facing or "
     "landmarks, or pose the template like the target",
     "R003.gap": "result: {gap}",
-    "R003.not-fitted": "pose: not fitted, as that would give {gap}",
-    "R003.pose": "pose: template joints rotated to fit, at most {joint:text} by {angle:.0f} "
-    "degrees; limbs resized, at most {limb:text} by {change:+z.0f} % in length",
+    "R003.not-fitted": "pose: not fitted, because that would result in {gap}",
+    "R003.pose": "pose: template joints rotated to fit, by up to {angle:.0f} degrees "
+    "({joint:text}); limb lengths changed by up to {change:+z.0f} % ({limb:text})",
     "R003.proportions": "proportions: template stretched by {scales}, pose kept",
     "R004.gap": "poor fit: {gap}; use a template of the same kind as the target",
-    "R004.not-fitted": "pose: not fitted, as that would give {gap}, with {joint:text} rotated by "
+    "R004.not-fitted": "pose: not fitted, because that would result in {gap}, with {joint:text} "
+    "rotated by "
     "{angle:.0f} degrees; use a template of the same kind as the target",
-    "R004.stretched-along-its-axes": "the template fits much better stretched by {scales}, with a "
-    "fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit "
+    "R004.stretched-along-its-axes": "the template fits much better when stretched by {scales}, "
+    "with a fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, fit "
     "proportions",
-    "R004.stretched-along-the-target": "the template fits much better stretched by {scales}, with "
-    "a fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use "
+    "R004.stretched-along-the-target": "the template fits much better when stretched by {scales}, "
+    "with a fitting error of {gap:.3f} % instead of {kept:.3f} %: if the target was stretched, use "
     "--scale axes",
     "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",

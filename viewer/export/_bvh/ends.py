@@ -12,8 +12,8 @@ _MOSTLY = 0.5  # minimum weight of a vertex that belongs to a joint
 _FEW = 4  # minimum number of vertices for measuring a joint's extent
 _TOO_SHORT = 0.1  # fraction of the parent bone: shorter ends are implausible
 _HALF = 0.5  # fraction of the parent bone: length of an end without another estimate
-_NO_SIZE = 0.1  # metres: the end of a skeleton without any bone
-_DEFAULT_END = 1.0  # the same, if the unit is unknown
+_NO_SIZE = 0.1  # metres: length of an end in a skeleton without bones
+_DEFAULT_END = 1.0  # length of such an end if the unit is unknown
 
 
 def end_offsets(figure: Figure, rest: Floats, leaves: Ints) -> Floats:

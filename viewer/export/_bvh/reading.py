@@ -12,11 +12,12 @@ skinned with LBS, with pose correctives from the file's rotations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._bvh.body import Space, rest_matrices
 from viewer.export._losses.skinned import Poses, Side, anchored, bare_poses, figure_side
 from viewer.rig.arrays import Floats

@@ -6,11 +6,12 @@ The file and the notes are those of ``viewer.export.bvh.export_animation``.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._bvh.angles import Unroller
 from viewer.export._bvh.body import Body, Conversion, shape_at

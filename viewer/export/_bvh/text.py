@@ -17,7 +17,7 @@ from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
 _DEEPEST = 32  # maximum indentation in tabs
-_BLOCK = 256  # frames that are formatted at once
+_BLOCK = 256  # number of frames formatted together
 _SECONDS_DIGITS = 9  # minimum decimals of the frame time, for a relative error below 1e-8
 
 

@@ -18,8 +18,8 @@ __all__ = ["add_cameras"]
 
 # OpenCV's cameras look along z with y down, those of glTF along -z with y up.
 _FLIP = np.diag([1.0, -1.0, -1.0])
-_NEAR = 0.01  # metres; glTF requires a near plane, which is closer than any figure
-_CENTRED = 1e-6  # fraction of the width
+_NEAR = 0.01  # distance of the near plane, which glTF requires, in metres: closer than any figure
+_CENTRED = 1e-6  # tolerance for a centred principal point, as a fraction of the width
 
 
 def add_cameras(

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.body import Body
 from viewer.export._gltf.keyed import first_time
@@ -24,9 +25,10 @@ from viewer.rig.pose import Pose
 from viewer.rig.scalars import length_text
 from viewer.rig.skinning import Skinning
 
-_MOST_VERTICES = 4_000_000  # maximum number compared, over all times: about two seconds
-_FEWEST, _MOST = 3, 128  # times per animation
-_BLOCK = 64  # times at once
+# Maximum number of compared vertices over all times: takes about two seconds.
+_MOST_VERTICES = 4_000_000
+_FEWEST, _MOST = 3, 128  # minimum and maximum number of times per animation
+_BLOCK = 64  # number of times per block
 _DEFAULTS = {"translation": (0.0, 0, 0), "rotation": (0.0, 0, 0, 1), "scale": (1.0, 1, 1)}
 
 

@@ -5,6 +5,7 @@ Specification: Khronos Group, ``registry.khronos.org/glTF/specs/2.0``.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import struct
 from typing import Any
@@ -27,7 +28,7 @@ _TYPES = {
 _SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _PADDING = 4  # alignment of arrays, bytes: size of the largest component
 _LONGEST = 2**32 - 1  # a .glb stores its length in 32 bits
-_HEADER = 28  # bytes of a .glb besides JSON and arrays
+_HEADER = 28  # bytes of a .glb in addition to JSON and arrays
 
 
 class Document:
@@ -39,14 +40,18 @@ class Document:
     ----------
     root : dict
         The JSON.
+    extras : list of (str, Any)
+        Name and application data of each figure whose file has some.
     """
 
     def __init__(self, name: str) -> None:
         self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
+        self.extras: list[tuple[str, Any]] = []
         self._name = name
         self._parts: list[bytes] = []
         self._size = 0
         self._pictures: dict[bytes, int] = {}
+        self._arrays: dict[tuple[object, ...], list[int]] = {}
 
     def add(self, kind: str, item: dict[str, Any]) -> int:
         """Append an item to ``nodes``, ``meshes`` … and return its index."""
@@ -71,12 +76,18 @@ class Document:
     ) -> list[int]:
         """Add several consecutive arrays of equal size; return their accessors.
 
+        Equal arrays are written once, so figures with the same mesh share it.
+
         ``values`` (A, N, ...): as for ``array``, A times.
         ``kind``, ``target``, ``bounds``: as for ``array``.
         """
         stored = self._stored(values)
         rows = stored.reshape(len(stored), -1, _SIZES[kind])
-        view = self._view(stored.tobytes(), target)
+        data = stored.tobytes()
+        known = hashlib.sha256(data).digest(), kind, stored.dtype, rows.shape, target, bounds
+        if known in self._arrays:
+            return list(self._arrays[known])
+        view = self._view(data, target)
         accessors = []
         for number, part in enumerate(rows):
             accessor = {
@@ -90,7 +101,8 @@ class Document:
                 accessor["min"] = part.min(axis=0).tolist()
                 accessor["max"] = part.max(axis=0).tolist()
             accessors.append(self.add("accessors", accessor))
-        return accessors
+        self._arrays[known] = accessors
+        return list(accessors)
 
     def integers(self, values: NDArray[np.integer], kind: str, bounds: bool = False) -> int:
         """Add a vertex attribute of normalised integers; return its accessor.
@@ -104,7 +116,11 @@ class Document:
         stride = size + -size % _PADDING
         rows = np.zeros((len(stored), stride // stored.itemsize), stored.dtype)
         rows[:, : stored.shape[1]] = stored
-        view = self._view(rows.tobytes(), VERTICES)
+        data = rows.tobytes()
+        known = hashlib.sha256(data).digest(), kind, stored.dtype, stride, bounds
+        if known in self._arrays:
+            return self._arrays[known][0]
+        view = self._view(data, VERTICES)
         self.root["bufferViews"][view]["byteStride"] = stride
         accessor: dict[str, Any] = {
             "bufferView": view,
@@ -117,7 +133,8 @@ class Document:
         if bounds:
             accessor["min"] = stored.min(axis=0).tolist()
             accessor["max"] = stored.max(axis=0).tolist()
-        return self.add("accessors", accessor)
+        self._arrays[known] = [self.add("accessors", accessor)]
+        return self._arrays[known][0]
 
     def picture(self, data: bytes, name: str) -> int:
         """Add an image, the bytes of a PNG or JPEG file, once; return its index in ``images``."""

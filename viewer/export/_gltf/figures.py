@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._gltf.body import Body, Built, add_body, body_of
 from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
@@ -43,7 +45,7 @@ class Added:
     clips : sequence of TransformClip or None
         The animations to write; None if only the pose was written.
     kept : dict of TransformClip
-        Those with an effect, by index in the file.
+        Animations with an effect, by index in the file.
     """
 
     figure: Figure
@@ -86,24 +88,32 @@ def add_figure(
 
 
 def place_figures(
-    document: Document, actors: Sequence[Actor], added: Sequence[Added], to_file: Floats
+    document: Document, actors: Sequence[Actor], built: Sequence[Built], to_file: Floats
 ) -> list[int]:
     """Place several figures as in their scene; return the nodes that move them.
 
+    ``actors``: the figures, each upright in its own space.
+    ``built``: their contents in the file.
     ``to_file`` (4, 4): scene space to the space of the file.
     """
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()
-    for actor, each in zip(actors, added, strict=True):
+    for actor, each in zip(actors, built, strict=True):
         own = to_metres(actor.figure.up, actor.figure.unit)
         matrix = to_file @ actor.placement @ np.linalg.inv(own)
-        if np.allclose(matrix, np.eye(4), rtol=0.0, atol=1e-12):
+        stays = np.allclose(matrix, np.eye(4), rtol=0.0, atol=1e-12)
+        if each.tree.place >= 0:
+            document.root["nodes"][each.tree.place]["name"] = text_of(actor.name)
+        # A root that only converts units or axes does not have the name of the figure.
+        if stays and each.tree.root in (each.tree.place, *each.tree.joints):
             continue
         # Nodes of skinned meshes stay roots, because their transforms have no effect.
-        moved = [root for root in each.built.roots if "skin" not in document.root["nodes"][root]]
-        item = {"name": text_of(actor.name), "children": moved}
-        node = document.add("nodes", {**item, "matrix": matrix.T.ravel().tolist()})
+        moved = [root for root in each.roots if "skin" not in document.root["nodes"][root]]
+        item: dict[str, Any] = {"name": text_of(actor.name), "children": moved}
+        node = document.add("nodes", item)
         roots[:] = [root for root in roots if root not in moved] + [node]
-        placing.append(node)
+        if not stays:
+            item["matrix"] = matrix.T.ravel().tolist()
+            placing.append(node)
     return placing
 
 
@@ -112,7 +122,7 @@ def figure_losses(
 ) -> list[Diagnostic]:
     """Return notes with the largest errors of a figure, and about data that is not written.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     kept, body, figure, notes = added.kept, added.body, added.figure, list[Diagnostic]()
     place = path, file, added.built.tree, added.built.meshes

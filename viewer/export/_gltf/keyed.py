@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.export._gltf.document import Document, text_of
+from viewer.export._gltf.motion import put_animation
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.reading import Placed
 from viewer.rig.arrays import Floats, Ints
@@ -27,7 +28,7 @@ _RATE = 60.0  # frames per second at which channels of different interpolation a
 
 
 class Clips:
-    """The animations of a file: clips of its figures with equal name and range are one.
+    """The animations of a file: clips of its figures with equal name and range are merged.
 
     Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
 
@@ -71,22 +72,14 @@ class Clips:
         return added
 
     def _put(self, clip: TransformClip, keys: _Keys, taken: Collection[int]) -> int:
-        """Add keys to the animation that another figure has in common, or to a new one."""
+        """Add keys to the animation shared with another figure, or to a new one."""
         name = (clip.name, clip.start, clip.end, first_time(clip))
         known = self._known.setdefault(name, [])
-        index = next((index for index in known if index not in taken), -1)
-        if index < 0:
-            item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
-            item |= {"samplers": keys.samplers, "channels": keys.channels}
-            index = self._document.add("animations", item)
+        common = next((index for index in known if index not in taken), -1)
+        item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
+        index = put_animation(self._document, item, keys.samplers, keys.channels, common)
+        if common < 0:
             known.append(index)
-            return index
-        item = self._document.root["animations"][index]
-        first = len(item["samplers"])
-        for channel in keys.channels:
-            channel["sampler"] += first
-        item["samplers"] += keys.samplers
-        item["channels"] += keys.channels
         return index
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
@@ -56,7 +57,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """Indices of the figure's vertices that the file's vertices are copies of."""
+        """Indices of the figure's vertices, one for each vertex of the file that copies it."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -117,7 +118,7 @@ def sides(
 def _split(side: Side, sources: Ints) -> Side:
     """Return a posed figure with its vertices duplicated as in the file."""
     whole = side.exact
-    assert side.body is not None  # the caller checked for a mesh
+    assert side.body is not None  # the caller has checked that there is a mesh
     body = body_rows(side.body, sources)
     return replace(
         side, body=body, exact=None if whole is None else lambda row: whole(row)[sources]
@@ -134,7 +135,7 @@ def first_set_note(
 ) -> list[Diagnostic]:
     """Return a note about the error in programs that read only four influences per vertex.
 
-    Empty if no vertex has more. ``expected``, ``read``: from ``sides``.
+    The list is empty if no vertex has more. ``expected``, ``read``: from ``sides``.
     """
     if influences is None or influences.most <= PER_SET or expected.body is None:
         return []
@@ -189,7 +190,7 @@ def _weights_phrase(influences: Influences) -> Phrase:
 def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnostic]:
     """Return a note that lists the parts of a figure that the file does not contain.
 
-    ``is_vrm``: whether its extensions hold what only VRM has.
+    ``is_vrm``: whether its extensions contain the data that only VRM supports.
     """
     shapes, skeleton, lost = figure.blend_shapes, figure.skeleton, list[Phrase]()
     rows = set(range(figure.n_shapes)) - set(shape.targets.tolist())

@@ -21,9 +21,10 @@ Color = tuple[float, float, float]
 _PLAIN = (0.62, 0.60, 0.57)  # linear; the viewer's colour for untextured surfaces
 _MATTE = {"metallicFactor": 0.0, "roughnessFactor": 0.8}  # glTF surfaces are metallic by default
 _WRAPS = {"clamp": 33071, "repeat": 10497, "mirror": 33648}
-_SMOOTH, _SHARP = (9729, 9987), (9728, 9986)  # magnified, minified with mipmaps
+# Filters for magnification, and for minification with mipmaps.
+_SMOOTH, _SHARP = (9729, 9987), (9728, 9986)
 _MINIFIED = dict(zip(MINIFICATIONS, (9728, 9729, 9984, 9985, 9986, 9987), strict=True))
-_SHEAR = 1e-6  # larger shears of a texture transform are reported, because glTF cannot express them
+_SHEAR = 1e-6  # larger shears of texture transforms are reported, because glTF cannot store them
 
 
 class Materials:
@@ -131,7 +132,7 @@ class Materials:
         if key not in self._images:
             data = texture.encoded or encode_png(image)
             added = self._document.picture(data, texture.name or name)
-            # The pixels are kept alive, so that no other array gets their id.
+            # A reference keeps the pixels alive, so that no other array gets their id.
             self._images[key] = added, image
         source, sampler = self._images[key][0], self._sampler(texture)
         pair = source, sampler

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._gltf.document import INDICES, Document, text_of
 from viewer.export._gltf.encoding import Encoding
 from viewer.export._gltf.materials import Materials
@@ -21,8 +21,8 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.mesh import Mesh, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
-_LONG = 65535  # maximum number of vertices with 16-bit indices, the highest being reserved
-_NOT_UNIT = 1e-3  # tolerance of unit length; squares of normals may underflow or overflow
+_LONG = 65535  # maximum number of vertices with 16-bit indices, the last of which is reserved
+_NOT_UNIT = 1e-3  # tolerance for unit length; squares of normals may underflow or overflow
 
 
 def add_mesh(

@@ -38,31 +38,31 @@ def still_locals(skeleton: Skeleton, rest: Locals, frames: Frames) -> Locals:
 def add_animation(
     document: Document,
     name: str,
-    rate: float,
+    times: Floats,
     skeleton: Skeleton,
     frames: Frames,
     tree: Tree,
     morphs: list[tuple[int, Floats]],
+    into: int = -1,
 ) -> int:
     """Add rotations of all joints, other properties that change, and the figure's placement.
 
     Quaternions have the sign nearest to the previous frame, because some programs interpolate
     components.
-    Times begin at 0.
 
     ``document``: modified in place.
     ``name``: name of the motion.
-    ``rate``: frames per second.
+    ``times`` (F,): increasing times of the frames in seconds, from 0.
     ``skeleton``: skeleton in the written shape.
     ``frames``: frames without gaps.
     ``tree``: the nodes.
     ``morphs``: nodes of meshes, and the changing weights of their targets.
-    Returns: number of joints with translations.
+    ``into``: animation to which the keys are added; -1 for a new one.
+    Returns: index of the animation.
     Raises RigError if a number exceeds single precision.
     """
     # Single precision distinguishes the times of eight million frames at any rate.
-    times = (np.arange(frames.n_frames) / rate).astype(np.float32)
-    keys = _Keys(document, document.array(times, "SCALAR", bounds=True))
+    keys = _Keys(document, document.array(times.astype(np.float32), "SCALAR", bounds=True))
     rotations = np.swapaxes(_continuous(frames.rotations), 0, 1)
     for node, output in zip(tree.joints, document.arrays(rotations, "VEC4"), strict=True):
         keys.add(node, "rotation", output)
@@ -84,11 +84,31 @@ def add_animation(
         keys.add(tree.place, "scale", document.array(scales, "VEC3"))
     for node, weights in morphs:
         keys.add(node, "weights", document.array(weights.ravel(), "SCALAR"))
-    document.add(
-        "animations",
-        {"name": text_of(name), "samplers": keys.samplers, "channels": keys.channels},
-    )
-    return len(moves)
+    return put_animation(document, {"name": text_of(name)}, keys.samplers, keys.channels, into)
+
+
+def put_animation(
+    document: Document,
+    item: dict[str, Any],
+    samplers: list[dict[str, Any]],
+    channels: list[dict[str, Any]],
+    into: int = -1,
+) -> int:
+    """Add samplers and channels to an animation of a file; return its index.
+
+    ``item``: the other members of a new animation.
+    ``samplers``, ``channels``: channels refer to these samplers; modified in place.
+    ``into``: the animation that is extended; -1 for a new one.
+    """
+    if into < 0:
+        return document.add("animations", {**item, "samplers": samplers, "channels": channels})
+    known = document.root["animations"][into]
+    first = len(known["samplers"])
+    for channel in channels:
+        channel["sampler"] += first
+    known["samplers"] += samplers
+    known["channels"] += channels
+    return into
 
 
 class _Keys:

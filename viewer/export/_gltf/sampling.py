@@ -1,7 +1,7 @@
-"""Evaluation of the animations of a glTF file written here.
+"""Evaluation of the animations of a glTF file written by this program.
 
 The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
-code with the rest of the program.
+code with other parts of the program.
 """
 
 from __future__ import annotations

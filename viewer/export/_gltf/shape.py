@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.morph_target import MORPH_GROUP
 from viewer.rig.shape import shaped
 
-_MOST_TARGETS = 64  # maximum number: each takes 12 bytes per vertex, and programs support few
+# Maximum number of targets: each takes 12 bytes per vertex, and programs support few.
+_MOST_TARGETS = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._losses.bounds import Bounds
 from viewer.export._losses.estimates import Estimator
@@ -21,14 +22,14 @@ from viewer.rig.motion.evaluation import Frames, frames_between, world_frames
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
-_BLOCK = 128  # poses at a time, so that their matrices fit into the processor's cache
-_BARE_BLOCK = 512  # the same without meshes
+_BLOCK = 128  # poses per block, whose matrices fit into the processor's cache
+_BARE_BLOCK = 512  # poses per block of skeletons without a mesh
 _CHUNK = 128  # poses per single-precision estimate
 _LIKELY = 4  # poses per chunk whose farthest vertex is measured first
 _SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning
-_MOST = 512  # poses compared one by one with nonlinear skinning
-_ROUNDING = 2e-6  # fraction of the size: single precision through a chain of joints
-_EPSILON = 2.0**-22  # relative to a coordinate: two steps of single precision
+_MOST = 512  # maximum number of poses compared one by one, with nonlinear skinning
+_ROUNDING = 2e-6  # fraction of the size: rounding in single precision along a chain of joints
+_EPSILON = 2.0**-22  # two steps of single precision, relative to a coordinate
 _SIZED = 256  # frames used to measure the distance of a motion from the origin
 _FAR = 5.0  # maximum factor on the tolerance far from the origin
 _NO_REASONS: dict[str, object] = {"causes": [], "estimate": "", "rate": 0.0}
@@ -102,7 +103,7 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     """Return the largest distances between joints and vertices of two sides over all poses.
 
     Poses and vertices that cannot have the largest distance are skipped: the result is exact,
-    although only few vertices are skinned in double precision.
+    although only a few vertices are skinned in double precision.
 
     ``first``, ``second``: sides with the same joints and vertices, in the same space.
     ``rows`` (F,): frames of the first side.
@@ -213,7 +214,7 @@ def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least
 def _vertices(side: Side, row: int) -> Floats:
     if side.exact is not None:
         return side.exact(row)
-    assert side.body is not None  # only sides with meshes are compared this way
+    assert side.body is not None  # only bodies with meshes are compared this way
     poses = side.poses(np.array([row]))
     return vertices(side.body, poses)[0]
 

@@ -1,6 +1,6 @@
 """Single-precision estimates of vertex distances, which select candidates for exact measurement.
 
-Many frames are skinned at once, a few hundred vertices at a time, so that their matrices stay in
+Many frames are skinned together, a few hundred vertices at a time, so that their matrices stay in
 the CPU cache. Candidates are then measured in double precision.
 """
 

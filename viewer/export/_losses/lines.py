@@ -109,7 +109,7 @@ def frames_losses(
     ``how``: skinning of the mesh; for both motions LBS replaces its method.
     ``span``: half-open range of frames in the file; all if
       omitted.
-    ``is_between``: whether the times of these poses lie between the frames.
+    ``is_between``: whether the times of these poses are between the frames.
     """
     figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span

@@ -10,11 +10,12 @@ All arrays are float64, whether they come from a figure or from a file that was 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -171,7 +172,7 @@ def _body(figure: Figure, how: Skinning, still: Floats, columns: Rows) -> Body:
     if shapes is not None and len(columns):
         directions = shapes.direction_values()[columns]
     correctives = None
-    # Correctives with a feature of their own are not measured, as neither side has them.
+    # Correctives with a special feature are not measured, because neither body has them.
     given = figure.correctives if how.correctives and figure.is_attached else None
     if given is not None and given.feature is None:
         correctives = given.values()

@@ -7,11 +7,12 @@ are refined.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._losses.apart import apart, negligible
 from viewer.export._losses.skinned import (
     Body,
@@ -36,14 +37,14 @@ _STEPS = 16  # maximum number of samples between two keys or frames
 _FEWEST = 4  # minimum number of samples per span; with less, only likely spans are sampled
 _LIKELY = 256  # number of likely spans, for joints and vertices each
 _INSET = 1e-6  # fraction of a span that is excluded near its keys, where curves may jump
-_SHORT = 1e-6  # in frames: shorter spans are ignored
-_BLOCK = 1024  # poses at a time
+_SHORT = 1e-6  # spans shorter than this, in frames, are ignored
+_BLOCK = 1024  # poses per block
 _NAMING = 1024  # approximate number of times at which all vertices are compared
 _GROUPS = 32  # time intervals, each of which contributes its farthest vertex
 _PEAKS = 64  # maximum number of refined peaks
 _HOPEFUL = 0.75  # fraction of the highest sample below which peaks are not refined
 _PARTS = 8  # subdivisions of the interval around a peak, narrowed to two per round
-_ROUNDS = 4  # rounds of refinement
+_ROUNDS = 4  # number of rounds of refinement
 
 
 @dataclass(frozen=True, slots=True, eq=False)

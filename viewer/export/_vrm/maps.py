@@ -24,7 +24,7 @@ class Maps:
     Attributes
     ----------
     lost : Counter
-        Number of lost references by what they are.
+        Number of lost references, by kind.
     """
 
     def __init__(self, record: VrmRecord, document: Document, built: Built) -> None:
@@ -58,7 +58,7 @@ class Maps:
 
     @property
     def materials(self) -> dict[int, int]:
-        """The written material of each material of the file that is used."""
+        """Written materials, by material of the original file; only those in use."""
         return self._materials
 
     def meshes(self, mesh: Any, kind: str) -> list[int]:

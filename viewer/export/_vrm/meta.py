@@ -39,7 +39,7 @@ def changed_meta(told: dict[str, Any], meta: VrmMeta, version: int) -> dict[str,
 
     ``told``: meta data of the file.
     ``meta``: requested values; empty ones keep those of the file.
-    ``version``: 0 or 1, which names them differently.
+    ``version``: 0 or 1; the names of the fields differ.
     """
     names = ("title", "author") if version == 0 else ("name", "authors")
     changed = dict(told)

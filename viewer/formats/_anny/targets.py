@@ -24,8 +24,8 @@ __all__ = ["ACTIONS", "Target", "action_targets", "change_targets", "phenotype_t
 _FOLDER = "mpfb2/targets/"
 _ACTIONS = "faceunits01/targets/faceunits/"
 _COMMENT = re.compile(rb"(?m)#[^\r\n]*")
-# A newborn is a baby scaled along x, y and z of the base mesh. Three targets of a newborn have a
-# weight of 1 in all: they share the offsets of the base mesh itself.
+# A newborn is a baby scaled along x, y and z of the base mesh. The weights of three targets of a
+# newborn sum to 1: these targets share the offsets of the base mesh.
 _NEWBORN = np.array([0.922, 0.75, 0.922])
 _N_SHARING = 3.0
 
@@ -45,7 +45,7 @@ ACTIONS = tuple(sorted([*(a + s for a in _SIDED for s in ("Left", "Right")), *_M
 """Facial actions, named as in ARKit."""
 
 Target = tuple[str, tuple[str, ...]]
-"""A target's file, and the variations of phenotypes that it belongs to."""
+"""A target's file, and the variations of phenotypes to which it belongs."""
 
 
 def phenotype_targets(package: Package) -> list[Target]:
@@ -111,7 +111,7 @@ def change_targets(package: Package) -> dict[str, tuple[str, str]]:
 
 
 def _listed(about: object, key: str) -> list[dict[str, Any]]:
-    """Return the objects in a list of an object; none if there is no such list."""
+    """Return the objects in a list of an object; an empty list if there is no such list."""
     found = about.get(key) if isinstance(about, dict) else None
     return [each for each in found if isinstance(each, dict)] if isinstance(found, list) else []
 

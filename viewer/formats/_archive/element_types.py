@@ -15,9 +15,10 @@ from viewer.formats._misfit import MisfitError
 __all__ = ["array_dtype", "item_count", "shaped"]
 
 _DTYPE = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|[SU]([1-9][0-9]{0,6}))")
-_LONGEST_TEXT = 1 << 20  # characters in one element
+_LONGEST_TEXT = 1 << 20  # maximum number of characters in one element
 _MAX_AXES = 32
-_MAX_BYTES = 1 << 60  # elements of an array; numpy cannot count more, even if an axis is 0
+# Maximum size of an array; numpy has no larger ones, even if an axis is 0.
+_MAX_BYTES = 1 << 60
 _LAST_LETTER = 0x10FFFF  # last code point of Unicode; numpy stores 4 bytes without checking them
 
 

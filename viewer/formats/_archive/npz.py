@@ -7,8 +7,8 @@ r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never pickled objects.
     header = "{" "'descr': '<f8'" "'fortran_order': False" "'shape': (6890, 3)" "}"   in any order
 
 On opening, the zip directory and the headers are read, and all sizes are checked for consistency.
-Values are read on demand, from the file if it is on disk. The header is matched by its grammar;
-numpy's own reader evaluates it as Python code, and warns about files of Python 2.
+Values are read on demand, from the file if it is on disk. The header is parsed by its grammar;
+numpy's reader would evaluate it as Python code, and warns about files of Python 2.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import re
 import struct
 import zipfile
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.element_types import array_dtype, item_count, shaped
@@ -38,7 +38,7 @@ from viewer.rig.arrays import Deferred
 __all__ = ["open_npy", "open_npz"]
 
 _MAX_AXES = 32
-_CHUNK = 1 << 16  # bytes, which stay in the cache between inflating and copying
+_CHUNK = 1 << 16  # bytes per piece, which stay in the cache between inflating and copying
 _LONGEST_HEADER = 1 << 16
 _LEAD = {
     b"\1\0": "<H",
@@ -59,14 +59,14 @@ class _Header:
     shape: tuple[int, ...]
     is_fortran: bool
     n_items: int
-    offset: int  # size of the values, in bytes
+    offset: int  # position of the values, in bytes
 
     def deferred(self, load: Callable[[], NDArray[Any]]) -> Deferred:
         return Deferred(self.shape, self.dtype.newbyteorder("="), load)
 
 
 def open_npz(directory: ZipDirectory) -> Archive:
-    """Open an ``.npz`` file; raises as ``open_archive`` does."""
+    """Open an ``.npz`` file; errors as of ``open_archive``."""
     directory.check(_key)
     members = directory.members
     values = {_key(member): _open_member(directory, member) for member in members}
@@ -203,7 +203,7 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
         raise storage.fault(key, Phrase("npy-memory", size=size)) from None
-    # The data is read in chunks, because reading it at once would need twice the memory.
+    # The data is read in chunks, because reading it as a whole would need twice the memory.
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
     done = 0
     while done < size:

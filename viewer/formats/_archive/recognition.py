@@ -10,14 +10,14 @@ from viewer.formats._format import Format
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-_NAMED_KEYS = 3  # keys per format in a message about unknown archives
+_NAMED_KEYS = 3  # number of keys per format in a message about unknown archives
 
 
 def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
     """Return the key of an archive's format, determined by its keys and the shapes of its arrays.
 
-    ``formats``: all formats by key.
-    Raises FormatError if none matches; the message lists keys of each format.
+    ``formats`` are all formats by key. Raises FormatError if none matches; the message lists keys
+    of each format.
     """
     archive = archive_of(source)
     keys = archive.keys

@@ -16,7 +16,7 @@ from viewer.phrases import printable
 __all__ = ["LONGEST_DIRECTORY", "StoredFile"]
 
 LONGEST_DIRECTORY = 2 << 20
-"""Bytes read at once, and so of a zip directory: about 30,000 members, as each takes memory."""
+"""Maximum bytes of one read, and thus of a zip directory: about 30,000 members."""
 
 _CHUNK = 1 << 20
 
@@ -78,7 +78,7 @@ class StoredFile:
         return file
 
     def fault(self, key: str, problem: Phrase) -> FormatError:
-        """Return an error that gives the file and the key."""
+        """Return an error that states the file and the key."""
         values = {"item": printable(key, 60), "problem": problem}
         return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
 

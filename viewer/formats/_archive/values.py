@@ -1,19 +1,20 @@
 """Archives of named arrays: pickles, ``.npz`` and ``.npy``, read without executing code in them.
 
 A pickle is a program, and so is an object array inside an ``.npz``. Neither is ever passed to
-Python's own unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
+Python's unpickler: ``_pickle/`` supports the few opcodes needed for arrays and plain data, and
 rejects all others by name. All other values are returned as ``Opaque``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.half_floats import in_double, widened
@@ -32,7 +33,7 @@ __all__ = [
     "describe",
 ]
 
-_MAX_SIDE = 1 << 27  # rows or columns of a sparse matrix; meshes have far fewer vertices
+_MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
 _WANTED = {"biuf": "numbers", "iuf": "numbers", "iu": "whole", "SU": "texts"}
 """Suffixes of the keys of phrases about arrays, by numpy's kind letters."""
 
@@ -159,7 +160,7 @@ class Archive:
     branch : callable, optional
         Returns the archive of a key whose value is a dict or a list of dicts, None for others.
     label : str
-        Where the names lie in the file, for messages: ``"people.3."``.
+        Path of the names in the file, for messages: ``"people.3."``.
     """
 
     def __init__(
@@ -199,7 +200,7 @@ class Archive:
         return self._values[key]
 
     def inside(self, key: str) -> Archive | None:
-        """Return a nested dict as an archive of its own, without reading its values.
+        """Return a nested dict as a separate archive, without reading its values.
 
         The items of a list of dicts are called "0", "1" …; None if the value is neither.
         """
@@ -223,7 +224,7 @@ class Archive:
         Parameters
         ----------
         key : str
-            Name in the file. Numbers in nested lists count as an array.
+            Name in the file. Numbers in nested lists are treated as an array.
         shape : sequence, optional
             For each axis a size, None for any, or a letter: axes with the same letter are equal.
         kinds : str

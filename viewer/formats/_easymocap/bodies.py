@@ -1,6 +1,6 @@
 """Body parameters of EasyMocap's records: layouts by length, and rows collected per person.
 
-The first three values of ``poses`` are the root's own rotation, which EasyMocap writes as 0:
+The first three values of ``poses`` are the rotation of the root, which EasyMocap writes as 0:
 ``Rh`` and ``Th`` move the body about the model's origin. Hand components of SMPL-X and MANO exclude
 the mean hand; those of SMPL+H include it.
 """
@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._easymocap.json_frames import (
     RecordError,
@@ -52,7 +53,7 @@ class BodyLayout:
     columns : tuple of (int, int)
         Ranges of ``poses`` for all joints except the root, in the order of ``names``.
     root : int
-        Number of values of the root's own rotation at the beginning: 3 or 0.
+        Number of values at the beginning that rotate the root: 3 or 0.
     hands : tuple of (str, int, int)
         Side, and the range of ``poses`` with its components.
     is_flat : bool
@@ -152,10 +153,11 @@ class Rows:
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)  # indices in the files' lists of people
+    # Indices of the records in the files' lists of people.
+    places: list[int] = field(default_factory=list)
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
-        """Record the origin of an accepted record."""
+        """Store the origin of an accepted record."""
         self.frames.append(frame)
         self.paths.append(path)
         self.places.append(place)
@@ -163,7 +165,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return the frames of the recording to which the kept rows belong; absent in others."""
+        """Return the timing of the kept rows; the person is absent in all other frames."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]

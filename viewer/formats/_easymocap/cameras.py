@@ -22,12 +22,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._misfit import remark_on
@@ -45,11 +46,11 @@ _INTRINSIC, _EXTRINSIC = "intri.yml", "extri.yml"
 _KEY = re.compile(rb"([^\s:\-#\"][^\s:]*|\"[^\"\r\n]*\")[ \t]*:(?:[ \t]+|$)(.*)")
 _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
-_MOST = 100_000  # elements of a matrix
+_MOST = 100_000  # maximum number of elements of a matrix
 _NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
-_LARGEST = 1e9  # limit of pixels in a calibration, and of a camera's distance in scene units
-_SHORTEST = 1e-3  # smallest focal length, pixels
-_MOST_BENT = 1e6  # largest distortion coefficient
+_LARGEST = 1e9  # maximum pixels in a calibration, and maximum distance of a camera in scene units
+_SHORTEST = 1e-3  # minimum focal length, pixels
+_MOST_BENT = 1e6  # maximum distortion coefficient
 
 Value = Floats | list[str] | str
 
@@ -73,7 +74,7 @@ class Storage:
     lines: dict[str, int] = field(default_factory=dict)
 
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
-        """Return an error at the line of an item; if it is missing, at the cameras' names."""
+        """Return an error at the line of an item or, if it is missing, of the cameras' names."""
         end = self.source.line(self.source.end)
         line = self.lines.get(item, self.lines.get("names", end))
         return _fault(self.source, key, line, item=printable(item, 40), **values)
@@ -179,7 +180,7 @@ def _check_size(file: Storage, key: str, values: Floats, largest: float = _LARGE
 
 
 def _rotation(file: Storage, name: str) -> Floats:
-    """Return R: the matrix if the file has one, otherwise that of the rotation vector."""
+    """Return R: the matrix if the file has one, otherwise the rotation of the rotation vector."""
     if f"Rot_{name}" not in file.values:
         return rotation_vector_to_matrix(_matrix(file, f"R_{name}", (3,)))
     rotation = _matrix(file, f"Rot_{name}", (3, 3))
@@ -207,7 +208,7 @@ def _pixels(value: Value | None) -> int:
 
 @dataclass(slots=True)
 class _Matrix:
-    """A matrix being read line by line."""
+    """A matrix that is being read line by line."""
 
     key: str
     line: int

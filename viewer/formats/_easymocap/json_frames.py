@@ -61,7 +61,7 @@ class RecordError(MisfitError):
 
 
 class _RepeatedKeyError(ValueError):
-    """An object with a repeated key, which is the text of the error."""
+    """Error about an object with a repeated key; its text is the key."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
@@ -104,7 +104,7 @@ def load_people(path: str, max_size: int) -> list[Any]:
         found = repeated_key(text)
         line = _line(text, found[1] if found else None)
         raise _fault("F002.json-twice", path, line, found=str(problem)) from None
-    except ValueError:  # the only other error that decoding can raise
+    except ValueError:  # decoding can raise no other error
         line = _line(text, long_number_place(text))
         raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
@@ -263,7 +263,7 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
             put(values)
             return
     except (KeyError, TypeError, ValueError, OverflowError):
-        pass  # reported below
+        pass  # the error is reported below
     values = row_of(record, key)
     if len(values) != count:
         raise RecordError(key, Phrase("record-count", expected=count, found=len(values)))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._easymocap.bodies import (
@@ -38,13 +39,14 @@ from viewer.rig.motion.body_motion import BodyMotion
 
 __all__ = ["Options", "Reading"]
 
-_SIZES = (64, 256, 1024, 4096)  # frames per part; later parts have the last size
+# Numbers of frames of the first parts; all later parts have the last size.
+_SIZES = (64, 256, 1024, 4096)
 _MOST_WARNINGS = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Settings that the files do not state; see ``open_capture``."""
+    """Settings that are not in the files; see ``open_capture``."""
 
     name: str
     frame_rate: float
@@ -72,7 +74,7 @@ class Reading:
     files : FrameFiles
         Files to read.
     options : Options
-        Settings that the files do not state.
+        Settings that are not in the files.
     body_layout, point_layout : layouts or None
         Layout of the first record that has one; other records must agree, but may add coefficients.
     first_fault : Diagnostic or None
@@ -130,7 +132,7 @@ class Reading:
             except RecordError as problem:
                 self._fault_of(path, place, problem, problem.key)
                 continue
-            if person < 0:  # identity unknown: unique only within the frame
+            if person < 0:  # The identity is unknown: the number is unique only within the frame.
                 person = min(seen) - 1 if -1 in seen else -1
                 self.note("F007.record-untracked", path)
             if person in seen:

@@ -18,13 +18,13 @@ from viewer.rig.material import Material, Texture
 
 __all__ = ["materials_of"]
 
-_LEAST_ALPHA = 255  # alpha of opaque pixels
+_LEAST_ALPHA = 255  # minimum alpha of opaque pixels
 
 
 def materials_of(source: Source, arrays: Arrays, told: dict[str, Any]) -> tuple[Material, ...]:
-    """Return all materials of a message; textures may be inside the file or beside it.
+    """Return all materials of a message; textures may be inside the file or next to it.
 
-    A picture is searched for under the paths stated in the file, and by its file name beside the
+    A picture is searched for at the paths stated in the file, and by its file name next to the
     file, in ``textures``, and in ``<file>.fbm``, where exporters unpack pictures.
     """
     pictures: dict[int, Bytes | None] = {}

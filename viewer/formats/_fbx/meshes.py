@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive
@@ -27,7 +27,7 @@ class Placed:
     prefix : str
         Prefix of the names of its arrays.
     told : dict
-        Its JSON.
+        Parsed JSON of the mesh.
     materials : list of int
         Material of each slot, to which its faces refer.
     placement : (4, 4)
@@ -50,7 +50,7 @@ def mesh_on_node(arrays: Arrays, placed: Placed) -> NodeMesh:
     if not len(listed):
         return NodeMesh(placed.told["name"], ())
     picks, owners = triangulate(get("vertices"), corners[listed].astype(np.int64), counts)
-    wanted = listed[picks]  # the file's corner at each corner of each triangle
+    wanted = listed[picks]  # corner in the file for each corner of each triangle
     slots = _slots(arrays, placed)[shown[owners]]
     linear = placed.placement[:3, :3]
     if np.linalg.det(linear) < 0.0:
@@ -174,7 +174,7 @@ def _targets(offsets: list[Floats]) -> MorphTargets | None:
 
 
 def _normal_targets(rows: list[Floats], linear: Floats) -> MorphTargets | None:
-    """Return the offsets of normals; None if the file has none; they are then recomputed."""
+    """Return the offsets of normals; None if the file has none, so that they are recomputed."""
     if not any(each.any() for each in rows):
         return None
     return _targets([_turned(each, linear, unit=False) for each in rows])

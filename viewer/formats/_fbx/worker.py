@@ -23,13 +23,15 @@ _LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter
 
 
 def main(arguments: list[str]) -> None:
-    """Read a file, write the message, and exit without any clean-up."""
+    """Read a file, write the message, and exit without cleaning up."""
     _limit_memory()
     gc.disable()
     import ufbx
 
+    scene = None  # held until the process exits, since the destructors of the binding crash
     try:
-        arrays, told = _Scene(ufbx, arguments[0]).message(arguments[1:])
+        scene = _Scene(ufbx, arguments[0])
+        arrays, told = scene.message(arguments[1:])
     except ufbx.UfbxError as problem:
         arrays, told = {}, {"error": str(problem)}
     sys.stdout.buffer.write(packed(arrays, told))
@@ -39,7 +41,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _limit_memory() -> None:
-    """Limit the memory of this process, so that a hostile file cannot exhaust the machine's."""
+    """Limit the memory of this process, so that a hostile file cannot exhaust the machine."""
     limit = int(os.environ.get("VIEWER_FBX_MEMORY", "0"))
     if limit and find_spec("resource") is not None:
         import resource
@@ -50,7 +52,7 @@ def _limit_memory() -> None:
 class _Scene:
     """A scene of ufbx.
 
-    Objects of the binding do not keep their parent objects alive, so all objects are held until the
+    Objects of the binding hold no references to their parents, so all objects are held until the
     process ends. Iterating over a list of the binding runs past its end, so lists are indexed.
     """
 
@@ -68,7 +70,7 @@ class _Scene:
         return value
 
     def get(self, item: Any, *names: str) -> Any:
-        """Return an attribute, which may be nested; all objects on the way are held."""
+        """Return an attribute, which may be nested; all intermediate objects are held."""
         for name in names:
             item = self.keep(getattr(item, name))
         return item

@@ -11,7 +11,7 @@ from viewer.formats._fbx.message import Arrays
 
 __all__ = ["KeptScene", "contents_of", "integers"]
 
-_METHODS = ("lbs", "lbs", "dqs", "mix")  # ufbx.SkinningMethod
+_METHODS = ("lbs", "lbs", "dqs", "mix")  # method of each value of ufbx.SkinningMethod
 # Elements without equivalent, by the list of the scene that contains them.
 _UNUSED = {
     "lights": "light",
@@ -22,7 +22,7 @@ _UNUSED = {
     "cache_deformers": "cache deformer",
     "constraints": "constraint",
 }
-_PHYSICAL = range(3, 11)  # ufbx.ShaderType: OSL standard surface to ShaderFX graph
+_PHYSICAL = range(3, 11)  # values of ufbx.ShaderType from OSL standard surface to ShaderFX graph
 
 
 class KeptScene(Protocol):

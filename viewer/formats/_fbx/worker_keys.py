@@ -11,7 +11,7 @@ from viewer.formats._fbx.worker_contents import KeptScene
 
 __all__ = ["keys_of"]
 
-_PERCENT = "DeformPercent"  # property of a blend channel
+_PERCENT = "DeformPercent"  # animated property of a blend channel
 
 
 def keys_of(kept: KeptScene, stack: int) -> list[dict[str, Any]]:

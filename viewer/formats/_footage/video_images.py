@@ -13,7 +13,7 @@ __all__ = ["VideoImages", "video_rate"]
 
 
 class VideoImages:
-    """Frames of a video behind one camera; the last one shown is cached.
+    """Frames of a video as the images of one camera; the last one shown is cached.
 
     Parameters
     ----------
@@ -80,5 +80,5 @@ class VideoImages:
 
 
 def video_rate(path: Path) -> float:
-    """Return the frames per second of a video; raises as ``VideoImages`` does."""
+    """Return the frames per second of a video; errors as of ``VideoImages``."""
     return VideoFrames(path).rate

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.json_text import parsed
 from viewer.formats._source import Source
 
@@ -87,7 +87,7 @@ def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:
 
 
 def _end(source: Source) -> int:
-    """Return where the last chunk ends, according to the header or the size of the file."""
+    """Return the end of the last chunk, according to the header or the size of the file."""
     size = len(source.data)
     if size < _HEADER.size:
         raise source.fault("F002.glb-header", found=size)
@@ -96,12 +96,12 @@ def _end(source: Source) -> int:
         raise source.fault("F002.gltf-version", found=version)
     if length != size:
         source.warn("G001.length", expected=length, found=size)
-    # A longer file has other data after its chunks; a truncated one ends early.
+    # A file that is too long has other data after its chunks; a truncated one ends early.
     return length if _HEADER.size + _CHUNK.size <= length < size else size
 
 
 def _next(data: memoryview, place: int) -> int:
-    """Return where the next chunk begins; some writers pad chunks without counting the padding."""
+    """Return the start of the next chunk; some writers pad chunks without counting the padding."""
     padded = place + -place % 4
     if padded != place and bytes(data[padded + 4 : padded + 8]) in (_JSON, _BINARY):
         return padded

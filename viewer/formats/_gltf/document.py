@@ -16,8 +16,8 @@ __all__ = ["Document", "open_document"]
 
 Content = TypeVar("Content")
 
-_FREE_BYTES = 256 << 20  # decoded bytes that any file is allowed
-_MOST_GROWTH = 64  # decoded bytes per byte of file; 20 is usual for compressed data
+_FREE_BYTES = 256 << 20  # number of decoded bytes that is allowed for every file
+_MOST_GROWTH = 64  # maximum decoded bytes per byte of the file; 20 is usual for compressed data
 
 
 class Document:
@@ -57,7 +57,7 @@ class Document:
         return self._tables[name]
 
     def spend(self, n_bytes: int, pointer: str) -> None:
-        """Count bytes that are about to be decoded; negative numbers are no longer in memory.
+        """Count bytes that are about to be decoded; negative numbers are bytes that were released.
 
         Raises
         ------
@@ -107,6 +107,10 @@ def _check_version(root: Element) -> None:
     if asset is None:
         root.warn("G001.no-asset")
         return
+    stated = asset.values.get("version")
+    # Some files of glTF 0.8 and 1.0 state the version as a number.
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and stated < 2:
+        raise asset.fault("F002.gltf-version", "version", found=stated)
     version = asset.text("version", "2.0")
     if version.partition(".")[0] != "2":
         raise asset.fault("F002.gltf-version", "version", found=version)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 
@@ -39,7 +39,7 @@ class DecodedPrimitive:
 def decoded_primitive(document: Document, primitive: Element) -> DecodedPrimitive | None:
     """Return a compressed primitive; None if the uncompressed form is to be read.
 
-    Where a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
+    If a primitive has both forms, the uncompressed one is read only if DracoPy is missing.
 
     Raises
     ------

@@ -24,7 +24,7 @@ _ONE = {
     "bufferViews": "a buffer view",
     "samplers": "a sampler",
 }
-_BEYOND = 1 << 64  # whole numbers from here on are invalid in any file
+_BEYOND = 1 << 64  # whole numbers from this value on are invalid in any file
 
 
 def _pointer_to(base: str, *keys: str | int) -> str:
@@ -41,7 +41,7 @@ def _pointer_to(base: str, *keys: str | int) -> str:
 
 
 class Element:
-    """An object of the document. Missing members have the caller's default.
+    """An object of the document; missing members have the default that the caller gives.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ class Element:
         name : str
             Name of the member.
         count : int
-            Number of elements that it can refer to.
+            Number of elements to which it can refer.
         what : str
             Name of these elements in the root: ``"nodes"``.
 
@@ -303,7 +303,7 @@ class Table:
         return len(self.items)
 
     def __getitem__(self, index: int) -> Element:
-        """Return an item; raises FormatError if it is no object, IndexError past the end."""
+        """Return an item; raise FormatError if it is not an object, IndexError past the end."""
         values = self.items[index]
         pointer = f"{self.pointer}/{index}"
         if type(values) is not dict:

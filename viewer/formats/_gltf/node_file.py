@@ -1,4 +1,4 @@
-"""Contents of glTF 2.0 files: ``.gltf`` with files beside it, ``.glb``, and ``.vrm`` characters.
+"""Contents of glTF 2.0 files: ``.gltf`` with accompanying files, ``.glb``, and ``.vrm`` characters.
 
 ::
 

@@ -28,7 +28,7 @@ def read_tree(document: Document) -> NodeTree:
     table = document.table("nodes")
     for place in range(len(table)):
         if type(table.items[place]) is not dict:
-            table[place]  # raises the error
+            table[place]  # raises the error for an item that is not an object
     parents = _parents(table)
     transforms: Transforms = node_transforms(table)
     return NodeTree(

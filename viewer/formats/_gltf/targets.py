@@ -58,7 +58,7 @@ def _offsets(attributes: Attributes, targets: Table, name: str) -> MorphTargets 
     if not used:
         return None
     document, rows = attributes.document, attributes.rows
-    # As if all vertices moved: some uses need an offset for each vertex.
+    # Limit the size as if all vertices moved: some uses need an offset for each vertex.
     document.spend(len(targets) * attributes.n_rows * 3 * 8, targets.pointer)
     found: list[NDArray[Any] | None] = [None] * len(targets)
     for place in used:
@@ -105,7 +105,7 @@ def _fitted(element: Element, weights: Floats, count: int) -> Floats:
 def target_names(mesh: Element, primitives: Table, count: int) -> tuple[str, ...]:
     """Return the names of the morph targets; empty strings if there are none.
 
-    Names are application data: of the mesh, of a primitive, or of the targets themselves.
+    Names are application data of the mesh, of a primitive, or of the targets themselves.
     """
     candidates = [_listed(mesh)]
     for place in range(len(primitives)):

@@ -1,4 +1,4 @@
-"""URIs of buffers and images: data inside the file, or files below its folder."""
+"""URIs of buffers and images: data inside the file, or files in or below its folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.formats._references import referenced_path, refused_text
 __all__ = ["is_data_uri", "uri_bytes", "uri_path"]
 
 _SCHEME = re.compile(r"[A-Za-z][A-Za-z0-9+.-]+:")  # at least two letters, because C: is a drive
-_SHOWN = 60  # characters of a URI in messages
+_SHOWN = 60  # maximum number of characters of a URI in messages
 
 
 def is_data_uri(uri: str) -> bool:

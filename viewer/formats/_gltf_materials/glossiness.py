@@ -4,7 +4,7 @@ KHR_materials_pbrSpecularGlossiness describes a surface by its diffuse and its s
 metallic surface with the reflectance D = 0.04 of dielectrics has, for a base colour B and a
 metallic value m, the diffuse colour (1 - m) B and the specular colour D + m (B - D). With the
 brightness d of the diffuse colour and s of the specular colour, where the diffuse colour is
-scaled by 1 - max(specular) as the extension does, m is the root of
+scaled by 1 - max(specular) as the extension does, m is the solution of
 
     D m² + (d (1 - max) / (1 - D) + s - 2 D) m + D - s = 0
 
@@ -14,12 +14,13 @@ specular colour for metals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.images import DecodedImage
@@ -32,7 +33,7 @@ __all__ = ["Glossiness", "from_glossiness", "read_glossiness"]
 
 _DIELECTRIC = 0.04
 _BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
-_ROWS = 256  # rows of an image that are converted together
+_ROWS = 256  # number of rows of an image that are converted together
 
 Reals = NDArray[np.float32]
 

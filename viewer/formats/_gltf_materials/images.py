@@ -1,14 +1,14 @@
 """Images of a glTF document: PNG, JPEG and WebP, embedded or in files below its folder.
 
-Only images that textures use are read. They are decoded together, each once, in parallel.
+Only images that textures use are read. They are decoded in parallel, each only once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.buffers import EncodedImage
 from viewer.formats._gltf.document import Document
@@ -75,7 +75,7 @@ def _encoded(document: Document, index: int) -> EncodedImage | None:
     try:
         image = document.buffers.image(index)
     except FormatError as problem:
-        # An error without a JSON pointer is about the image's own file, which it names.
+        # An error without a JSON pointer concerns the file of the image, which the message names.
         has_pointer = bool(problem.diagnostic.pointer)
         said = problem.diagnostic.message if has_pointer else _named(document, problem)
         document.source.warn("F005.gltf-image", f"/images/{index}", problem=said)

@@ -1,19 +1,20 @@
 """Materials of a glTF document, in the metallic-roughness model of its section 3.9.
 
-Read: all properties of the core specification, ``KHR_texture_transform``, ``KHR_materials_unlit``,
-``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived model
-``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated; see
-``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored
-with a warning, because the shape can still be shown.
+Supported are all properties of the core specification, ``KHR_texture_transform``,
+``KHR_materials_unlit``, ``KHR_materials_emissive_strength`` and ``EXT_texture_webp``. The archived
+model ``KHR_materials_pbrSpecularGlossiness`` and VRM's toon materials are approximated; see
+``glossiness.py`` and ``toon.py``. Other extensions are not drawn. Invalid members are ignored with
+a warning, because the shape can still be shown.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
@@ -34,7 +35,7 @@ DRAWN_EXTENSIONS = (
 """Extensions of materials and textures that have an effect."""
 
 _WHITE = (1.0, 1.0, 1.0, 1.0)
-_LARGEST = 1e6  # larger factors look the same, but their products could overflow
+_LARGEST = 1e6  # maximum factor; larger ones look the same, but their products could overflow
 _FACTORED = (("normalTexture", "normal_texture"), ("occlusionTexture", "occlusion_texture"))
 _MODES = {mode.upper(): mode for mode in ALPHA_MODES}
 _NEUTRAL: dict[str, dict[str, Any]] = {
@@ -106,7 +107,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
-    """Return the properties of a material; ``toon``: if VRM declares it toon-shaded or unlit."""
+    """Return the properties of a material; ``toon`` contains those of VRM, if any."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.images import DecodedImage
@@ -23,7 +23,7 @@ _NEAREST, _LINEAR = 9728, 9729
 _MINIFIED = dict(zip((9728, 9729, 9984, 9985, 9986, 9987), MINIFICATIONS, strict=True))
 _READABLE = "EXT_texture_webp"
 _UNREADABLE = ("KHR_texture_basisu", "MSFT_texture_dds", "EXT_texture_avif")
-_LARGEST = 1e6  # with larger offsets and scales, single precision cannot resolve texels
+_LARGEST = 1e6  # maximum offset and scale; with larger ones, single precision cannot resolve texels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -147,7 +147,7 @@ def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     Parameters
     ----------
     offset, scale : (2,)
-        Of texture coordinates from 0 to 1.
+        Offset and scale of texture coordinates from 0 to 1.
     angle : float
         Radians.
 
@@ -162,7 +162,7 @@ def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     cos, sin = math.cos(angle), math.sin(angle)
     (a, b), (c, d) = np.array([[cos, sin], [-sin, cos]]) * scale
     u, v = offset
-    # Adding 0 makes negative zeros positive.
+    # Adding 0 replaces -0 by 0.
     return np.array([[a, -b, b + u], [-c, d, 1.0 - d - v]]) + 0.0
 
 

@@ -1,4 +1,4 @@
-"""Toon materials of VRM characters: the colour of their lit side, and that of the side in shade.
+"""Toon materials of VRM characters: the colours of the lit side and of the side in shade.
 
 ::
 
@@ -15,13 +15,15 @@ between c = toony - 1 - shift and c = 1 - toony - shift.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.toon_ramp import modern_ramp
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["MTOON", "Toon", "read_toon"]
@@ -89,7 +91,7 @@ def _toon(document: Document, element: Element) -> Toon:
 
 
 def _old_toon(document: Document, told: Any, element: Element) -> Toon:
-    """Return the toon shading of version 0.x, whose thresholds are those of the other version."""
+    """Return the toon shading of version 0.x, whose thresholds are converted to version 1.0."""
     color = rows_of(_member(_member(told, "vectorProperties"), "_ShadeColor"), _OLD_COLOR)
     numbers = _member(told, "floatProperties")
     toony = value_of(_member(numbers, "_ShadeToony"), _TOONY)
@@ -102,8 +104,7 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
     if color is not None:
         color = decode_srgb(color[:3].clip(0.0, 1.0))
     if toony is not None and shift is not None:
-        toony += (1.0 - toony) * (0.5 + 0.5 * shift)
-        shift = -shift - (1.0 - toony)
+        toony, shift = modern_ramp(toony, shift)
     return Toon(_values(color, toony, shift), shade)
 
 

@@ -11,14 +11,14 @@ __all__ = ["Picks", "first_known", "picked", "triangles_of", "triangulate"]
 
 Picks = NDArray[np.integer]
 
-_MOST_CORNERS = 400  # ear clipping of larger polygons would take seconds, so they become fans
-_CHUNK = 4_000_000  # (corner, corner) pairs that are tested at once
+_MOST_CORNERS = 400  # larger polygons become fans, as ear clipping would take seconds
+_CHUNK = 4_000_000  # (corner, corner) pairs per batch
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
     """Triangulate polygons, keeping their order and winding.
 
-    A quad is split along the diagonal for which both halves face the same way as the whole; a
+    A quad is split along the diagonal for which both halves face the same way as the quad; a
     larger polygon becomes a fan if all corners are visible from the first, otherwise its ears are
     clipped one by one (Meisters 1975), in the plane of its area vector (Newell).
 
@@ -59,8 +59,8 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
 
 
 def picked(corners: Picks, picks: Picks) -> Picks:
-    """Return a value of every corner for the corners of triangles: (C,) to (T, 3)."""
-    # If there are as many, all polygons are triangles.
+    """Return the values of polygon corners at the corners of triangles: (C,) to (T, 3)."""
+    # If there are as many corners of triangles as of polygons, all polygons are triangles.
     return corners.reshape(-1, 3) if len(corners) == picks.size else corners[picks]
 
 

@@ -15,7 +15,7 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
-_SHORTEST = 1e-15  # length of a normal; the square of a shorter length is 0 in float32
+_SHORTEST = 1e-15  # minimum length of a normal; the square of a shorter length is 0 in float32
 _SIZES = {3: "triangle", 4: "quad"}
 
 
@@ -29,7 +29,7 @@ def filled_normals(
     source : Source
         The file, which records warnings about zero-length normals.
     normals : (V, 3) or None
-        Normals of the file; NaN where there is none.
+        Normals of the file; NaN if there is none.
     positions, triangles : (V, 3), (T, 3)
         The mesh.
     """
@@ -60,7 +60,7 @@ def polygon_text(counts: NDArray[np.integer], n_triangles: int) -> str:
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:
-    """Return the up axis stated by a comment in this program's notation; y by default."""
+    """Return the up axis stated by a comment that this program wrote; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 
 

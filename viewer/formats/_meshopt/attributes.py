@@ -9,19 +9,20 @@
     tail    first element, version 1: a mode for every 4 bytes of an element
 
 The position of a group depends on the contents of the groups before it. Group sizes are therefore
-computed for all positions at once, so that finding each group takes one look-up; then all groups
+computed for all positions in advance, so that finding each group takes one look-up; then all groups
 with the same number of bits are decoded together. Specification: Khronos Group,
 KHR_meshopt_compression, appendix A.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_attributes"]
@@ -34,7 +35,7 @@ _ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
 _BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
 # The four group modes in a byte of header bits.
 _MODES = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
-_PADDING = (32, 24)  # minimum size of the tail, by version
+_PADDING = (32, 24)  # minimum size of the tail in bytes, by version
 
 
 @dataclass(slots=True)
@@ -42,9 +43,9 @@ class _Groups:
     """Groups with the same number of bits per delta, above 0."""
 
     starts: list[int] = field(default_factory=list)
-    """Their positions in the stream."""
+    """Positions of the groups in the stream."""
     places: list[int] = field(default_factory=list)
-    """Their positions in the result, in groups."""
+    """Positions of the groups in the result, in units of groups."""
 
 
 def decoded_attributes(data: Bytes, count: int, stride: int) -> Bytes | None:
@@ -112,7 +113,7 @@ def _scan(
     found: dict[int, _Groups],
     literals: list[tuple[int, int, int]],
 ) -> int:
-    """Find all groups and return where they end; raises IndexError past the end of the stream."""
+    """Find all groups and return their end; raise IndexError past the end of the stream."""
     count, stride, version, block = layout
     sizes = _sizes(data)
     stream = data.tobytes()
@@ -145,7 +146,7 @@ def _find_groups(
     n_groups: int,
     table: list[tuple[bytes, _Groups | None]],
 ) -> int:
-    """Find the groups of one byte position in a block's elements, and return where they end."""
+    """Find the groups of one byte position in a block's elements, and return their end."""
     n_headers = -(-n_groups // 4)
     headers = stream[place : place + n_headers]
     place += n_headers

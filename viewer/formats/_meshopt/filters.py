@@ -84,7 +84,7 @@ def _colors(rows: NDArray[np.unsignedinteger]) -> Bytes:
     alpha = rows[:, 3].astype(np.int64)
     luma = rows[:, 0].astype(np.int64)
     orange, green = signed[:, 1], signed[:, 2]
-    # The highest set bit of alpha is a marker; the bits below it are alpha's own.
+    # The highest set bit of alpha is a marker; the bits below it are the value of alpha.
     bits = np.frexp(np.maximum(alpha, 1).astype(np.float64))[1]
     most = (1 << bits) - 1
     own = alpha & most >> 1

@@ -41,7 +41,7 @@ def read_skeleton(archive: Archive, parameters: ModelParameters) -> Skeleton:
         dof_joints=joints,
         dof_kinds=kinds,
         rest_dofs=np.zeros(len(joints)),
-        # Momentum's limits are soft: fitted parameters may exceed them, and are shown as they are.
+        # Momentum's limits are soft: fitted parameters may exceed them, and are shown unchanged.
         dof_limits=np.tile([-np.inf, np.inf], (len(joints), 1)),
     )
 

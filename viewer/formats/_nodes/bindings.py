@@ -1,18 +1,19 @@
 """Inverse bind matrices: one per joint, for all skins and rigid meshes of a figure.
 
-A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes
-attached to a node have none. Their vertices are transformed into one binding space by a matrix A
-with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second
-time, through an auxiliary joint. Binding space is the space of the scene: A of the first skin
-undoes quantisation, and the units and axes of the mesh.
+A figure has one inverse bind matrix per joint, but each skin of a file has separate ones, and
+meshes attached to a node have none. Their vertices are transformed into one binding space by a
+matrix A with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a
+second time, through an auxiliary joint. Binding space is the space of the scene: A of the first
+skin undoes quantisation, and the units and axes of the mesh.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeSkin
 from viewer.formats._nodes.joints import Joints, rest_worlds
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -21,7 +22,7 @@ __all__ = ["Bindings", "bind_rigid", "bind_skins", "inverse_binds"]
 
 # float32 rounding of the entries of a product of two matrices, relative to the largest
 _SAME = 1e-6
-# Worse conditioned matrices are not inverted, because baking would lose too many digits.
+# Matrices with a worse condition are not inverted, because baking would lose too many digits.
 _WORST_CONDITION = 1e5
 _MOST_CANDIDATES = 8
 # If the first A is closer to the identity, the vertices keep the file's coordinates.
@@ -57,12 +58,12 @@ class Bindings:
 
 
 def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
-    """Bind the skins of a figure; the first determines where the binding space is in the scene.
+    """Bind the skins of a figure; the first one determines the binding space.
 
     Parameters
     ----------
     joints : Joints
-        Auxiliary joints are appended where skins disagree.
+        Auxiliary joints are appended if skins disagree.
     skins : dict of NodeSkin
         By index in the file, in order of precedence.
 
@@ -100,7 +101,7 @@ def _baked(bindings: Bindings, inverse_bind: Floats, slots: Ints) -> Floats:
     ]
     if not pairs:
         return _baked_at_rest(bindings, inverse_bind, slots)
-    # A few candidates are enough: skins differ by one matrix, or in a few joints only.
+    # A few candidates are enough: skins differ by one matrix, or only in a few joints.
     some = pairs[:: max(1, len(pairs) // _MOST_CANDIDATES)]
     candidates = [quotient for pair in some if (quotient := _quotient(*pair)) is not None]
     candidates = [np.eye(4), *(each for each in candidates if _is_regular(each))]
@@ -116,8 +117,8 @@ def _rest_space(rests: Floats) -> Floats:
     ----------
     rests : (M, 4, 4)
         Skinning matrices in the rest pose, of parents before those of their children. They are
-        all the same if the rest pose is the bind pose; otherwise the first that another one is
-        equal to is returned, as helpers above the hips may have any matrix.
+        all the same if the rest pose is the bind pose; otherwise the first that is equal to another
+        one is returned, as helpers above the hips may have any matrix.
     """
     regular = rests[_is_regular(rests)]
     if not len(regular):
@@ -174,7 +175,7 @@ def bind_rigid(bindings: Bindings, nodes: list[int]) -> None:
 def _rigid_matrix(bindings: Bindings, joint: int, above: int) -> Floats | None:
     """Return A of a mesh on a joint, and bind the joint; None if a matrix is singular.
 
-    In the rest pose the mesh is where its nearest bound ancestor puts it.
+    In the rest pose, the mesh is placed by its nearest bound ancestor.
     """
     known = bindings.matrices.get(joint)
     if known is not None:

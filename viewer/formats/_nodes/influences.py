@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import Primitive
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Influences", "divided", "of_rows", "on_joint"]
 
-_NO_SUM = 1e-12  # smaller sums of weights are not scaled to 1
+_NO_SUM = 1e-12  # sums of weights smaller than this are not scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeTree
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
@@ -127,7 +128,7 @@ def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
     Returns
     -------
     left, scales, right : (3, 3), (3,), (3, 3)
-        U, the diagonal of S, and V^T.
+        The matrix U, the diagonal of S, and the matrix V^T.
     """
     left, scales, right = np.linalg.svd(linear)
     if np.linalg.det(left) < 0.0:
@@ -205,7 +206,7 @@ def skeleton_of(
 
 
 def _springs_of(springs: Springs, own: Mapping[int, int]) -> Springs | None:
-    """Return the spring joints of one figure, whose joints are not nodes; None without any."""
+    """Return the spring joints of one figure, with joints instead of nodes; None if it has none."""
     rows = [row for row, node in enumerate(springs.joints.tolist()) if node in own]
     if not rows:
         return None

@@ -1,4 +1,4 @@
-"""Morph targets of a primitive: only the vertices that each target moves are kept."""
+"""Morph targets of a primitive: only the vertices that each target moves are stored."""
 
 from __future__ import annotations
 

@@ -41,9 +41,9 @@ def remember_pointers(
     members : Members
         The nodes of the figure.
     joints : Joints
-        Their joints.
+        The joints of the figure.
     pieces : list of Piece
-        Their primitives.
+        The primitives of the figure.
     """
     if not file.has_pointers:
         return

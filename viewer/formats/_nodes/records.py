@@ -1,4 +1,4 @@
-"""Application data and names of a file of nodes, kept by a figure to be written back."""
+"""Application data and names of a file of nodes, stored in a figure to be written back."""
 
 from __future__ import annotations
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.rig.arrays import Bools, Floats
@@ -97,17 +97,17 @@ def read_faces(lines: Lines, before: dict[str, int]) -> FaceRows | None:
 
 
 def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
-    """Return the three numbers of every corner as written, 0 where there is none: (C, 3).
+    """Return the three numbers of every corner as written, 0 for missing numbers: (C, 3).
 
     None if a corner is invalid.
     """
     text = rows.body.replace(b"/", b" ")
     values, bad = parse_numbers(text, 0, len(text), is_kept=False)
-    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index, and means "missing" below
+    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
-        # The second most common kind of file has only vertices.
+        # In the second most common kind of file, corners have only a vertex.
         return _spread(values, np.ones(len(begins), np.int64), None)
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     if not fits.all():
@@ -154,8 +154,8 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
 
 
 def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Corners | None:
-    """Arrange the numbers of corners in rows of three; with a gap, the second becomes the third."""
-    # Larger numbers are out of range; they are read again by the function for invalid faces.
+    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
+    # Larger numbers are out of range; the function for invalid faces reads them again.
     whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
     if (whole != values).any():
         return None

@@ -8,10 +8,10 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["is_cut_out", "is_normal_map"]
 
-_SAMPLES = 128  # rows and columns that are looked at, at most
-_ERROR = 0.2  # of the length of a normal: eight bits, and images that are compressed
-_MOST = 0.95  # of the pixels
-_SOLID = 16, 239  # below and above, opacity counts as 0 and 1
+_SAMPLES = 128  # maximum number of rows and columns that are sampled
+_ERROR = 0.2  # tolerance of a normal's length, for 8-bit and compressed images
+_MOST = 0.95  # minimum fraction of pixels that fulfil a criterion
+_SOLID = 16, 239  # opacities below and above are treated as 0 and 1
 
 
 def is_normal_map(image: Bytes) -> bool:
@@ -27,7 +27,7 @@ def is_normal_map(image: Bytes) -> bool:
 
 
 def is_cut_out(opacity: Bytes) -> bool:
-    """Return whether opacities, (H, W) uint8, are nearly all 0 or 1, as of leaves and hair."""
+    """Return whether opacities, (H, W) uint8, are nearly all 0 or 1, as for leaves and hair."""
     values = _sampled(opacity)
     return bool(((values < _SOLID[0]) | (values > _SOLID[1])).mean() > _MOST)
 

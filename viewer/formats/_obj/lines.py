@@ -1,18 +1,18 @@
 """Lines of an ``.obj``, grouped by keyword, in pieces of a few hundred thousand bytes.
 
-All lines with the same keyword are parsed at once. Pieces that fit into the processor's cache make
-this several times faster than parsing the whole file at once.
+All lines of a piece with the same keyword are parsed together. Pieces that fit into the processor's
+cache make this several times faster than parsing whole files.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.progress import report_bytes
@@ -26,7 +26,7 @@ Letters = NDArray[np.uint8]
 KEYWORDS = ("v", "vt", "vn", "f")
 """Keywords of the lines that contain numbers."""
 
-_PIECE = 1 << 18  # bytes
+_PIECE = 1 << 18  # bytes per piece
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _LINE_END = re.compile(rb"[\r\n]")
 _PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
@@ -114,7 +114,7 @@ def _split(data: bytes, base: int) -> Lines:
     if len(indented):
         inked = np.append(np.flatnonzero(~_is_blank(letters)), len(letters))
         first = inked[np.searchsorted(inked, starts[indented])]
-        starts[indented] = np.minimum(first, ends[indented] - 1)  # for an empty line, its end
+        starts[indented] = np.minimum(first, ends[indented] - 1)  # the end of an empty line
     first, second, third = (letters.take(starts + k, mode="clip") for k in range(3))
     ends_at_1, ends_at_2 = _is_blank(second), _is_blank(third)
     is_v = first == ord("v")

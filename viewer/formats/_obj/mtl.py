@@ -12,19 +12,20 @@
 ``Pr``, ``Pm`` and ``norm`` are those of the PBR extension (Burley and others, 2013, as Blender and
 tinyobjloader write it). An option is a word that begins with ``-`` and its values: ``-o`` and
 ``-s`` offset and scale the image, ``-clamp`` clamps it at its edges, ``-bm`` scales a normal map,
-``-imfchan`` picks a channel. ``map_Ka`` counts without ``map_Kd``. A bump map is drawn if its image
-holds normals; heights, specular and reflection maps and the rest of the extension are not drawn.
-Programs differ in details, see ``_REPLACING``, ``name_here`` and ``image_kinds``.
+``-imfchan`` selects a channel. ``map_Ka`` is used if there is no ``map_Kd``. A bump map is drawn if
+its image contains normals; heights, specular and reflection maps and the rest of the extension are
+not drawn. Programs differ in details, see ``_REPLACING``, ``name_here`` and ``image_kinds``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._obj.image_kinds import is_cut_out, is_normal_map
@@ -60,17 +61,17 @@ _NOT_DRAWN = (
     *(b"map_orm", b"map_rma"),
 )
 _REPLACING = b"Blender", b"3ds Max"
-"""Programs, named in a comment, whose maps replace the value beside them, which has its default."""
+"""Programs, named in a comment, whose maps replace values, which then have their defaults."""
 
-_HEAD = 300  # bytes in which that comment is
-_ROUNDING = 1e-3  # by which values may exceed 1
+_HEAD = 300  # number of bytes that are searched for that comment
+_ROUNDING = 1e-3  # tolerance by which values may exceed 1
 
 
 @dataclass(slots=True)
 class _Statements:
-    """What one ``newmtl`` states: values, and maps with their location in the library.
+    """Statements of one ``newmtl``: values, and maps with their location in the library.
 
-    ``replaces``: whether maps replace the values; otherwise they are multiplied.
+    ``replaces`` states whether maps replace the values; otherwise they are multiplied.
     """
 
     library: Source
@@ -87,7 +88,7 @@ def read_libraries(
     Parameters
     ----------
     source : Source
-        The ``.obj``; warned of libraries, materials and images that are missing.
+        The ``.obj``; warnings about missing libraries, materials and images are added to it.
     libraries : list of (bytes, int)
         Text after each ``mtllib``, and its offset.
     names : list of str
@@ -166,7 +167,7 @@ def _read(library: Source, known: dict[str, _Statements], load: _Load) -> None:
 
 
 def _found_here(library: Source, text: bytes, position: int, moved: set[str]) -> MapOptions:
-    """Return a map with its file's name in this folder; warn once if it is another one."""
+    """Return a map with its file's name in this folder; warn once if the name differs."""
     options = map_options(text.decode("utf-8", "surrogateescape"))
     file = name_here(library.path.parent, options.file)
     if file is None:
@@ -178,7 +179,7 @@ def _found_here(library: Source, text: bytes, position: int, moved: set[str]) ->
 
 
 def _holds_normals(library: Source, file: str, position: int, load: _Load) -> bool:
-    """Return whether the image of a bump map exists and holds normals."""
+    """Return whether the image of a bump map exists and contains normals."""
     path = referenced_path(library.path.parent, file)
     if path is None or not path.is_file():
         return False
@@ -227,11 +228,11 @@ def _material(name: str, stated: _Statements, load: _Load) -> Material:
     if cut is not None and cut.image is not None:
         base = textures.get("base_texture")
         if base is not None and base.image is cut.image and cut.image[..., 3].min() == 255:
-            # The alpha of an image that has none; its brightness is not meant.
+            # The image has no alpha; its brightness is not meant to be the opacity.
             alpha_mode = "blend" if opacity < 1.0 else "opaque"
         else:
             whole = textures["base_texture"] = _with_opacity(base, cut)
-            assert whole.image is not None  # made from images
+            assert whole.image is not None  # the texture was made from images
             if opacity == 1.0 and is_cut_out(whole.image[..., 3]):
                 alpha_mode = "mask"
     parts: dict[str, Any] = dict(textures)
@@ -252,7 +253,7 @@ def _material(name: str, stated: _Statements, load: _Load) -> Material:
 
 
 def _numbers(stated: _Statements, textures: dict[str, Texture]) -> dict[str, tuple[float, ...]]:
-    """Return the values of a material that count beside its textures."""
+    """Return the values of a material that are used together with its textures."""
     of_texture = {
         "diffuse": "base_texture",
         "emissive": "emissive_texture",
@@ -261,7 +262,7 @@ def _numbers(stated: _Statements, textures: dict[str, Texture]) -> dict[str, tup
     }
     numbers = dict(stated.numbers)
     for kind, texture in of_texture.items():
-        # A factor of 0 would leave nothing of a map, which many programs write all the same.
+        # Many programs write a factor of 0 next to a map, although it would make the map black.
         is_zero = kind != "roughness" and not any(numbers.get(kind, ()))
         if texture in textures and (stated.replaces or is_zero):
             numbers.pop(kind, None)
@@ -310,7 +311,7 @@ def _with_opacity(base: Texture | None, cut: Texture) -> Texture:
     assert cut.image is not None  # checked by the caller
     opacity = cut.image[..., cut.channel]
     if cut.image[..., 3].min() < 255:
-        opacity = cut.image[..., 3]  # if the image has alpha, it is the opacity
+        opacity = cut.image[..., 3]  # the opacity is the image's alpha, if it has alpha
     if base is None or base.image is None:
         white = np.full((*opacity.shape, 3), 255, np.uint8)
         return replace(cut, image=np.dstack([white, opacity]), channel=0)

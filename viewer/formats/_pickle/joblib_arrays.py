@@ -5,7 +5,7 @@
     array   = BUILD of a NumpyArrayWrapper, [n, n bytes of padding], the values
     wrapper = {subclass, shape, order: "C" or "F", dtype, allow_mmap, numpy_array_alignment_bytes}
 
-Only files since joblib 1.1 have padding. An array of objects is a pickle of its own.
+Only files since joblib 1.1 have padding. An array of objects is a separate pickle.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ def take_array(machine: Machine, wrapper: Instance, run: Callable[[Machine], obj
     found = dtype.dtype()
     n_items = None if found is None else item_count(shape, found.itemsize)
     if found is None or n_items is None:
-        # The size of its elements is unknown, and so is where the pickle continues.
+        # The size of the elements is unknown, and therefore also the position at which the pickle
+        # continues.
         raise MisfitError(Phrase("joblib-dtype", dtype=dtype.what(), shape=shape))
     start = machine.skip(n_items * found.itemsize)
     array = Array()

@@ -18,13 +18,13 @@ from viewer.formats._source import Source
 
 __all__ = ["Machine"]
 
-# Items; a body model needs a few hundred, a motion in plain lists some 100,000. Results of
-# trackers, which write a dict per frame and person, need one for every eight bytes.
+# Maximum number of items; a body model needs a few hundred, a motion in plain lists about 100,000.
+# Results of trackers, which write a dict per frame and person, need one for every eight bytes.
 _MAX_STEPS = 1_000_000
 _BYTES_PER_STEP = 4
 _MOST_STEPS = 20_000_000
-_DEEPEST = 3  # pickles inside pickles; real files have two
-_LONGEST_LINE = 256  # characters of a name or number in the text protocols
+_DEEPEST = 3  # maximum nesting of pickles inside pickles; real files have two levels
+_LONGEST_LINE = 256  # maximum number of characters of a name or number in the text protocols
 _INTEGER = re.compile(rb"[+-]?[0-9]+")
 
 
@@ -46,8 +46,8 @@ class Machine:
     depth : int
         Number of pickles that contain this one.
     persistent, load_bytes : callable or None
-        Return the value of a persistent id, and that of torch's storages saved as bytes; None
-        where the file must not have any.
+        Return the value of a persistent id, and that of torch's storages saved as bytes; None if
+        the file must not contain any.
     """
 
     def __init__(
@@ -104,7 +104,7 @@ class Machine:
         """Continue with the budget that a nested machine has left."""
         self._budget = inner._budget
 
-    # Reading bytes.
+    # Methods that read bytes.
 
     def number(self, size: int, *, is_signed: bool = False) -> int:
         """Read an integer of ``size`` bytes, least significant first."""
@@ -156,7 +156,7 @@ class Machine:
         """Return the error for a file damaged by a text-mode transfer."""
         return self.source.fault("F002.pickle-line-ends")
 
-    # The stack.
+    # Methods of the stack.
 
     def push(self, value: object) -> None:
         """Push a value onto the stack."""
@@ -195,7 +195,7 @@ class Machine:
         else:
             self.pop()
 
-    # The memo.
+    # Methods of the memo.
 
     def remember(self, index: int) -> None:
         """Store the topmost value in the memo."""

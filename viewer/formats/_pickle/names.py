@@ -22,7 +22,7 @@ __all__ = ["as_key", "build", "call", "create", "find"]
 
 # Numpy 2 and scipy 1.8 renamed modules; files keep the old names. A rule for prefixes would be
 # unsafe: numpy.testing.runstring executes any string.
-_FACTORIES = ("dict", "list", "int", "float")  # of defaultdict
+_FACTORIES = ("dict", "list", "int", "float")  # allowed factories of defaultdict
 _ROLES = {
     ("numpy", "ndarray"): "ndarray",
     ("numpy", "dtype"): "dtype",
@@ -53,7 +53,7 @@ _ROLES = {
     ("builtins", "object"): "object",
     ("__builtin__", "set"): "set",
     ("builtins", "set"): "set",
-    ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" like this in old protocols
+    ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" in this form in old protocols
     ("builtins", "bytes"): "bytes",
     ("collections", "OrderedDict"): "dict",
     ("collections", "defaultdict"): "defaultdict",
@@ -63,7 +63,7 @@ _ROLES = {
     ("joblib.numpy_pickle", "NumpyArrayWrapper"): "joblib",
     **TORCH_ROLES,
 }
-# Wrappers of joblib before 0.10, which keep each array in a file of its own.
+# Wrappers of joblib before 0.10, which store each array in a separate file.
 _OLD_WRAPPERS = ("NDArrayWrapper", "ZNDArrayWrapper")
 _CLASSES = {"csc", "csr", "Ch", "Select", "expression", "joblib"}
 _ORDERS = {"<", ">", "=", "|"}
@@ -243,7 +243,7 @@ def _dict(arguments: tuple[object, ...]) -> object:
 
 
 def _defaultdict(arguments: tuple[object, ...]) -> object:
-    """Return a plain dict: nothing asks for a missing key, so its factory is never called."""
+    """Return a plain dict: missing keys are never looked up, so its factory is never called."""
     match arguments:
         case () | (None,) | (StandIn(role="type" | "dict" | "set"),):
             return {}
@@ -301,7 +301,7 @@ def _build_dtype(target: Dtype, state: object) -> None:
             if letter is None or letter not in _ORDERS:
                 raise MisfitError(Phrase("pickle-byte-order", found=noun(order)))
             if any(part is not None for part in (sub, names, fields)):
-                target.code = "V"  # records of any size
+                target.code = "V"  # records may have any size
             target.order = letter
             dtype = target.dtype()
             if dtype is None or size in (-1, dtype.itemsize):

@@ -37,7 +37,7 @@ def warn_of_rest(machine: Machine) -> None:
 
 
 def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
-    """Return the values that a pickle built as an archive.
+    """Return the values that a pickle builds, as an archive.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def has_names(whole: object) -> bool:
 
 
 def _objects(whole: object) -> object:
-    """Return the objects of an array of them; a single one as it is."""
+    """Return the objects of an array of objects; a single one is returned unchanged."""
     if not isinstance(whole, Array) or whole.items is None:
         return whole
     return whole.items[0] if len(whole.items) == 1 else whole.items

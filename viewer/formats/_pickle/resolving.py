@@ -1,7 +1,7 @@
-"""Converts the values that a pickle builds to those of an archive, one key at a time.
+"""Conversion of the values that a pickle builds to those of an archive, one key at a time.
 
 Values are converted on demand, so a key that is not needed costs nothing and cannot invalidate the
-others. Shared and self-containing values are traversed within a budget and a depth.
+others. Shared and self-containing values are traversed within limits of budget and depth.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from viewer.rig.arrays import Deferred
 
 __all__ = ["resolve"]
 
-_DEEPEST = 32  # nested containers
-_DEEPEST_EXPRESSION = 8  # nested expressions; a released model has two
+_DEEPEST = 32  # maximum depth of nested containers
+_DEEPEST_EXPRESSION = 8  # maximum depth of nested expressions; a released model has two levels
 _SMALLEST_BUDGET = 1000
 _NUMBERS = "biuf"
 

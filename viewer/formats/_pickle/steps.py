@@ -27,7 +27,7 @@ Result = TypeVar("Result")
 
 _STOP = ord(".")
 _LAST_PROTOCOL = 5
-_MAX_INTEGER = 1024  # bytes
+_MAX_INTEGER = 1024  # maximum length in bytes
 _LONGEST_NAME = 256
 _FLOAT = re.compile(rb"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|-?inf|-?nan")
 # Escapes of Python 2's repr(). Others are refused, as Python's decoder warns about some of them.
@@ -53,7 +53,7 @@ def run(machine: Machine) -> object:
 
 
 def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
-    """Convert refusals of names, arguments and strings to errors that give the file."""
+    """Convert refusals of names, arguments and strings to errors that name the file."""
     try:
         return action()
     except UnicodeError:
@@ -224,7 +224,7 @@ def _stack_global(machine: Machine) -> None:
 
 
 def _persistent(machine: Machine) -> None:
-    """Replace a persistent id by its value, where the file's kind gives it one."""
+    """Replace a persistent id by its value, if files of this kind define one."""
     found = machine.pop()
     if machine.persistent is None:
         _refused(Phrase("noun-persistent"))(machine)
@@ -244,7 +244,7 @@ def _reduce(machine: Machine) -> None:
 
 
 def _loaded_bytes(machine: Machine, function: StandIn, arguments: object) -> object:
-    """Return what torch saved as bytes inside the pickle."""
+    """Return the value that torch saved as bytes inside the pickle."""
     match arguments:
         case (Span(coding=None | "latin-1") as data,) if machine.load_bytes is not None:
             return machine.load_bytes(machine, data)

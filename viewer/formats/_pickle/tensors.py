@@ -1,21 +1,21 @@
 """Tensors of torch in pickles: storages whose bytes stay in the file, and strided views of them.
 
-A tensor is ``_rebuild_tensor_v2(storage, offset, size, stride, …)``: element (i, j, …) is that at
-offset + i stride[0] + j stride[1] + … of the storage. Several tensors may share a storage, and
-expanded tensors have strides of 0. Everything is checked against the storage before it is read.
+A tensor is ``_rebuild_tensor_v2(storage, offset, size, stride, …)``: element (i, j, …) is at offset
++ i stride[0] + j stride[1] + … of the storage. Several tensors may share a storage, and expanded
+tensors have strides of 0. All values are checked against the storage before it is read.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.element_types import item_count, shaped
 from viewer.formats._archive.zip_directory import MAX_RATIO, SMALL
@@ -48,7 +48,7 @@ _LONGEST_KEY = 200
 
 @dataclass(slots=True, eq=False)
 class Storage:
-    """A flat array in a file, read at most once, whichever tensors use it.
+    """A flat array in a file, read at most once, regardless of how many tensors use it.
 
     Attributes
     ----------
@@ -196,7 +196,7 @@ ROLES = {
     ("torch._utils", "_rebuild_parameter"): "torch-parameter",
     ("torch.storage", "_load_from_bytes"): "torch-bytes",
 }
-"""Roles of torch's names; "torch-bytes" is a file of its own, see ``_torch/legacy.py``."""
+"""Roles of torch's names; "torch-bytes" is a separate file, see ``_torch/legacy.py``."""
 
 CALLS: dict[str, Callable[[tuple[object, ...]], object]] = {
     "torch-tensor": _tensor,

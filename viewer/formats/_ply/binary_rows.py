@@ -39,7 +39,7 @@ class BinaryRows:
         return None
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         if element.count == 0:
             return False
@@ -99,7 +99,7 @@ class BinaryRows:
         size = int(kind[1])
         if len(cursor) == 0:
             return np.zeros(0, dtype=kind), cursor
-        # There is a window of the size of a number at every byte, as rows need not be aligned.
+        # A window with the size of a number starts at every byte, as rows need not be aligned.
         windows = np.ndarray(
             len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
         )

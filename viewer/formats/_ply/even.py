@@ -51,7 +51,7 @@ def even_binary(
 ) -> tuple[Columns, int] | None:
     """Return the columns of an element, and the size of its rows in bytes.
 
-    ``counts``: lengths of the lists in the first row. Returns None if other rows have other
+    ``counts`` are the lengths of the lists in the first row. Returns None if other rows have other
     lengths, or the file is too short.
     """
     left = iter(counts)
@@ -92,5 +92,5 @@ def _compact(values: NDArray[np.float64]) -> Numbers:
 
 
 def _equal_counts(count: int, size: int) -> NDArray[np.int64]:
-    # One number represents all of them.
+    # A single number represents all equal counts.
     return np.broadcast_to(np.int64(size), (count,))

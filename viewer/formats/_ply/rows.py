@@ -28,7 +28,7 @@ _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
-    """Read all elements, by name.
+    """Read all elements and return them by name.
 
     Raises
     ------
@@ -93,7 +93,7 @@ class _Text:
         return self._firsts
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         last = self.line + element.count
         if self.has_bad or element.count == 0 or last > len(self.counts):

@@ -29,8 +29,8 @@ KEYS = (
 """Keys that are read; all are ignored if the first is missing."""
 
 _UPS = ("y", "z")
-_SHORTEST = 1e-6  # length of a quaternion; a shorter quaternion defines no reliable rotation
-_LONGEST_WORD = 200  # characters
+_SHORTEST = 1e-6  # minimum length of a quaternion; a shorter one defines no reliable rotation
+_LONGEST_WORD = 200  # maximum number of characters of a text
 
 
 def read_rotations(named: NamedValues) -> JointRotations | None:
@@ -96,7 +96,7 @@ def _names(named: NamedValues) -> tuple[str, ...]:
 
 
 def _meanings(named: NamedValues, count: int) -> tuple[str, ...]:
-    """Return the meaning of each joint; none if there is another number of them."""
+    """Return the meaning of each joint; an empty tuple if their number differs."""
     if named.values.get("joint_meanings") is None:
         return ()
     found = named.array("joint_meanings", "U", Phrase("pose-names"))

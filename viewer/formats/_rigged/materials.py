@@ -31,7 +31,7 @@ _RECORDS = "material_records"
 
 
 def material_arrays(mesh: Mesh) -> dict[str, NDArray[Any]]:
-    """Return the arrays that describe a mesh's materials; none if it has no material."""
+    """Return the arrays that describe a mesh's materials; an empty dict if it has no material."""
     if not mesh.materials:
         return {}
     arrays: dict[str, NDArray[Any]] = {
@@ -143,5 +143,5 @@ def _picture(archive: Archive, key: str) -> Bytes | None:
 
 
 def texts(archive: Archive, key: str) -> tuple[str, ...]:
-    """Return an array of texts."""
+    """Return an array of strings."""
     return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))

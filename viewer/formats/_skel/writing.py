@@ -34,7 +34,7 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
     Returns
     -------
     list of Diagnostic
-        Empty: the format holds all of a skeleton that it accepts.
+        Empty: the format stores every property of a skeleton that it accepts.
 
     Raises
     ------

@@ -1,6 +1,6 @@
 """Tables of numbers in a ``.skin`` file: positions, normals, texture coordinates, triangles.
 
-A valid block is parsed at once. Otherwise every word is examined: each error is recorded and the
+A valid block is parsed as a whole. Otherwise every word is examined: each error is recorded and the
 value replaced by NaN. Line breaks have no meaning in the format, but most files have one vertex or
 triangle per line. In this case, a line of the wrong length does not affect the others.
 """

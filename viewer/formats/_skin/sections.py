@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._skin.bindings import read_bindings
 from viewer.formats._skin.blocks import KEYWORDS, Block, find_block, read_count
 from viewer.formats._skin.material import read_material
@@ -52,10 +53,10 @@ class Sections:
     materials: list[Material] = field(default_factory=list)
     pictures: dict[str, Bytes | None] = field(default_factory=dict)
     triangles: list[TriangleRun] = field(default_factory=list)
-    n_triangles: int = 0  # of all sections read so far
+    n_triangles: int = 0  # number of triangles in all sections read so far
     bindings: Floats | None = None
     offsets: dict[str, int] = field(default_factory=dict)
-    counts: dict[str, int] = field(default_factory=dict)  # as declared by the file
+    counts: dict[str, int] = field(default_factory=dict)  # numbers of rows as declared by the file
 
     def triangle_offset(self, triangle: int) -> int:
         """Return the offset of a triangle, numbered across all sections."""

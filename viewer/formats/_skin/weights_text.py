@@ -13,7 +13,7 @@ from viewer.rig.skin import Skin
 
 __all__ = ["weights_lines"]
 
-_AT_ONCE = 2048  # vertices whose numbers are formatted at once
+_AT_ONCE = 2048  # number of vertices that are formatted together
 _SEPARATORS = (b" ", b"\n  ")
 
 

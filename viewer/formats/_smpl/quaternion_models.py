@@ -12,7 +12,7 @@ from viewer.rig.bodies.quaternion_feature import QuaternionFeature
 
 __all__ = ["coordinate_regressor", "quaternion_correctives"]
 
-_STAR_SHAPE = 1  # the coefficient that drives correctives of STAR: the second one
+_STAR_SHAPE = 1  # index of the shape coefficient that drives correctives of STAR
 
 
 def coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> JointRegressor:
@@ -36,7 +36,7 @@ def coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> Joi
 def quaternion_correctives(
     archive: Archive, n_vertices: int, n_joints: int
 ) -> tuple[Correctives, str] | None:
-    """Return correctives that quaternions drive, and the model's title; None for SMPL's own.
+    """Return correctives that quaternions drive, and the model's title; None for those of SMPL.
 
     STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
     four for each joint.

@@ -3,7 +3,7 @@
 A word is the text of one number. Its digits form an integer w, and its value is w * 10^q. If w and
 10^|q| are exact in float64, their product or quotient is the correctly rounded value (Clinger
 1990). Otherwise the product is computed to about 100 bits; if its error could change the rounding,
-the word is left to ``float()``.
+the word is converted by ``float()``.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ _U = np.uint64
 _DOT = ord(".")
 _DOTS = _U(0x2E2E2E2E2E2E2E2E)
 _ZERO = _U(0x30)
-_MOST_DIGITS = 24  # characters read before or after the decimal point
+_MOST_DIGITS = 24  # maximum number of characters read before or after the decimal point
 _HIGHEST = 1843  # upper digits of a 64-bit integer of 20 digits
 _LARGEST = 1.8e19  # below 2^64
 _EXACT = _U(1 << 53)
 # Products with powers beyond 10^19 are rejected by _LARGEST, unless they are 0.
 _TENS = np.array([10**k if k < 20 else 0 for k in range(_MOST_DIGITS + 1)], dtype=np.uint64)
 _POWERS = 10.0 ** np.arange(_MOST_DIGITS + 1)
-_FEW = 0.25  # fraction of words that are evaluated separately
+_FEW = 0.25  # maximum fraction of words that are evaluated separately
 
 
 def parse_short(

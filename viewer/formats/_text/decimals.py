@@ -24,7 +24,7 @@ MOST_DECIMALS = 15
 _U = np.uint64
 _TENS = np.array([10**k for k in range(20)], dtype=np.uint64)
 _EXACT = 1e15  # integers of up to 15 digits survive the conversion to float64 and back
-_NEAR = 1e-6  # distance from a tie, relative to the last digit
+_NEAR = 1e-6  # minimum distance from a tie, relative to the last digit
 _TAILS = np.array(
     [int.from_bytes(b"\0\0\0\0" + b"e%+03d" % e, "little") for e in range(-99, 100)],
     dtype=np.uint64,
@@ -107,7 +107,7 @@ def shortest(values: Floats) -> Digits:
 
 
 def _magnitudes(values: Floats) -> tuple[Floats, Bools, Indices]:
-    """Return magnitudes, which of them are out of range, and their decimal exponents.
+    """Return magnitudes, a mask of those out of range, and their decimal exponents.
 
     Numbers out of range and 0 are replaced by 1.
     """
@@ -133,15 +133,15 @@ def _nearest(
 def _placed(numbers: Words, exponents: Indices, decimals: Indices, most: int, least: int) -> Digits:
     """Place the point in numbers * 10^-decimals.
 
-    ``exponents``: those of the first digits; from -4 to below ``most``, no exponent is written.
-    ``least``: number of decimals of integers.
+    ``exponents`` are those of the first digits; from -4 to below ``most``, no exponent is written.
+    ``least`` is the number of decimals of integers.
     """
     exponents = np.where(numbers == 0, 0, exponents)
     numbers, decimals = _stripped(numbers, decimals)
     is_exponential = (exponents < -4) | (exponents >= most)
     tails = None
     if is_exponential.any():
-        # One digit before the point.
+        # Write one digit before the point.
         decimals = np.where(is_exponential, decimals + exponents, decimals)
         tails = np.where(is_exponential, _TAILS.take(exponents + 99, mode="clip"), _U(0))
     numbers = numbers * _TENS.take(np.maximum(-decimals, 0))

@@ -1,8 +1,8 @@
 """Offsets of values in a JSON text, searched for only when an error needs one.
 
-Python's parser is fast, but it keeps no offsets. If there is an error, the text is scanned a second
-time, token by token. By then, it is known to be valid JSON, except that it may be nested too deeply
-and contain NaN and infinities.
+Python's parser is fast, but it does not record offsets. If there is an error, the text is scanned a
+second time, token by token. By then, it is known to be valid JSON, except that it may be nested too
+deeply or contain NaN and infinities.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def line_at(text: str, offset: int) -> int:
 def value_place(text: str, path: Sequence[str | int]) -> int | None:
     """Return the offset of a value, in characters; None if there is no such value.
 
-    If a key is repeated, its last value counts, as in Python.
+    If a key is repeated, its last value is used, as in Python.
 
     >>> value_place('{"a": [1, 22]}', ("a", 1))
     10

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import bisect
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._text.numbers import word_begins
 
 __all__ = ["LineSizes", "line_sizes"]
 
-_PIECE = 1 << 18  # bytes; temporary arrays stay in the processor's cache
+_PIECE = 1 << 18  # bytes per piece, whose temporary arrays stay in the processor's cache
 _LINE_END = re.compile(rb"[\r\n]")
 
 

@@ -7,12 +7,13 @@ of the previous number, so numbers are written from the last to the first.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._text.swar import Indices, Words, eight_letters
 from viewer.rig.arrays import Bools
 
@@ -23,7 +24,7 @@ Number = TypeVar("Number", bound=np.generic)
 _U = np.uint64
 _EIGHT = _U(10**8)
 _PAD = 32  # bytes before the text for the leading zeros of the first number
-_AT_ONCE = 1 << 13  # numbers; their temporary arrays stay in the processor's cache
+_AT_ONCE = 1 << 13  # numbers per batch, whose temporary arrays stay in the processor's cache
 _TENS = [_U(10**k) for k in range(1, 20)]
 
 

@@ -33,12 +33,12 @@ Indices = NDArray[np.intp]
 
 _U = np.uint64
 ZEROS = _U(0x3030303030303030)
-"""Eight times the character 0."""
+"""The character 0, eight times."""
 
 _LOW7 = _U(0x7F7F7F7F7F7F7F7F)
 _HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
 _SIXES = _U(0x0606060606060606)
-# The mask of the last k characters of a word.
+# Masks of the last k characters of a word.
 _KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], dtype=np.uint64)
 
 
@@ -90,7 +90,7 @@ def letters_after(bits: Words) -> Indices:
 
 
 def close_gap(words: Words, bits: Words) -> Words:
-    """Remove a marked character: those before it move by one position towards it.
+    """Remove a marked character: the characters before it move by one position towards it.
 
     The first character becomes a null byte.
     """

@@ -28,7 +28,7 @@ from viewer.phrases import printable
 __all__ = ["is_torch", "open_torch"]
 
 _PICKLE = "/data.pkl"
-_LARGEST_PICKLE = 64 << 20  # bytes; the arrays are not in it
+_LARGEST_PICKLE = 64 << 20  # maximum bytes of the pickle, which does not contain the arrays
 _LARGEST_READ = 1 << 20
 
 
@@ -38,7 +38,7 @@ def is_torch(directory: ZipDirectory) -> bool:
 
 
 def open_torch(directory: ZipDirectory) -> Archive:
-    """Open a torch file whose value is a dict; raises as ``open_archive`` does."""
+    """Open a torch file whose value is a dict; errors as of ``open_archive``."""
     directory.check(lambda member: member.filename)
     source, members = directory.source, {member.filename: member for member in directory.members}
     found = [name for name in members if name.endswith(_PICKLE)]
@@ -91,7 +91,7 @@ class _Storages:
 
 
 def _read_member(storage: StoredFile, member: zipfile.ZipInfo) -> memoryview:
-    """Read the bytes of a member in pieces, because reading it at once needs twice the memory."""
+    """Read the bytes of a member in pieces: reading it as a whole needs twice the memory."""
     room, done = bytearray(member.file_size), 0
     try:
         with (

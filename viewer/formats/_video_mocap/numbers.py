@@ -34,13 +34,14 @@ __all__ = [
 
 Frames = np.ndarray[Any, np.dtype[np.int64]]
 
-_MOST_ROWS = 2_000_000  # frames of all people: 18 hours of one person, about a gigabyte
+# Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
+_MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")
-_SMALLEST = 1e-3  # determinant; a rotation has 1, a missing one 0
+_SMALLEST = 1e-3  # minimum determinant; that of a rotation is 1, of a missing one 0
 
 
 class RowBudget:
-    """Counts the frames of all people, because dicts that share arrays multiply them."""
+    """Counter of the frames of all people, which dicts that share arrays multiply."""
 
     def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
         self._archive, self._most, self._left = archive, most, most
@@ -51,7 +52,7 @@ class RowBudget:
         Raises
         ------
         FormatError
-            If there are more than any plausible recording has.
+            If there are more than in any plausible recording.
         """
         self._left -= max(count, 1)
         if self._left < 0:
@@ -64,7 +65,7 @@ def has(archive: Archive | None, *keys: str) -> bool:
 
 
 def person_number(key: str) -> int | None:
-    """Return the number of a person from a key, or None if the key is no number.
+    """Return the number of a person from a key, or None if the key is not a number.
 
     >>> person_number("-1"), person_number("camera")
     (-1, None)
@@ -73,7 +74,7 @@ def person_number(key: str) -> int | None:
 
 
 def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
-    """Return the shape of an array of numbers; empty if the value is none or does not exist."""
+    """Return the shape of an array of numbers; empty if there is no such array."""
     value = archive.get(key) if archive.has(key) else None
     is_array = isinstance(value, Deferred) and value.dtype.kind in "biuf"
     return value.shape if is_array and isinstance(value, Deferred) else ()
@@ -119,7 +120,7 @@ def frames_of(archive: Archive, key: str, count: int) -> Frames:
 
 
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return rotation vectors of rotation matrices, whose last axes are 3 x 3; zeros are identity.
+    """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
 
     Single precision leaves matrices that are not exactly orthogonal; the nearest rotation is used.
 
@@ -132,7 +133,7 @@ def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
 
 
 def rotations_of(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return rotation matrices, made exactly orthogonal; see ``matrices``."""
+    """Return exactly orthogonal rotation matrices; see ``matrices``."""
     return _rotations(archive, key, rows(archive, key, shape))
 
 
@@ -184,7 +185,7 @@ def sole(archive: Archive, key: str) -> float:
 
 
 def intrinsics_of(focal: Floats | float, center: Floats) -> Floats:
-    """Return K for focal lengths (N,), (N, 2) or one, and image centres (N, 2), pixels."""
+    """Return K for focal lengths (N,), (N, 2) or a single one, and image centres (N, 2), pixels."""
     lengths = np.atleast_1d(np.asarray(focal, dtype=np.float64))
     centers = np.atleast_2d(center)
     count = max(len(lengths), len(centers))

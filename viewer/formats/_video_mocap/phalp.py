@@ -7,7 +7,7 @@
                       betas (10,)}; bbox, mask, 3d_joints … are not read
 
 SMPL in the camera's space, with ``camera`` as its translation. Trackers keep lost people for a
-while: they are listed in ``tid``, but ``tracked_time`` counts the frames since they were seen.
+while: they are listed in ``tid``, but ``tracked_time`` counts the frames since they were last seen.
 """
 
 from __future__ import annotations
@@ -36,10 +36,11 @@ from viewer.rig.smpl_family import FAMILY
 
 __all__ = ["read", "recognises"]
 
-_FOCAL, _IMAGE = 5000.0, 256.0  # pixels of the network, whose image is scaled to the longer side
+# Focal length and image size of the network, pixels; the image is scaled to the longer side.
+_FOCAL, _IMAGE = 5000.0, 256.0
 _SIZES = {"global_orient": 9, "body_pose": 207, "betas": 10}
 _N_JOINTS = 24
-_LARGEST = 1 << 20  # pixels along a side
+_LARGEST = 1 << 20  # maximum size of an image, pixels
 
 
 def recognises(archive: Archive) -> bool:
@@ -140,7 +141,7 @@ def _track(archive: Archive, rows: list[tuple[int, Floats]]) -> Track:
 
 
 def _size(frame: Archive) -> tuple[int, int] | None:
-    """Return width and height of the video, from the first detection that gives them."""
+    """Return width and height of the video, from the first detection that states them."""
     try:
         sizes = frame.array("size", (None, 2)).values() if frame.has("size") else np.zeros((0, 2))
     except FormatError:

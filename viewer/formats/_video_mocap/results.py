@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
@@ -22,13 +23,13 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["Cameras", "Options", "Results", "Track", "capture_of"]
 
-_LARGEST = 1 << 20  # pixels along a side of a video
-_MOST_FRAMES = 1 << 22  # 38 hours at 30 frames per second
+_LARGEST = 1 << 20  # maximum width and height of a video, pixels
+_MOST_FRAMES = 1 << 22  # maximum number of frames: 38 hours at 30 frames per second
 
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """Settings that the files do not state; see ``viewer.formats.video_mocap.open_results``."""
+    """Settings that are not in the files; see ``viewer.formats.video_mocap.open_results``."""
 
     frame_rate: float | None = None
     space: str = ""
@@ -54,11 +55,11 @@ class Track:
     shape : (N, S), (1, S) or None
         Shape coefficients.
     hands : mapping of side to (N, C)
-        As for ``BodyMotion``; zeros stand for the mean hand.
+        As for ``BodyMotion``; zeros mean the mean hand.
     world_rotations : (N, 3) or None
         As for ``BodyMotion``.
     layout, points : PointLayout, (N, P, 4)
-        Captured points, in place of a body.
+        Captured points, instead of a body.
     rig : tuple of (N, P), (N, S), (N, E), (N, 3), or None
         Model parameters, identity, expression and position of the Momentum Human Rig.
     """
@@ -109,15 +110,15 @@ class Results:
     model : str
         The member of the SMPL family, or ``"MHR"``; empty if there are no bodies.
     people : mapping of space to {person: Track}
-        ``"world"`` and ``"camera"``, as far as the file has them; the first is the default.
+        ``"world"`` and ``"camera"``, or the one that the file has; the first is the default.
     ups : mapping of space to axis
         The axis that points up; empty if it is unknown.
     cameras : mapping of space to Cameras
-        Cameras, as far as the file determines them.
+        Cameras, if the file determines them.
     cameras_of : callable or None
         Returns the cameras in world space if they depend on a figure's rest joints.
     frame_rate : float or None
-        Frames per second, if the tool always uses the same.
+        Frames per second, if the tool always uses the same rate.
     facts : tuple of (str, str)
         Recognised and ignored contents, for ``viewer info``.
     notes : tuple of Diagnostic
@@ -166,7 +167,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
 
 
 def _shapes_vary(results: Results) -> bool:
-    """Return whether anyone has a shape that changes over time."""
+    """Return whether any person has a shape that changes over time."""
     shapes = [track.shape for people in results.people.values() for track in people.values()]
     return any(shape is not None and bool((shape != shape[:1]).any()) for shape in shapes)
 
@@ -258,7 +259,7 @@ class _Capture:
         )
 
     def view(self, cameras: Cameras) -> CameraView:
-        """Return the camera; frames outside the timeline are dropped."""
+        """Return the camera; frames outside the timeline are omitted."""
         intrinsic, size = cameras.intrinsics[0], cameras.size
         if size is not None and not 0 < min(size) <= max(size) < _LARGEST:
             size = None

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
@@ -49,9 +49,9 @@ _PARAMETERS = (
     *("hand_pose_params", "global_rot"),
 )
 _MODEL = ("mhr_model_params", "shape_params", "expr_params")
-_MOST_POINTS = 4_000_000  # points of a person in all frames: 128 MB
-_COST = 10  # frames; looking at a person takes about as long as reading so many
-_LOOKED_AT = 1000  # frames or people of which one must be recognised
+_MOST_POINTS = 4_000_000  # maximum number of points of a person in all frames: 128 MB
+_COST = 10  # frames; inspecting a person takes about as long as reading this many
+_LOOKED_AT = 1000  # number of frames or people of which at least one must be recognised
 _SUFFIXES = (".npz", ".pkl")
 
 
@@ -124,7 +124,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
 
 
 def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
-    """Return values with an axis of frames."""
+    """Return values with a first axis of frames."""
     return values if lead else values[None]
 
 
@@ -152,7 +152,7 @@ def _is_person(archive: Archive) -> bool:
 
 
 def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
-    """Yield frame, person and arrays of everybody in a pickle."""
+    """Yield the frame, number and arrays of each person in a pickle."""
     if _is_person(archive):
         yield 0, 0, archive
         return
@@ -181,7 +181,7 @@ def claims_folder(source: Source, names: set[str]) -> bool:
     file = Source(source.path / first, max_size=source.max_size)
     try:
         return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
-    except FormatError:  # a file of some other kind, in a folder of another format
+    except FormatError:  # the folder is of another format
         return False
 
 
@@ -258,7 +258,7 @@ def _track(rows: list[_Row], layout: PointLayout) -> Track:
     kept = [rows[row] for row in first.tolist()]
     places = np.array([row.points for row in kept])
     points = np.concatenate([places, np.ones((*places.shape[:2], 1))], axis=2)
-    if ORIGIN in layout.names:  # of the rig, which is no point of the body
+    if ORIGIN in layout.names:  # origin of the rig, which is not a point of the body
         points[:, layout.names.index(ORIGIN)] = 0.0
     return Track(
         frames.astype(np.int64),

@@ -4,7 +4,8 @@
 
     trans (B, T, 3)  root_orient (B, T, 3)  pose_body (B, T, 63)  betas (B, 16) or (B, 10)
     cam_R (B, T, 3, 3)  cam_t (B, T, 3)  intrins (4,): fx fy cx cy
-    track_info.json, beside or in the folder above: ids of people, and frames in which they are seen
+    track_info.json, in the same folder or the folder above: ids of people, and frames in which they
+    are seen
 
 SMPL+H with flat hands. The camera's pose maps the world to the camera; its first frame defines the
 world, in which y points down. The result is the file with the highest iteration number.
@@ -39,7 +40,7 @@ __all__ = ["claims_folder", "read", "read_folder", "recognises"]
 
 _RESULT = re.compile(r".*?_?(\d{1,9})_(?:\w+_)?world_results\.npz")
 _TRACKS = "track_info.json"
-_SIZE = 32 << 20  # bytes of the file of tracks
+_SIZE = 32 << 20  # maximum size of the file of tracks, bytes
 
 
 def recognises(archive: Archive) -> bool:

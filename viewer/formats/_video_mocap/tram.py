@@ -7,8 +7,8 @@
     camera.npy            dict: world_cam_R (F, 3, 3), world_cam_T (F, 3), or only pred_cam_R and
                           pred_cam_T; img_focal, img_center
 
-SMPL in the camera's space. A vertex v is at R[frame] v + T[frame] in the world, which has y up;
-the world of ``pred_cam`` is the first frame's camera.
+SMPL in the camera's space. The world position of a vertex v is R[frame] v + T[frame]; the world has
+y up; the world of ``pred_cam`` is the first frame's camera.
 """
 
 from __future__ import annotations

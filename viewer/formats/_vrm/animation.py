@@ -44,7 +44,7 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     Parameters
     ----------
     file : NodeFile
-        A file with the extension.
+        A file that has the extension.
     source : Source
         Records messages about invalid bones and unused contents.
 

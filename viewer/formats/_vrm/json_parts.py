@@ -8,7 +8,7 @@ __all__ = ["is_index", "listed", "part"]
 
 
 def part(told: Any, *names: str) -> Any:
-    """Return a nested property; None if it is missing or a value on the way is not an object.
+    """Return a nested property; None if it is missing or an outer value is not an object.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def part(told: Any, *names: str) -> Any:
 
 
 def listed(told: Any, *names: str) -> list[Any]:
-    """Return a nested list; an empty one if it is missing or no list."""
+    """Return a nested list; an empty one if it is missing or not a list."""
     found = part(told, *names)
     return found if isinstance(found, list) else []
 

@@ -32,7 +32,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["old_chains", "old_shapes"]
 
-_END = 0.07  # metres from the last joint to the point that swings
+_END = 0.07  # distance from the last joint to the swinging point, metres
 _TO_OURS = np.array([1.0, 1.0, -1.0])
 _DOWN = (0.0, -1.0, 0.0)
 
@@ -84,7 +84,7 @@ def old_chains(
 def _tails(
     tree: NodeTree, children: dict[int, list[int]], bone: int
 ) -> Iterator[tuple[int, Floats]]:
-    """Yield a bone and all nodes below it, parents first, with the point that swings."""
+    """Yield a bone and all nodes below it, parents first, with the swinging point of each."""
     stack = [bone]
     while stack:
         node = stack.pop()

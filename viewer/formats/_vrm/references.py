@@ -1,4 +1,4 @@
-"""Nodes to which the extensions of a VRM file refer, so that all of them are kept."""
+"""Nodes to which the extensions of a VRM file refer, so that none of them is removed."""
 
 from __future__ import annotations
 

@@ -1,12 +1,12 @@
-"""Parts of both versions of spring chains: joints, colliders, and places of nodes."""
+"""Parts of both versions of spring chains: joints, colliders, and transforms of nodes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeTree
 from viewer.formats._vrm.json_parts import is_index, listed
 from viewer.rig.arrays import Floats
@@ -53,7 +53,7 @@ def obstacles_of(spring: Any, groups: list[tuple[int, ...]]) -> tuple[int, ...]:
 
 
 def tail_between(tree: NodeTree, head: int, tail: int) -> Floats | None:
-    """Return the origin of a node in the space of an ancestor; None if it is not below it."""
+    """Return the origin of a node in the space of an ancestor; None if the node is not below it."""
     place, node = np.zeros(3), tail
     while node != head:
         if node < 0:

@@ -1,4 +1,4 @@
-"""Chains of springs, such as hair and skirts: ``VRMC_springBone`` 1.0, ``secondaryAnimation``.
+"""Chains of spring joints: ``VRMC_springBone`` 1.0 and ``secondaryAnimation``.
 
 ::
 
@@ -38,7 +38,7 @@ _DOWN = (0.0, -1.0, 0.0)
 
 
 def read_springs(file: NodeFile, source: Source) -> Springs | None:
-    """Return the spring joints of a file, whose joints are node indices; None without any.
+    """Return the spring joints of a file as node indices; None if there are none.
 
     Parameters
     ----------

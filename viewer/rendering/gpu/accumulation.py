@@ -13,7 +13,7 @@ __all__ = ["Accumulation"]
 
 
 class Accumulation:
-    """Adds images and draws their average.
+    """Accumulator that adds images and draws their average.
 
     Colours are premultiplied by alpha, so averaging pixels averages their coverage.
 
@@ -36,7 +36,7 @@ class Accumulation:
         self.context, self.size, self.count = context, size, 0
         self._owner = Owner()
         keep = self._owner.keep
-        what = f"the sum of pictures of {size[0]} x {size[1]} pixels"
+        what = f"the sum of images of {size[0]} x {size[1]} pixels"
         with self._owner.guard():
             self._sum = keep(checked(context, context.texture(size, 4, dtype="f4"), what))
             self._framebuffer = keep(context.framebuffer([self._sum]))
@@ -59,7 +59,7 @@ class Accumulation:
         self.count += 1
 
     def show(self, target: Target) -> None:
-        """Replace the image of a target by the average; its depths are kept."""
+        """Replace the image of a target by the average; its depths are preserved."""
         target.framebuffer.use()
         self.context.viewport = (0, 0, *self.size)
         self.context.enable_only(moderngl.NOTHING)

@@ -47,7 +47,7 @@ class ActorBuffers:
     programs : Programs
         Provides the skinning programs.
     cube : moderngl.Buffer
-        Vertices of the cube, of which boxes are instances.
+        Vertices of the cube that is instanced to draw boxes.
     notes : list of str
         Receives messages about limitations of the driver.
     forget : callable
@@ -127,7 +127,7 @@ class ActorBuffers:
 
     @contextmanager
     def guard(self) -> Iterator[None]:
-        """If the block fails, free the buffers that were created in it."""
+        """Free the buffers that were created in the block if it fails."""
         with ExitStack() as stack:
             # Items are freed in reverse order: posed meshes before the meshes that they use.
             for kept in (self.meshes, self._instanced, self.posed, self.skeletons):

@@ -29,7 +29,8 @@ Region = tuple[int, int, int, int]
 """Left, bottom, width and height in pixels, from the lower left corner."""
 
 _MARGIN = 2  # margin in pixels around openings, for the rounding of the rasterizer
-_LARGEST = 0.25  # fraction of the image: with larger openings, a second draw gains nothing
+# Maximum fraction of the image covered by openings for which a second draw is faster.
+_LARGEST = 0.25
 
 
 class BackFaces:
@@ -90,7 +91,7 @@ class BackFaces:
     def regions(
         self, model_view: Floats, projection: Floats, viewport: Region
     ) -> tuple[Region, ...] | None:
-        """Return the regions of the image where back faces can be seen; None for all of it.
+        """Return the regions of the image with visible back faces; None for the whole image.
 
         Parameters
         ----------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.bone_links import BoneLinks, bone_links
 from viewer.rendering.gpu.bone_shapes import arrow, ball, octahedron, stick
 from viewer.rendering.gpu.box_buffers import joint_colors
@@ -20,7 +20,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["BoneBuffers"]
 
-_BALL = -2  # in place of a child
+_BALL = -2  # marks a ball, in place of a child
 _MANY = 1000  # number of joints above which balls, which may all coincide, are omitted
 _GREY = (0.30, 0.32, 0.35)  # linear
 
@@ -56,7 +56,7 @@ class _Part:
         self._arrays = self._owner.keep(VertexArrays(context))
 
     def draw(self, program: moderngl.Program) -> None:
-        """Draw all instances with the attributes that the program's compiler kept."""
+        """Draw all instances with the attributes that the program uses."""
         if self.count:
             array = self._arrays.get(program, lambda: self._content(program))
             array.render(moderngl.TRIANGLES, vertices=self.n_corners, instances=self.count)
@@ -114,7 +114,7 @@ class BoneBuffers:
 
 
 def _skipped(layout: str) -> str:
-    """Return moderngl's padding for an attribute that a compiler dropped."""
+    """Return moderngl's padding for an attribute that the compiler removed."""
     return f"{4 * int(layout[0])}x"
 
 

@@ -15,11 +15,11 @@ __all__ = ["arrow", "ball", "octahedron", "stick"]
 
 _Point: TypeAlias = tuple[float, float, float]
 
-_WIDEST = 0.12  # where an octahedron is widest: fraction of the length from the joint
+_WIDEST = 0.12  # position at which an octahedron is widest, as a fraction of the length
 _FLATNESS = 0.7  # thickness over width, so that a 90-degree rotation about the length is visible
-_SIDES = 8  # of sticks and arrows
-_TIP = 0.72  # where the tip of an arrow begins, as a fraction of the length
-_TIP_WIDTH = 2.4  # in widths of its shaft
+_SIDES = 8  # number of sides of sticks and arrows
+_TIP = 0.72  # position at which the tip of an arrow begins, as a fraction of the length
+_TIP_WIDTH = 2.4  # width of the tip, in widths of the shaft
 
 
 def octahedron() -> Floats:

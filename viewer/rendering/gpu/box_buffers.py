@@ -90,7 +90,7 @@ class BoxBuffers:
         return hidden
 
     def array(self, program: moderngl.Program) -> moderngl.VertexArray:
-        """Return the instanced boxes for a program, with the attributes that its compiler kept."""
+        """Return the instanced boxes for a program, with the attributes that it uses."""
 
         def content() -> list[Any]:
             found: list[Any] = [(self._cube, "3f4 12x", "in_corner")]

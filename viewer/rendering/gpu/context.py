@@ -83,7 +83,7 @@ def _create(options: Mapping[str, int]) -> moderngl.Context:
     try:
         with deferred():
             return moderngl.create_context(**settings)
-    except Exception as problem:  # glcontext raises plain Exception
+    except Exception as problem:  # glcontext raises Exception itself
         from viewer.rendering.gpu.offer import headless_offer, offer_text
 
         text = str(problem)

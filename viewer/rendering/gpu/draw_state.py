@@ -82,7 +82,7 @@ def sides(
     double_sided : bool
         Whether this surface has two sides.
     blended : bool
-        Whether it is translucent: of two sides the farther one is drawn first.
+        Whether it is translucent: of the two sides, the farther one is drawn first.
     is_mirrored : bool
         Whether the surface is reflected: its front faces are then clockwise.
     """

@@ -6,14 +6,15 @@ import ctypes
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from viewer.data_classes import dataclass
 
 __all__ = ["EglDevice", "device_of_worker", "egl_devices"]
 
-_MOST = 64  # devices
+_MOST = 64  # maximum number of devices
 _EXTENSIONS = 0x3055
-_CUDA_DEVICE = 0x323A  # EGL_NV_device_cuda
+_CUDA_DEVICE = 0x323A  # EGL_CUDA_DEVICE_NV of EGL_NV_device_cuda
 _SOFTWARE = "EGL_MESA_device_software"
 
 
@@ -37,7 +38,7 @@ class EglDevice:
 
 
 def egl_devices() -> list[EglDevice]:
-    """Return the devices that EGL lists; none if EGL is missing or cannot list devices."""
+    """Return the devices that EGL lists; an empty list if EGL is missing or cannot list them."""
     if not sys.platform.startswith("linux"):
         return []
     try:
@@ -76,10 +77,10 @@ def _function(egl: ctypes.CDLL, name: str, result: Any) -> Any:
 def device_of_worker(
     rank: int, devices: Sequence[EglDevice] | None = None, visible: str | None = None
 ) -> int | None:
-    """Return the EGL device that a worker process draws on.
+    """Return the EGL device on which a worker process draws.
 
     The first device of ``CUDA_VISIBLE_DEVICES`` is used, which schedulers set for each job, but EGL
-    ignores. Without it, graphics cards are assigned to workers in turn.
+    ignores. If the variable is not set, graphics cards are assigned to workers in turn.
 
     Parameters
     ----------

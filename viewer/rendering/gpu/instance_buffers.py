@@ -79,7 +79,7 @@ class InstanceBuffers:
     n_updates : int
         Number of matrix uploads.
     is_mirrored : bool
-        Whether the placements are reflections; the actors agree where it matters.
+        Whether the placements are reflections; all actors agree if faces are culled.
     """
 
     def __init__(self, context: moderngl.Context, mesh: MeshBuffers, way: str = "") -> None:
@@ -220,7 +220,7 @@ class InstanceBuffers:
 
     @property
     def is_affine(self) -> bool:
-        """Whether joints of some actor scale or shear."""
+        """Whether joints of at least one actor scale or shear."""
         return not self._is_rigid[: self.count].all()
 
     @property
@@ -248,7 +248,7 @@ class InstanceBuffers:
                 )
                 if name in program and buffer is not None
             ]
-            # Skip the bytes of attributes that the compiler dropped, four per number.
+            # Skip the bytes of attributes that the compiler removed, four per number.
             layout = " ".join(
                 f"{size}f4" if name in program else f"{4 * size}x" for name, size in _PER_INSTANCE
             )

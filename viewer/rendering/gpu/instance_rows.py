@@ -42,7 +42,7 @@ class InstanceRows:
         self._count = 0
 
     def write(self, rows: Floats) -> None:
-        """Upload rows, (N, numbers of the layout).
+        """Upload rows, (N, number of values in the layout).
 
         Raises
         ------

@@ -20,7 +20,7 @@ from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["MeshBuffers"]
 
-_MOST_VISIBLE = 64  # combinations of hidden parts whose runs are kept
+_MOST_VISIBLE = 64  # maximum number of combinations of hidden parts whose runs are cached
 
 
 class MeshBuffers:
@@ -109,7 +109,7 @@ class MeshBuffers:
         """Return the triangles of the full or the reduced mesh, without hidden body parts.
 
         ``as_listed`` keeps the file's order, which affects how translucent edges blend.
-        ``hidden_parts`` are parts of the mesh, which are left out by drawing the other runs.
+        ``hidden_parts`` are parts of the mesh, which are omitted by drawing only the other runs.
         """
         reduced = reduced and self.figure.reduced is not None
         key = (reduced, hidden, as_listed)
@@ -214,7 +214,7 @@ class MeshBuffers:
 
     @property
     def product(self) -> np.ndarray:
-        """The pose correctives as float32, (P, 3 V), for sums on the processor."""
+        """The pose correctives as float32, (P, 3 V), for sums on the CPU."""
         if self._product is None:
             correctives = self.figure.correctives
             assert correctives is not None  # checked by the caller

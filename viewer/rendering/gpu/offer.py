@@ -1,4 +1,4 @@
-"""OpenGL version offered by a machine that lacks the required one."""
+"""OpenGL version offered by a machine that lacks the required version."""
 
 from __future__ import annotations
 
@@ -6,16 +6,17 @@ import ctypes
 import os
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import glcontext
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Offer", "headless_offer", "offer_of", "offer_text"]
 
 _VERSION, _RENDERER, _LANGUAGE = 0x1F02, 0x1F01, 0x8B8C
 _NEEDED, _NEEDED_LANGUAGE = (3, 3), (3, 30)
-_TRIED = (320, 310, 210, 100)  # newest first; from 3.1 on, they are core profiles
+_TRIED = (320, 310, 210, 100)  # versions to try, newest first; from 3.1 on, they are core profiles
 _OVERRIDES = ("MESA_GL_VERSION_OVERRIDE", "MESA_GLSL_VERSION_OVERRIDE")
 
 
@@ -42,7 +43,7 @@ def headless_offer(options: Mapping[str, Any]) -> Offer | None:
     for version in _TRIED:
         try:
             context = create(mode="standalone", glversion=version, **names)
-        except Exception:  # glcontext raises plain Exception
+        except Exception:  # glcontext raises Exception itself
             continue
         try:
             return offer_of(context.load("glGetString"))
@@ -82,7 +83,7 @@ def offer_text(offer: Offer, environment: Mapping[str, str] = os.environ) -> str
     version, language = _numbers(offer.version), _numbers(offer.language)
     forced = re.match(r"(\d)(\d\d)", environment.get(_OVERRIDES[1], ""))
     if forced:
-        # The override applies only to core profiles, and the driver may have none.
+        # The override applies only to core profiles, which the driver may not offer.
         language = min(language, (int(forced[1]), int(forced[2])))
     if version < _NEEDED:
         beside = f" with GLSL {_dotted(language, 2)}" if language < _NEEDED_LANGUAGE else ""

@@ -24,7 +24,7 @@ class Owner:
         self._stack = ExitStack()
 
     def keep(self, item: _Item) -> _Item:
-        """Take ownership of an object and return it."""
+        """Take ownership of an object, and return the object."""
         self._stack.callback(item.release)
         return item
 
@@ -46,7 +46,7 @@ class Kept(Generic[_Key, _Item]):
     """Cache of one item per object, keyed by identity and created on first use."""
 
     def __init__(self) -> None:
-        # The objects are kept alive, so that no other object can get the same id.
+        # References keep the objects alive, so that no other object can get the same id.
         self._items: dict[int, tuple[_Key, _Item]] = {}
 
     def __len__(self) -> int:

@@ -22,10 +22,10 @@ SHADING = {
     "parts": "Body parts as colours",
     "scalar": "Numbers as colours",
 }
-"""Chunks in ``shaders/shade``, with labels for menus."""
+"""Chunks in ``shaders/shade`` and their labels in menus."""
 
 SHADING_CHOICES = {"auto": "Blinn-Phong, or by material", **SHADING}
-"""Shadings that can be chosen, with labels for menus."""
+"""Available shadings and their labels in menus."""
 
 _NEEDS = re.compile(r"^#pragma needs ([\w ]+)\n")
 _INCLUDE = re.compile(r"^#pragma include (\w+)\s*$")
@@ -36,7 +36,7 @@ _PLACE = re.compile(r"(?:ERROR:\s*)?\b\d+[:(](\d+)\)?(?:\(\d+\))?\s*:\s*")
 
 
 def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> None:
-    """Set uniforms by name; uniforms that the compiler dropped as unused are skipped.
+    """Set uniforms by name; uniforms that the compiler removed as unused are skipped.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def set_uniforms(program: moderngl.Program, values: Mapping[str, object]) -> Non
         uniform = program.get(name, None)
         if isinstance(uniform, moderngl.Uniform):
             if isinstance(value, bytes):
-                # Compilers drop the end of an array that is unused.
+                # Compilers remove the unused end of an array.
                 uniform.write(value[: 4 * uniform.dimension * uniform.array_length])
             else:
                 uniform.value = value
@@ -98,7 +98,8 @@ class Programs:
         affine : bool
             Whether joints may scale or shear, for vertex shaders that skin.
         summed : bool
-            Whether pose correctives were summed before, for vertex shaders that skin instances.
+            Whether pose correctives have already been summed, for vertex shaders that skin
+            instances.
         materials : bool
             Whether surfaces have more than a base colour texture, see ``include/surface.glsl``.
         effects : tuple of str
@@ -186,7 +187,7 @@ def _compose(name: str, chunk: str, files: list[str], defines: tuple[str, ...] =
     """Return a shader's text with its chunk and includes, with line numbers of the original files.
 
     Line numbers also encode the file, as ``_LINES_PER_FILE`` times its index in ``files``, since
-    Mesa drops the source number after parsing.
+    Mesa discards the source number after parsing.
     """
     base = len(files) * _LINES_PER_FILE
     files.append(name)
@@ -224,7 +225,8 @@ def _chunk(folder: str, chunk: str, files: list[str]) -> str:
         parts.append(_chunk(folder, name, files))
         parts.append(f"#undef {folder}\n")
     if needs:
-        inner = f"\n{inner[needs.end() :]}"  # keep the line, so that line numbers stay correct
+        # Preserve the line break, so that line numbers stay correct.
+        inner = f"\n{inner[needs.end() :]}"
     inner = _INCLUDES.sub("", inner)
     parts.append(f"#line {len(files) * _LINES_PER_FILE + 1}\n{inner}\n")
     files.append(f"{folder}/{chunk}.glsl")

@@ -26,7 +26,8 @@ __all__ = ["WAYS", "RestBuffers"]
 WAYS = ("texture", "product")
 """Methods of summing pose correctives."""
 
-_MOST_TEXELS = 24 << 20  # offsets in a texture, 12 bytes each; more are summed on the processor
+# Maximum number of offsets in a texture, 12 bytes each; more are summed on the CPU.
+_MOST_TEXELS = 24 << 20
 
 
 class RestBuffers:
@@ -125,7 +126,7 @@ class RestBuffers:
         Parameters
         ----------
         program : moderngl.Program
-            Attributes that its compiler dropped are omitted.
+            Attributes that it does not use are omitted.
         skin : SkinBuffers
             Influences.
         attached : bool

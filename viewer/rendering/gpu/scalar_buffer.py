@@ -39,7 +39,7 @@ class ScalarBuffer:
     range : (float, float)
         Lowest and highest value, in the unit given in ``SCALARS``.
     span : (float, float)
-        The same, or the typical range of a quantity with a robust range.
+        ``range``, or the typical range of a quantity with a robust range.
     name : str
         Name of the scalar quantity.
     version : int

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import picture_texture
@@ -30,7 +31,7 @@ SAMPLERS = {
 """Texture unit of each entry of ``TEXTURES``; skinning and effects use the other units."""
 
 _UNITS = tuple(SAMPLERS.values())
-_MOST_SETS = 3  # sets of texture coordinates that one figure's textures may use
+_MOST_SETS = 3  # maximum number of texture coordinate sets that one figure's textures may use
 _COLORS = ("base_texture", "emissive_texture", "shade_texture")  # sRGB
 _UNTEXTURED: dict[str, Any] = {
     "u_textured": False,
@@ -95,7 +96,7 @@ def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
     Parameters
     ----------
     mesh : Mesh
-        Sets that no texture uses are left out.
+        Sets that no texture uses are omitted.
     notes : list of str
         Receives a message if textures use more sets than can be drawn.
     """
@@ -130,7 +131,7 @@ def upload_surfaces(
     materials : sequence of Material
         Materials of one mesh.
     sets : sequence of int
-        Sets of texture coordinates that are drawn; textures of other sets are left out.
+        Sets of texture coordinates that are drawn; textures of other sets are omitted.
     notes : list of str
         Receives messages about limitations of the driver.
     owner : Owner
@@ -170,7 +171,7 @@ def _mirrored(image: Bytes, wrap: tuple[str, str]) -> Bytes:
     if wrap[0] == "mirror":
         image = np.concatenate([image, image[:, ::-1]], axis=1)
     if wrap[1] == "mirror":
-        # v = 0 is at the last row: there the image itself begins.
+        # v = 0 is at the last row, at which the unmirrored image begins.
         image = np.concatenate([image[::-1], image], axis=0)
     return image
 

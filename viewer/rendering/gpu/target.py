@@ -14,7 +14,7 @@ from viewer.rig.arrays import Bytes
 __all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
 
 
-_OPAQUE = 0xFF000000  # smallest opaque pixel as a little-endian number
+_OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian number
 
 
 def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:

@@ -17,7 +17,7 @@ __all__ = ["Waiter"]
 
 
 class Waiter:
-    """Submits the driver's queued work, and waits for it.
+    """Submission of work to the driver, and waiting for its completion.
 
     Parameters
     ----------

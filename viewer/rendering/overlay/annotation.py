@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_layout import lay_out
 from viewer.rendering.overlay.lettering import Lettering
 from viewer.rendering.overlay.segments import Segments, SegmentStyle
@@ -28,7 +28,7 @@ __all__ = [
 LABEL_COLOR = (0.97, 0.97, 0.98)
 """Default label colour, sRGB."""
 
-_LETTERS = 17.0  # height in an image of standard height, pixels
+_LETTERS = 17.0  # text height in an image of standard height, pixels
 _GAP = 7.0  # pixels between a point and its label
 _LEADER, _BENEATH = 1.3, 2.6  # widths of a leader line and of its dark outline, pixels
 _RIM = 5.0  # pixels between a point and the start of its leader line
@@ -46,8 +46,8 @@ class Labels:
     points : (N, 3)
         Labelled points, scene space.
     ranks : (N,) int
-        Labels with lower ranks take precedence if there is no room for all, even across
-        annotations; among equal ranks, labels of nearer points do.
+        If there is no room for all labels, lower ranks take precedence, even across annotations;
+        among equal ranks, nearer points do.
     colors : (N, 3)
         Colours of the text, sRGB, 0 to 1.
     """
@@ -182,7 +182,7 @@ def leader_lines(placed: PlacedLabels, view: View, size: tuple[int, int]) -> Seg
     led, scale = placed.has_line, picture_scale(size)
     points, to = placed.points[led], placed.ends[led]
     pixels = project(view, size, points).pixels
-    # The point's own dot must not be covered.
+    # The dot of the point must not be covered.
     pixels = pixels + scale * _RIM * unit(to - pixels)
     starts, ends = (unproject(view, size, points, places) for places in (pixels, to))
     colors = np.hstack([placed.colors[led], np.ones((len(starts), 1))])

@@ -24,10 +24,10 @@ __all__ = [
 ]
 
 _DEPTH = 0.2  # distance of the image planes, relative to the size of the scene
-_WIDTH = 1.8  # pixels
+_WIDTH = 1.8  # width of lines, pixels
 _COLOR = (0.10, 0.13, 0.18, 0.95)  # sRGB and opacity
-_TICK = 0.22  # height of the mark above a frustum's upper side, relative to the side
-_RANK = 1  # joint names and findings come first
+_TICK = 0.22  # height of the mark above a frustum's upper side, relative to the length of the side
+_RANK = 1  # rank of the labels: joint names and findings take precedence
 
 
 def frustum_depth(box: Floats) -> float:

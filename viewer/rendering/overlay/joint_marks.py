@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
 from viewer.rendering.projection import picture_scale, project, project_segments
@@ -17,7 +17,7 @@ from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 from viewer.rig.srgb import encode_srgb
 
@@ -35,12 +35,13 @@ HIGHLIGHT = (1.0, 0.77, 0.16, 1.0)
 """Colour of the selected joint, sRGB and opacity."""
 
 _AXIS_COLORS = ((0.95, 0.36, 0.33), (0.42, 0.83, 0.36), (0.36, 0.58, 1.0))  # x, y, z; sRGB
-_AXIS_FRACTION = 0.4  # fraction of the distance to the nearest connected joint
-_AXIS_LIMITS = 0.005, 0.05  # fraction of the skeleton's size
-_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # pixels, for an image of standard height
+_AXIS_FRACTION = 0.4  # length of axes, as a fraction of the distance to the nearest connected joint
+# Minimum and maximum length of axes, as fractions of the skeleton's size.
+_AXIS_LIMITS = 0.005, 0.05
+_DOT, _BONE, _AXIS = 7.0, 3.0, 2.0  # diameter and widths in an image of standard height, pixels
 _OUTLINE = 2.0
 _DARK = (0.05, 0.06, 0.08, 0.85)
-_DOT_REACH, _BONE_REACH = 8.0, 4.0  # pixels
+_DOT_REACH, _BONE_REACH = 8.0, 4.0  # maximum distances from the pointer, pixels
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,8 +82,7 @@ def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
         skeleton, pose = actor.figure.skeleton, actor.pose
         if skeleton is None or pose is None or not actor.is_drawn:
             continue
-        shape = shaped(actor.figure, pose.shape_weights).skeleton
-        assert shape is not None  # applying a shape keeps the skeleton
+        shape = shaped_skeleton(actor.figure, pose.shape_weights)
         placement = actor.placement @ placement_matrix(pose)
         matrices = placement @ posed_skeleton(shape, pose).world
         found.append(JointMarks(index, skeleton, matrices))

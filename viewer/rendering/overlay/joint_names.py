@@ -13,7 +13,7 @@ from viewer.rig.skeleton import joint_labels, shown_joints
 
 __all__ = ["name_labels"]
 
-_LONGEST = 40  # characters of a name
+_LONGEST = 40  # maximum number of characters of a name
 _LATE = 1000  # rank of unselected joints, so that other labels take precedence
 
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_cells import Dots
 from viewer.rig.arrays import Bools, Floats, Ints
 
@@ -32,11 +32,11 @@ _WAYS = np.array(
 _REACHES = (1.0, 3.0, 5.0)
 """Distances of labels from their points, in gaps; all but the first have a leader line."""
 
-_ALIKE = 1.0  # pixels; labels of points closer than this may have the same place
-# Minimum distance of a label from other points: times its distance from its own point, or in gaps
-# for a label with a leader line.
+_ALIKE = 1.0  # pixels; labels of points closer than this may have the same position
+# Minimum distance of a label from other points, as a multiple of its distance from its own point,
+# or in gaps for a label with a leader line.
 _CLEARER = 1.5
-_FREE = 3.0  # the same for a position with plenty of room
+_FREE = 3.0  # the same distance for a position with plenty of room
 _BESIDE_LINE = 0.75  # minimum distance of a leader line from other points, in gaps
 
 
@@ -47,9 +47,9 @@ class Places:
     Attributes
     ----------
     labels : (M,)
-        Index of the label to which each place belongs.
+        Index of the label to which each position belongs.
     ranks : (M,)
-        Preference of the place, lower is better.
+        Preference of the position, lower is better.
     anchors : (M, 2)
         The labels' points, pixels.
     low, high : (M, 2)
@@ -59,7 +59,7 @@ class Places:
     own : (M,)
         Distance between these two points, pixels.
     has_line : (M,) bool
-        Whether the place needs a leader line.
+        Whether the position requires a leader line.
     """
 
     labels: Ints
@@ -72,7 +72,7 @@ class Places:
     has_line: Bools
 
     def take(self, rows: NDArray[np.integer[Any]]) -> Places:
-        """Return a selection of the places."""
+        """Return a selection of the positions."""
         return Places(
             self.labels[rows],
             self.ranks[rows],
@@ -86,7 +86,7 @@ class Places:
 
 
 def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float) -> Places:
-    """Return all candidate places of labels that lie within an image.
+    """Return all candidate positions of labels that lie within an image.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
     ways = np.tile(_WAYS, (len(_REACHES), 1))
     nearest = anchors[:, None] + gap * np.repeat(_REACHES, len(_WAYS))[:, None] * ways
     low = np.rint(nearest - 0.5 * (1.0 - np.sign(ways)) * sizes[:, None])
-    # Labels straight above, below or beside their point may be shifted to stay in the image.
+    # Labels straight above, below or next to their point may be shifted to stay in the image.
     room = np.maximum(np.array(picture) - sizes, 0)[:, None]
     low = np.where(ways == 0.0, np.clip(low, 0.0, room), low)
     is_inside = (low >= 0.0) & (low + np.maximum(sizes, 1)[:, None] <= picture)
@@ -116,12 +116,12 @@ def places_of(anchors: Floats, sizes: Ints, picture: tuple[int, int], gap: float
 
 
 def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
-    """Return a mask of places certainly too close to other points, or over their own: (M,).
+    """Return a mask of positions certainly too close to other points, or over their own: (M,).
 
     Parameters
     ----------
     places : Places
-        Candidate places within the image.
+        Candidate positions within the image.
     anchors : (N, 2)
         The labels' points, pixels.
     dots : Dots
@@ -133,7 +133,7 @@ def crowded(places: Places, anchors: Floats, dots: Dots, gap: float) -> Bools:
     more = 0.7 * _least(places, gap)[:, None]
     around = dots.most_within(anchors - _ALIKE, anchors + _ALIKE)
     found = dots.fewest_within(places.low - more, places.high + more)
-    # With gaps of less than a pixel, a place may also be over its own point.
+    # With gaps of less than a pixel, a label may also be over its own point.
     return np.asarray((found > around[places.labels]) | (places.own == 0.0))
 
 
@@ -143,7 +143,7 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
     Parameters
     ----------
     places : Places
-        Candidate places within the image.
+        Candidate positions within the image.
     gap : float
         Pixels between a point and its label.
 
@@ -152,7 +152,7 @@ def line_pixels(places: Places, gap: float) -> tuple[Ints, Bools]:
     pixels : (M, S, 2)
         Column and row of the pixels, starting from the point.
     are_part : (M, S) bool
-        Whether each pixel belongs to the line; places without a line have none.
+        Whether each pixel belongs to the line; positions without a line have none.
     """
     start, length = places.anchors[:, None], places.own[:, None]
     steps = np.arange(0.5 * gap, places.own.max(initial=0.0))
@@ -168,7 +168,7 @@ def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap
     Parameters
     ----------
     places : Places
-        Places to which the lines lead.
+        Positions to which the lines lead.
     pixels, are_part : (M, S, 2), (M, S) bool
         Result of ``line_pixels``.
     dots : Dots
@@ -187,12 +187,12 @@ def crowded_lines(places: Places, pixels: Ints, are_part: Bools, dots: Dots, gap
 
 
 def clear_places(places: Places, dots: Dots, gap: float) -> Places:
-    """Return the places that are far enough from other points, best first for each label.
+    """Return the positions that are far enough from other points, best first for each label.
 
     Parameters
     ----------
     places : Places
-        Candidate places within the image.
+        Candidate positions within the image.
     dots : Dots
         All points.
     gap : float
@@ -204,19 +204,19 @@ def clear_places(places: Places, dots: Dots, gap: float) -> Places:
         clear = np.minimum(clear, nearest)
         rows = np.flatnonzero((clear >= _least(places, gap)) & (beside_line >= _BESIDE_LINE * gap))
         places, clear = places.take(rows), clear[rows]
-    # Places with plenty of room come first, then crowded ones, then those with leader lines.
+    # Positions with plenty of room come first, then crowded ones, then those with leader lines.
     is_free = ~places.has_line & (clear >= _FREE * places.own)
     order = np.lexsort((places.ranks, places.has_line, ~is_free, places.labels))
     return places.take(order)
 
 
 def _least(places: Places, gap: float) -> Floats:
-    """Return the minimum distance of places from other points, pixels: (M,)."""
+    """Return the minimum distance of positions from other points, pixels: (M,)."""
     return _CLEARER * np.where(places.has_line, gap, places.own)
 
 
 def _clearances(places: Places, dots: Dots, layer: int, gap: float) -> tuple[Floats, Floats]:
-    """Return distances of the nearest other points from places and lines: (M,), inf if far."""
+    """Return distances of the nearest other points from positions and lines: (M,), inf if far."""
     reach = np.where(places.has_line, _CLEARER * gap, _FREE * places.own)[:, None]
     low = np.minimum(places.low - reach, places.anchors - _BESIDE_LINE * gap)
     high = np.maximum(places.high + reach, places.anchors + _BESIDE_LINE * gap)

@@ -11,10 +11,10 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Cells", "Dots", "summed", "sums_within"]
 
-_FINE = 4  # subdivisions of a pixel per axis; each keeps at most one dot
-_BLOCK = 4  # cells per axis
-_DENSE = 8  # mean number of dots per block from which they are split into layers
-_PAIRS = 1 << 18  # pairs of a rectangle and a dot per batch
+_FINE = 4  # subdivisions of a pixel per axis; each contains at most one dot
+_BLOCK = 4  # number of cells per axis of a block
+_DENSE = 8  # mean number of dots per block above which dots are split into layers
+_PAIRS = 1 << 18  # number of pairs of a rectangle and a dot per batch
 
 
 class Cells:
@@ -35,7 +35,8 @@ class Cells:
 
     def __init__(self, picture: tuple[int, int], side: int) -> None:
         self.side = side
-        self._counts = np.array([-(-length // side) for length in picture])  # columns, rows
+        # Numbers of columns and rows.
+        self._counts = np.array([-(-length // side) for length in picture])
         self.shape = int(self._counts[1]) + 2, int(self._counts[0]) + 2
 
     def of(self, points: Floats) -> Ints:
@@ -112,7 +113,7 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Number of layers; the few dots of the first are enough to reject most crowded places."""
+        """Number of layers; the few dots of the first suffice to reject most crowded positions."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:
@@ -176,7 +177,8 @@ def _levels(places: Ints) -> Ints:
 
 def _firsts(rows: Floats | Ints) -> Ints:
     """Return the indices of the first occurrence of each distinct row of two integers: (M,)."""
-    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]  # sorts faster than rows
+    # Complex numbers are sorted faster than rows.
+    pairs = rows.astype(np.float64).view(np.complex128)[:, 0]
     return np.unique(pairs, return_index=True)[1].astype(np.int32)
 
 

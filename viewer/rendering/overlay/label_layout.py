@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_candidates import (
     Places,
     clear_places,
@@ -21,10 +21,11 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Layout", "lay_out"]
 
-_FEWEST, _MOST = 256, 1024  # labels per batch: the first batch, and the limit of later batches
+_FEWEST, _MOST = 256, 1024  # number of labels in the first batch, and maximum of later batches
 _CELL = 0.5  # side length of a cell in gaps, unless this gives too many cells
-_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000  # more cells cost more than they save
-_SAMPLES = 5  # columns of a label that are tested first; they detect most overlaps
+# Maximum numbers of cells, above which a grid costs more than it saves.
+_CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000
+_SAMPLES = 5  # number of columns of a label that are tested first; they detect most overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,7 +37,7 @@ class Layout:
     chosen : (M,)
         Indices of the placed labels, in the order of placement.
     corners : (M, 2)
-        Their top left corners, integer pixels.
+        Top left corners of the labels, integer pixels.
     ends : (M, 2)
         Point on each label that is nearest to the labelled point, pixels.
     has_line : (M,) bool
@@ -58,9 +59,9 @@ def lay_out(
 ) -> Layout:
     """Place labels next to their points in order, and omit those without room.
 
-    A label is placed right or left of its point, diagonally, above or below, where there is the
-    most room; otherwise at a distance, with a leader line. It is never closer to another point than
-    to its own; distances are accurate to a quarter of a pixel.
+    A label is placed right or left of its point, diagonally, above or below, whichever position has
+    the most room; otherwise at a distance, with a leader line. It is never closer to another point
+    than to its own; distances are accurate to a quarter of a pixel.
 
     Parameters
     ----------
@@ -83,7 +84,7 @@ def lay_out(
     ends, has_line = [np.zeros((0, 2))], [np.zeros(0, np.bool_)]
     for some in _portions(order):
         places = places_of(anchors[some], sizes[some], picture, gap)
-        # Vectorized rejection of most places that overlap others.
+        # Vectorized rejection of most positions that overlap others.
         may = np.flatnonzero(~crowded(places, anchors[some], dots, gap))
         places = places.take(may[taken.may_be_open(places.low[may], places.high[may])])
         places = places.take(_with_free_lines(places, taken, dots, gap))
@@ -100,7 +101,7 @@ def lay_out(
 
 
 def _portions(order: Ints) -> Iterator[Ints]:
-    """Yield batches of growing size: the more labels are placed, the fewer places remain open."""
+    """Yield batches of growing size, as fewer positions remain free for later labels."""
     first, count = 0, _FEWEST
     while first < len(order):
         yield order[first : first + count]
@@ -108,7 +109,7 @@ def _portions(order: Ints) -> Iterator[Ints]:
 
 
 def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> Ints:
-    """Return the indices of places that need no leader line or have a clear path for it: (M,)."""
+    """Return the indices of positions without a leader line or with a clear path for it: (M,)."""
     rows = np.flatnonzero(places.has_line)
     led = places.take(rows)
     pixels, are_part = line_pixels(led, gap)
@@ -118,10 +119,11 @@ def _with_free_lines(places: Places, taken: _Taken, dots: Dots, gap: float) -> I
 
 
 def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
-    """Choose the first open place of each label; return indices of places: (M,)."""
+    """Choose the first free position of each label; return indices of positions: (M,)."""
     found: list[int] = []
     settled = -1  # the most recently placed label
-    closed: set[tuple[int, ...]] = set()  # occupied places, shared by labels of coincident points
+    # Occupied positions, shared by labels of coincident points.
+    closed: set[tuple[int, ...]] = set()
     pixels, are_part = line_pixels(places, gap)
     corners = list(map(tuple, np.hstack([places.low, places.high]).tolist()))
     for row, label in enumerate(places.labels.tolist()):
@@ -141,13 +143,13 @@ def _settle(places: Places, taken: _Taken, gap: float) -> Ints:
 class _Taken:
     """Mask of the pixels occupied by labels and lines.
 
-    ``picture``: width and height, pixels.
-    ``gap``: pixels between a point and its label.
+    ``picture`` is the width and height, pixels; ``gap`` is the number of pixels between a point and
+    its label.
     """
 
     def __init__(self, picture: tuple[int, int], gap: float) -> None:
         self._pixels = np.zeros(picture[::-1], dtype=np.bool_)
-        # Half a gap is kept free on both sides, so that adjacent labels do not read as one.
+        # Half a gap stays free on both sides, so that adjacent labels are not read as one.
         self._apart = round(0.5 * gap)
 
     def may_be_open(self, low: Ints, high: Ints) -> Bools:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.palettes import NOTHING
 from viewer.rendering.scalar_look import TYPICAL, ScalarLook
 from viewer.rig.arrays import Bytes, Floats
@@ -193,7 +194,7 @@ def _bar(name: str, title: str, shown: Sequence[Shown]) -> Legend:
 
 
 def _counts(title: str, shown: Sequence[Shown]) -> Legend:
-    """Return the legend of a count: one block per number, starting at the lowest present."""
+    """Return the legend of a count: one block per number, starting at the lowest number present."""
     first = min(int(one.numbers.min()) for one in shown)
     colors = shown[0].look.colors[first:]
     step = -(-len(colors) // _MOST_COUNTS)

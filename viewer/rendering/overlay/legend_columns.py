@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+
+from viewer.data_classes import dataclass
 
 __all__ = ["LegendColumns", "legend_columns"]
 
@@ -43,7 +44,7 @@ def legend_columns(widths: Sequence[float], rows: int, width: float) -> LegendCo
     rows : int
         Maximum number of lines per column, 1 or more.
     width : float
-        Maximum total width of all columns, in the same unit. The first column is kept even if it is
+        Maximum total width of all columns, in the same unit. The first column is used even if it is
         wider.
 
     Returns

@@ -17,15 +17,15 @@ if TYPE_CHECKING:
 
 __all__ = ["legend_pixels"]
 
-_SIZES = 9, 40  # height of letters, pixels: smallest and largest
+_SIZES = 9, 40  # minimum and maximum text height, pixels
 _LETTERS_PER_HEIGHT, _LETTERS_PER_WIDTH = 40.0, 46.0
 _SMALLER = 0.6  # factor to which the text height of many items may shrink
 _MOST = 0.9  # maximum fraction of the image's width and height
 # Fractions of the image's width for several columns. Figures are in the middle, so the text
 # shrinks before the columns use more than the first fraction.
 _WIDE, _WIDER = 0.3, 0.45
-_LONGEST = 40  # characters of a name
-_BAR = 14.0  # width, in text heights
+_LONGEST = 40  # maximum number of characters of a name
+_BAR = 14.0  # width of the bar, in text heights
 _PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 190), (12, 12, 14)
 
 
@@ -59,7 +59,7 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
 
 
 class _Drawing:
-    """Layout of a legend from top to bottom: lines of text, a bar or columns of swatches."""
+    """Layout of a legend, from top to bottom: lines of text, then a bar or columns of swatches."""
 
     def __init__(
         self, legend: Legend, letters: int, size: tuple[int, int], fraction: float

@@ -12,7 +12,7 @@ from viewer.rig.arrays import Bytes, Ints
 __all__ = ["Lettering", "shelves"]
 
 _RIM = 2  # width of the outline, pixels
-_WIDEST = 2048  # pixels; longer strings are truncated
+_WIDEST = 2048  # maximum width of a string, pixels; longer strings are truncated
 _MOST = 4000  # maximum number of cached strings
 _DARK = 205  # opacity of the outline, 0 to 255
 

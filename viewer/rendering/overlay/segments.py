@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["HIDDEN", "SegmentPass", "SegmentStyle", "Segments", "dots", "joined"]
 
 HIDDEN = 0.4
-"""Default opacity of parts behind a surface."""
+"""Default opacity of segments behind a surface."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -48,7 +48,7 @@ class SegmentStyle:
     Attributes
     ----------
     on_top : bool
-        Whether they are drawn over everything drawn before.
+        Whether segments are drawn over everything drawn before.
     hidden : float
         Opacity of hidden parts, 0 to 1.
     lift : float

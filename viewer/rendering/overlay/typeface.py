@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Typeface", "interface_font", "system_fonts"]
 
-# One font of each group is used; the first that is installed.
+# Of each group, the first installed font is used.
 _GROUPS = (
     (
         "NotoSansCJK-Regular.ttc",
@@ -198,7 +198,7 @@ def _opened(letters: int) -> Iterator[Font]:
 
 
 def _glyph(font: Font, letter: str) -> tuple[object, bytes]:
-    """Return a key of a letter's picture: a font draws all missing letters alike."""
+    """Return a key of a letter's picture, which is the same for all letters that a font lacks."""
     mask = font.getmask(letter)
     return mask.size, bytes(mask)
 

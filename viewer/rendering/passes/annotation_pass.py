@@ -17,7 +17,7 @@ __all__ = ["AnnotationPass"]
 
 
 class AnnotationPass:
-    """Draws annotations over the bound framebuffer's contents.
+    """Pass that draws annotations over the contents of the bound framebuffer.
 
     Parameters
     ----------

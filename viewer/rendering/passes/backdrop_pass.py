@@ -1,4 +1,4 @@
-"""Drawing of the studio, out of focus, behind the scene."""
+"""Pass that draws the studio, out of focus, behind the scene."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from viewer.rendering.view import View, set_lights
 
 __all__ = ["BackdropPass"]
 
-_PARALLEL_FOV = 35.0  # degrees: parallel rays would all show the same point
+_PARALLEL_FOV = 35.0  # degrees, for parallel projections, whose rays would all show the same point
 
 
 class BackdropPass:
-    """Draws the studio.
+    """Pass that draws the studio.
 
     Parameters
     ----------

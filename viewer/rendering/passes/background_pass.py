@@ -20,7 +20,8 @@ _CLEARED = {
     "transparent": (0.0, 0.0, 0.0, 0.0),
     "environment": (0.0, 0.0, 0.0, 0.0),  # drawn by another pass
 }
-_MOST_PIXELS = 1 << 23  # larger gradients are drawn each time, to save memory
+# Maximum size of a stored gradient; larger ones are drawn each time, to save memory.
+_MOST_PIXELS = 1 << 23
 
 
 def parse_color(text: str) -> tuple[float, float, float]:
@@ -84,8 +85,7 @@ class BackgroundPass:
         if self._picture is not None and self._picture.size != size:
             self._picture.release()
             self._picture = None
-        # The first image of a size is often the only one, as while resizing or when rendering a
-        # file.
+        # The first image of a size is often the only one, for instance while a window is resized.
         if self._picture is None and size == self._last_size and size[0] * size[1] <= _MOST_PIXELS:
             self._picture = _Picture(self.context, self.programs, size)
             with self.context.scope(self._picture.framebuffer):

@@ -1,8 +1,8 @@
 """Order of blended triangles: runs and the triangles within each, from the farthest to the nearest.
 
-The place of a triangle is its posed centroid. The order is therefore correct except for triangles
+Triangles are sorted by their posed centroids. The order is therefore correct except for triangles
 that intersect or overlap cyclically, and for interleaved materials, which are drawn one after the
-other. The posed vertices are read back when the pose changes, and sorted when the view does.
+other. The posed vertices are read back when the pose changes, and sorted when the view changes.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ __all__ = ["SortedTriangles"]
 
 
 class SortedTriangles:
-    """Blended triangles in an index buffer of their own, sorted.
+    """Blended triangles in a separate index buffer, sorted.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ class SortedTriangles:
             for start, part in zip(starts, parts, strict=True)
         ]
         data = np.ascontiguousarray(self._triangles[np.concatenate(order)], "u4").tobytes()
-        # Vertex arrays that use the buffer remain valid when it is given another size.
+        # Vertex arrays that use the buffer remain valid when it is resized.
         self.indices.orphan(len(data))
         self.indices.write(data)
         farthest = np.argsort([part.mean() for part in parts], kind="stable").tolist()

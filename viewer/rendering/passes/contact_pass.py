@@ -7,11 +7,11 @@ them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.passes.shadow_pass import parallel_view
@@ -20,10 +20,10 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["Contact", "ContactPass"]
 
-_SIZE = 256  # texels on each side
+_SIZE = 256  # texels on each side of the field
 _NEAR, _FAR = 0.04, 0.35  # upper ends of contact and ambient shadow, figure sizes
-_BELOW = 0.05  # depth to which feet may sink into the ground, likewise
-_NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, likewise
+_BELOW = 0.05  # depth to which feet may sink into the ground, figure sizes
+_NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, figure sizes
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Contact:
 
 
 class ContactPass:
-    """Draws heights from below the ground, and blurs them.
+    """Pass that draws heights as seen from below the ground, and blurs them.
 
     Parameters
     ----------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import moderngl
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs
@@ -23,7 +24,7 @@ __all__ = ["GHOST_COLOR", "STYLES", "Ghost", "GhostPass"]
 GHOST_COLOR = (0.10, 0.42, 0.85)
 """Default colour of ghosts, linear."""
 
-_NEARER = (-2.0, -4.0)  # polygon offset: factor and units
+_NEARER = (-2.0, -4.0)  # factor and units of the polygon offset
 
 STYLES = ("solid", "translucent", "wireframe")
 

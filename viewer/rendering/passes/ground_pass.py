@@ -58,7 +58,8 @@ class GroundPass:
         view : View
             The camera's matrices.
         box : (2, 3)
-            Bounds of the objects on the ground, scene space, which define height, step and extent.
+            Bounds of the objects on the ground, scene space, which define the grid's height, step
+            and extent.
         background : str
             Background of the image; lines are light on a dark background.
         """

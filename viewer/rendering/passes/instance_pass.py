@@ -28,8 +28,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
 
     Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
     translucent actors, actors with hidden parts, and meshes that are drawn several times per
-    frame, in the bind pose or coloured by a scalar. Where back faces are culled, the actors of a
-    group are all mirrored or all not, and joints that are mirrored are drawn singly.
+    frame, in the bind pose or coloured by a scalar. If back faces are culled, either all or none of
+    the actors of a group are mirrored, and actors with mirrored joints are drawn individually.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
 
 
 def _has_single_sides(actor: Actor) -> bool:
-    """Return whether back faces of some material are not drawn."""
+    """Return whether the back faces of at least one material are not drawn."""
     return any(not material.double_sided for material in actor.figure.require_mesh().materials)
 
 

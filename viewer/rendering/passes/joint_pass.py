@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints
 from viewer.rig.skinning import deform
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
 
 _HIGHLIGHT = (1.0, 0.55, 0.02)  # linear
-_CUBE_SIZE = 0.015  # fraction of the skeleton's size, for a skeleton without boxes
+_CUBE_SIZE = 0.015  # size of the cubes of a skeleton without boxes, as a fraction of its size
 _WORLD_UNIT = 0
 _CUBE_VERTICES = 36
 
@@ -49,7 +49,7 @@ class SkeletonBuffers:
         self._key: tuple[NumberKey, bool] | None = None
 
     def style(self, options: DisplayOptions) -> str:
-        """Return the style of the drawn skeleton, as ``bone_style``."""
+        """Return the style of the drawn skeleton; see ``bone_style``."""
         from viewer.rendering.passes.bone_style import bone_style
 
         return bone_style(self.figure.require_skeleton(), options)
@@ -85,8 +85,7 @@ class SkeletonBuffers:
         """
         if self.is_current(pose, options):
             return
-        skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # applying a shape keeps the skeleton
+        skeleton = shaped_skeleton(self.figure, pose.shape_weights)
         are_boxes = self.style(options) == "boxes"
         # Bones need the matrices of all joints, as they reach from one joint to another.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)

@@ -19,7 +19,7 @@ from viewer.rig.skinning import Skinning
 
 __all__ = ["KeypointBuffers", "KeypointPass"]
 
-_CUBE_SIZE = 0.006  # half the side length, relative to the figure's size
+_CUBE_SIZE = 0.006  # half the side length of a cube, relative to the figure's size
 
 
 class KeypointBuffers:

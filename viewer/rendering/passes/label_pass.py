@@ -16,8 +16,9 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["LabelPass"]
 
-_WIDTH, _TALLEST = 2048, 4096  # pixels of the texture; every OpenGL 3.3 driver supports this size
-_MOST = 1000  # number of texts up to which unused texts are kept in the texture
+# Maximum size of the texture, pixels, which every OpenGL 3.3 driver supports.
+_WIDTH, _TALLEST = 2048, 4096
+_MOST = 1000  # number of texts up to which unused texts stay in the texture
 
 
 class LabelPass:

@@ -164,7 +164,7 @@ class LatePasses:
 
     @cached_property
     def backdrop_pass(self) -> BackdropPass:
-        """Draws the studio behind the scene."""
+        """Pass that draws the studio behind the scene."""
         from viewer.rendering.passes.backdrop_pass import BackdropPass
 
         backdrop = BackdropPass(self._context, self._programs, self.studio)
@@ -172,7 +172,7 @@ class LatePasses:
         return backdrop
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
-        """Bind the textures that the shading of meshes needs in addition to the meshes' own."""
+        """Bind the textures that shading needs in addition to those of the meshes."""
         if options.shading == "matcap":
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):

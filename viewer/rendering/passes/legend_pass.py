@@ -11,7 +11,7 @@ from viewer.rendering.overlay.legend import Legend
 
 __all__ = ["LegendPass"]
 
-_MARGIN = 0.014  # fraction of the image height
+_MARGIN = 0.014  # margin of the legend, as a fraction of the image height
 
 
 class LegendPass:

@@ -40,7 +40,7 @@ SKIN_COLOR = (0.62, 0.60, 0.57)
 
 _EDGE_COLOR = (0.05, 0.07, 0.10, 0.55)  # sRGB and alpha
 _NORMAL_COLOR = (0.10, 0.75, 0.85, 1.0)
-_NORMAL_LENGTH = 0.02  # relative to the figure's size
+_NORMAL_LENGTH = 0.02  # length of drawn normals, relative to the figure's size
 _COLORMAP_UNIT = 6
 
 
@@ -118,7 +118,7 @@ class MeshPass:
     def _back_faces(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
     ) -> tuple[Region, ...] | None:
-        """Return where back faces can be seen; None for everywhere, as with hidden parts."""
+        """Return the regions with visible back faces; None for all, as with hidden parts."""
         if mesh.hidden_parts or options.hidden_parts or options.reduced:
             return None
         model_view = view.matrix @ placement
@@ -267,7 +267,7 @@ def fragment_macros(mesh: MeshBuffers, view: View, options: DisplayOptions) -> t
 
 
 def uses_materials(mesh: PosedMesh, options: DisplayOptions) -> bool:
-    """Return whether a mesh is drawn with its materials: scalar quantities replace them."""
+    """Return whether a mesh is drawn with its materials, which scalar quantities replace."""
     has_values = options.shading == "scalar" and mesh.scalars.look is not None
     return mesh.mesh.has_materials and not has_values
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import colorsys
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -26,7 +26,7 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 
 __all__ = ["Moment", "MotionPathBuffers", "MotionPathPass", "path_colors"]
 
-_WIDTH = 2.5  # pixels
+_WIDTH = 2.5  # width of the lines, pixels
 _HIDDEN = 0.3  # opacity of hidden parts
 _GOLDEN = 0.618033988749895
 
@@ -68,7 +68,7 @@ class MotionPathBuffers:
         key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
         if key == self._key or actor.clip is None:
             return
-        self._clip = actor.clip  # keeps the clip alive, so that its id is not reused
+        self._clip = actor.clip  # a reference keeps the clip alive, so that its id is not reused
         path = motion_path(
             actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
         )

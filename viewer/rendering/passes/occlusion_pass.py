@@ -20,7 +20,7 @@ _RADIUS = 0.09  # radius within which surfaces occlude, relative to a figure's s
 
 
 class OcclusionPass:
-    """Computes how much ambient light reaches each pixel, at half resolution.
+    """Pass that computes how much ambient light reaches each pixel, at half resolution.
 
     Parameters
     ----------

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.index_sets import MeshRun
@@ -30,9 +30,10 @@ __all__ = ["OutlinePass", "OutlineTools"]
 _COLORS = ((1.0, 0.66, 0.10), (0.80, 0.93, 1.0))
 """Outline colours of selected and hovered parts, sRGB."""
 _WIDTH = 2.0  # line width, pixels in an image of standard height
-_POINT = 9.0  # diameter of a point, likewise
-_TILE, _LEVEL = 16, 4  # side of the tiles of tile.vert, pixels; mipmaps with texels of that size
-_MOST = 12  # search radius around a mask, pixels
+_POINT = 9.0  # diameter of a point, pixels in an image of standard height
+# Side length of the tiles of tile.vert, pixels; mipmap level with texels of that size.
+_TILE, _LEVEL = 16, 4
+_MOST = 12  # maximum search radius around a mask, pixels
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,16 +31,17 @@ LEFT: Color = (0.05, 0.20, 0.75)
 MIDDLE: Color = (0.42, 0.42, 0.42)
 """Colours by side, linear; the actor's colour, if set, replaces MIDDLE."""
 
-_LARGEST = 0.012  # radius relative to the size of all points: 2 cm on a person
-_SMALLEST = 0.0015  # minimum of this radius: coincident points stay visible
+_LARGEST = 0.012  # maximum radius relative to the extent of all points: 2 cm on a person
+# Minimum radius relative to the same extent, so that coincident points stay visible.
+_SMALLEST = 0.0015
 _SPACING = 0.3  # maximum radius relative to the distance of the nearest point, for fingers
 _LIMB = 0.5  # radius of a limb relative to its thinner end
-_MANY = 1000  # points; comparing more of them pair by pair takes too much memory
-_CELLS = 48  # cells of a grid along the longest side of the points
-_SAMPLES = 32  # frames of a clip that determine the radii
+_MANY = 1000  # number of points above which comparing all pairs takes too much memory
+_CELLS = 48  # number of cells of a grid along the longest side of the points
+_SAMPLES = 32  # number of frames of a clip that determine the radii
 _CERTAIN = 0.999  # confidence above which a point is drawn opaque
 _FINE, _COARSE = (12, 3), (6, 1)  # subdivisions of a capsule: around, and from equator to pole
-_FLOATS = 11  # numbers of an instance
+_FLOATS = 11  # number of values per instance
 
 
 def point_radii(points: Floats) -> Floats:
@@ -79,7 +80,7 @@ def point_radii(points: Floats) -> Floats:
 
 
 def _gaps(places: Floats) -> Floats:
-    """Return the distance of each point (N, 3) from the nearest other one: (N,)."""
+    """Return the distance of each point (N, 3) from its nearest neighbour: (N,)."""
     apart = np.linalg.norm(places[:, None] - places[None], axis=2)
     apart[apart == 0.0] = np.inf
     return np.asarray(apart.min(axis=1))

@@ -34,8 +34,8 @@ def draw_runs(
 ) -> None:
     """Draw all opaque or all blended triangles, one material at a time.
 
-    Of blended triangles that are not sorted, the back faces are drawn first. Those of opaque ones
-    are only drawn in the regions ``back_faces``, if given.
+    Of blended triangles that are not sorted, the back faces are drawn first. Back faces of opaque
+    triangles are drawn only in the regions ``back_faces``, if given.
     """
     two_passes = blended and isinstance(indices, IndexSet)
     plain = {"u_metallic": options.metallic, "u_roughness": options.roughness}
@@ -66,7 +66,7 @@ def draw_shapes(
     instances: int = 1,
     is_mirrored: bool = False,
 ) -> None:
-    """Draw the shapes of all surfaces, cut out where their materials are.
+    """Draw the shapes of all surfaces, with the cutouts of their materials.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def draw_shapes(
     instances : int
         Number of instances.
     is_mirrored : bool
-        Whether the mesh is reflected, which turns its front faces over.
+        Whether the mesh is reflected, which reverses the winding of its front faces.
     """
     program = array.program
     has_materials = "u_alpha_mode" in program

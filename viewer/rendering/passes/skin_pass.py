@@ -37,7 +37,7 @@ from viewer.rig.skinning import METHODS, Skinning
 
 __all__ = ["PosedMesh", "skinning_options_key"]
 
-_BYTES_PER_VERTEX = 24  # position and normal, three float32 each
+_BYTES_PER_VERTEX = 24  # a position and a normal, of three float32 each
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
 
 
@@ -62,7 +62,7 @@ class PosedMesh:
     center : (3,)
         Origin of the positions in figure space; part of the model matrix.
     back_faces : BackFaces
-        Where back faces of the surface can be seen.
+        Regions in which back faces of the surface are visible.
     scalars : ScalarBuffer
         Values of a scalar quantity, computed when one is shown.
     hidden_parts : frozenset of int

@@ -11,10 +11,11 @@ slide on an ellipsoid, and each part of the spine bends into an arc of constant 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, rotation_vector_to_matrix
 
@@ -22,7 +23,7 @@ __all__ = ["DOF_NAMES", "JOINTS", "AnatomicalPosing", "dof_table"]
 
 _Z, _MINUS_Z = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 _X, _Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-_PINS = {  # rotations about x, y, z that take z to the axis of a hinge of the foot, in OpenSim
+_PINS = {  # rotations about x, y, z that rotate z to the axis of a foot hinge in OpenSim
     "ankle": (0.175895, -0.105208, 0.0186622),
     "subtalar_r": (-1.76818999, 0.906223, 1.8196000),
     "subtalar_l": (1.768189999, -0.906223, 1.8196000),
@@ -115,7 +116,7 @@ _RANKS = np.concatenate([np.arange(len(axes)) for _, axes, _ in _TABLE])
 # Joints whose frames are independent of the shape: the root and the ends of chains.
 _FIXED = [JOINTS.index(name) for name in ("pelvis", "toes_r", "toes_l", "head", "hand_r", "hand_l")]
 _ARCS = (("lumbar_body", "pelvis"), ("thorax", "lumbar_body"), ("head", "thorax"))
-_TILT = 0.25 * np.pi  # of the shoulder blades on their ellipsoid, at rest
+_TILT = 0.25 * np.pi  # angle of the shoulder blades on their ellipsoid at rest
 
 
 def dof_table() -> tuple[Ints, Ints]:
@@ -187,7 +188,7 @@ class AnatomicalPosing:
         return frames @ own @ np.swapaxes(frames, 1, 2)
 
     def translations(self, dofs: Floats) -> Floats:
-        """Return the displacement of joints from rest, in their parents: (..., 24, 3)."""
+        """Return the displacement of joints from rest in parent space: (..., 24, 3)."""
         found = np.zeros((*dofs.shape[:-1], len(JOINTS), 3))
         joint = {name: self.joints[row] for row, name in enumerate(JOINTS)}
         number = {name: dofs[..., row] for row, name in enumerate(DOF_NAMES)}
@@ -234,7 +235,7 @@ def _arc(angle: Floats, length: float) -> tuple[Floats, Floats]:
 
 
 def _shortest_rotations(source: Floats, target: Floats) -> Floats:
-    """Return the rotations that align vectors (J, 3); none where a vector is 0."""
+    """Return the rotations that align vectors (J, 3); the identity for zero vectors."""
     with np.errstate(invalid="ignore", divide="ignore"):
         a = source / np.linalg.norm(source, axis=1, keepdims=True)
         b = target / np.linalg.norm(target, axis=1, keepdims=True)

@@ -1,4 +1,4 @@
-"""Joints that follow their DOFs by rules other than Euler angles."""
+"""Joints whose DOFs are not Euler angles but parameters of other rules."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ __all__ = ["JointPosing"]
 
 
 class JointPosing(Protocol):
-    """Rules that take the place of a skeleton's rotation DOFs about x, y and z; immutable."""
+    """Rules that replace the rotation DOFs of a skeleton about x, y and z; immutable."""
 
     def rotations(self, dofs: Floats) -> Floats:
-        """Return the rotation of each joint relative to its rest: (..., J, 3, 3) for (..., D)."""
+        """Return each joint's rotation relative to its rest: (..., J, 3, 3) for (..., D)."""
 
     def translations(self, dofs: Floats) -> Floats:
         """Return the translation of each joint relative to its parent: (..., J, 3)."""

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose, joint_rotations
 from viewer.rig.skeleton import Skeleton
@@ -20,8 +19,8 @@ class MappedFeature:
     Attributes
     ----------
     targets : tuple of J int
-        Joint of the other model that each joint drives; 0, its root, drives nothing. Of several
-        joints with the same target, the last one counts.
+        Joint of the other model that each joint drives; 0, its root, drives nothing. If several
+        joints have the same target, the last one drives it.
     n_targets : int
         Number of joints of the other model.
     """

@@ -8,10 +8,9 @@ Each joint has seven parameters: translation, rotation about x, y and z in this 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.pose import Pose
@@ -20,14 +19,14 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["PER_JOINT", "ModelParameters", "driven_dofs"]
 
 PER_JOINT = 7
-"""Parameters of a joint."""
+"""Number of parameters of a joint."""
 
-_SCALE = 6  # index of the scale among them
+_SCALE = 6  # index of the scale among the parameters of a joint
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelParameters:
-    """The parameters that pose and scale a figure.
+    """Parameters that pose and scale a figure.
 
     Attributes
     ----------
@@ -50,7 +49,7 @@ class ModelParameters:
         return len(self.names)
 
     def apply(self, skeleton: Skeleton, pose: Pose, values: Floats) -> None:
-        """Set DOFs, translations and scales of a pose, in place.
+        """Set the DOFs, translations and scales of a pose in place.
 
         Parameters
         ----------
@@ -76,7 +75,7 @@ class ModelParameters:
 
 
 def driven_dofs(transform: Floats) -> tuple[Ints, Ints]:
-    """Return joint and kind of each joint parameter, except scales, that can be nonzero.
+    """Return the joint and kind of each joint parameter that can be nonzero, except scales.
 
     Parameters
     ----------

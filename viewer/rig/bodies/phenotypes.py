@@ -1,8 +1,9 @@
 """Phenotypes of Anny: age, gender, height and others, as blends of MakeHuman's targets.
 
 Brégier et al., Human Mesh Modeling for Anny Body. A target belongs to one variation of several
-phenotypes (``female``, ``young``, ``maxmuscle`` ...). A phenotype between two of its anchors gives
-two variations a weight; a target's coefficient is the product of the weights of its variations::
+phenotypes (``female``, ``young``, ``maxmuscle`` ...). A value between two anchors of a phenotype
+gives weights to two variations; a target's coefficient is the product of the weights of its
+variations::
 
     c_t = prod_{v in t} w_v        w_v: piecewise linear in the phenotype, sums to 1
 
@@ -40,7 +41,7 @@ PHENOTYPES = (*VARIATIONS, *ORIGINS)
 TYPICAL = 0.5
 """Value of every phenotype of the mean body."""
 
-_NEWBORN = -1.0 / 3.0  # the age of the first anchor; a baby is at 0
+_NEWBORN = -1.0 / 3.0  # age value of the first anchor; a baby has the value 0
 _ALL = tuple(name for names in VARIATIONS.values() for name in names) + ORIGINS
 
 

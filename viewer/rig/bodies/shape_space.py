@@ -18,7 +18,7 @@ class ShapeSpace(Protocol):
         Parameters
         ----------
         weights : (N,)
-            N <= S; missing weights count as 0.
+            N <= S; missing weights are treated as 0.
 
         Returns
         -------

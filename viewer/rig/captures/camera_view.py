@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -84,10 +85,10 @@ class CameraView:
 
 
 def view_at(view: CameraView, seconds: float) -> CameraView:
-    """Return a camera as it stands at a time; itself if it does not move.
+    """Return a camera at a given time; the camera itself if it does not move.
 
-    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Across gaps
-    it is interpolated too, and outside its motion the end frames hold.
+    Between frames its rotation is interpolated spherically, its centre -R^T T linearly. Gaps are
+    interpolated too; outside the motion, the first or last frame is used.
 
     Parameters
     ----------
@@ -124,7 +125,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
     Parameters
     ----------
     view : CameraView
-        Fixed or moving camera; a fixed one has the time 0.
+        Fixed or moving camera; a fixed camera has only the time 0.
     most : int
         Maximum number of times, at least 2.
     """

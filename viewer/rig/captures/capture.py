@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImages
@@ -16,7 +17,7 @@ from viewer.rig.motion.parameter_clip import ParameterMotion
 __all__ = ["Capture", "CapturePart", "RestRoots"]
 
 RestRoots = Callable[[Floats | None], Floats]
-"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or without any."""
+"""Rest positions (N, 3) of a figure's root joint for shape coefficients (N, S), or for none."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,9 +31,9 @@ class CapturePart:
     bodies : mapping of person to BodyMotion
         Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
-        The same for keypoints.
+        Keypoints in the same form.
     parameters : mapping of person to ParameterMotion
-        The same for model parameters; people who have both are shown as bodies if the figure of
+        Model parameters in the same form; people who have both are shown as bodies if the figure of
         the bodies has model parameters, otherwise as points.
     warnings : tuple of Diagnostic
         Messages from the reader about these frames.
@@ -61,17 +62,17 @@ class Capture:
         Returns an iterator over the parts in time order; the first is short so that something
         can be shown early. Every call reads the files again.
     up : "y", "z", "-y", "-z" or ""
-        The axis that points up in the world; empty to guess from the first bodies.
+        The axis that points up in the world; empty to detect it from the first bodies.
     views : tuple of CameraView
         Calibrated cameras.
     images : CameraImages or None
         Images of the cameras, if available.
     views_of : callable or None
-        Returns further cameras, whose places depend on the figure that shows the bodies.
+        Returns further cameras, whose positions depend on the figure that shows the bodies.
     facts : tuple of (str, str)
         Recognised contents of the file, for ``viewer info``.
     space : "world", "camera" or ""
-        The space of its bodies, of those that the file contains; empty if it has only one.
+        The space of its bodies if the file has several; empty if it has only one.
     in_space : callable or None
         Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str

@@ -1,4 +1,4 @@
-"""Frame rate of a capture: requested, stored in its files, that of its video, or assumed."""
+"""Frame rate of a capture: requested, stored in its files, taken from its video, or assumed."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def capture_rate(requested: float | None, own: float | None, video: float | None
     own : float or None
         Rate of the files, or of the tool that wrote them.
     video : float or None
-        Rate of the video that was captured.
+        Rate of the source video.
 
     >>> capture_rate(None, None, 25.0), capture_rate(None, None, None)
     (25.0, 30.0)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip, PointLayout, sample_points
@@ -58,7 +58,7 @@ def sample_upright_points(
     frames: tuple[int, int | None] | None = None,
     interpolate: bool = False,
 ) -> tuple[SampledPoints, Literal["y", "z"]]:
-    """Sample an actor's points, rotated upright if their own world is upside down.
+    """Sample an actor's points, rotated upright if their world is upside down.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
@@ -13,19 +12,19 @@ from viewer.rig.motion.sampled_clip import SampledClip
 
 __all__ = ["Displacement", "joint_displacement", "point_displacement"]
 
-_TOGETHER = 1000  # frames per batch, to limit the memory for their matrices
+_TOGETHER = 1000  # frames per batch, which limits the memory for matrices
 
 
 @dataclass(frozen=True, slots=True)
 class Displacement:
-    """Distances between the joints of two motions in the frames that both have.
+    """Distances between the joints of two motions in their common frames.
 
     Attributes
     ----------
     mean, largest : float
-        Over joints and frames, figure units.
+        Mean and maximum distance over all joints and frames, figure units.
     joint, frame : int
-        Where the largest distance is; the frame has the first motion's number.
+        Location of the largest distance; frames are numbered as in the first motion.
     n_frames : int
         Number of compared frames.
     """
@@ -45,7 +44,7 @@ def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) 
     figure : Figure
         Figure with a skeleton.
     before, after : SampledClip
-        Two motions of it on the same clock.
+        Two motions of the figure on the same timeline.
     """
     timing = before.timing
     times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
@@ -71,7 +70,7 @@ def joint_displacement(figure: Figure, before: SampledClip, after: SampledClip) 
 
 
 def point_displacement(before: PointClip, after: PointClip) -> Displacement:
-    """Return how far points move, at the times of the first motion's frames where both are seen."""
+    """Return how far points move in the frames of the first motion in which both are visible."""
     timing = before.timing
     times = timing.start + np.arange(timing.n_frames) / timing.frame_rate
     inside = (times >= after.start - 1e-9) & (times <= after.end + 1e-9)

@@ -1,4 +1,4 @@
-"""Frames in which a joint of a foot stands on the ground, by its height and speed."""
+"""Detection of the frames in which a joint of a foot is on the ground, by its height and speed."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from viewer.rig.cleanup.frame_rows import runs_of
 __all__ = ["contacts", "mean_speeds"]
 
 # Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
-_LOW, _HIGH = 0.02, 0.035  # above the lowest positions: a contact begins, and ends
-_SLOW, _FAST = 0.3, 0.5  # per second
-_LOWEST = 0.05  # fraction of the frames below the level of the ground
+_LOW, _HIGH = 0.02, 0.035  # heights above the lowest positions at which a contact begins and ends
+_SLOW, _FAST = 0.3, 0.5  # speeds per second at which a contact begins and ends
+_LOWEST = 0.05  # fraction of the frames that are below the ground level
 _WINDOW = 0.1  # seconds over which the speed is averaged
-_SHORTEST = 0.1  # seconds
+_SHORTEST = 0.1  # minimum duration of a contact, seconds
 
 
 def contacts(positions: Floats, present: Bools, rate: float, size: float, up: int) -> Bools:
-    """Return the frames in which a joint stands: it is low and slow, with hysteresis.
+    """Return the frames in which a joint is on the ground: low and slow, with hysteresis.
 
     Parameters
     ----------

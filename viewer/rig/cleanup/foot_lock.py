@@ -1,13 +1,14 @@
-"""Feet held in place while they stand on the ground (after Kovar et al. 2002)."""
+"""Locking of feet in place while they are on the ground (after Kovar et al. 2002)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import cast
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.foot_contacts import contacts
 from viewer.rig.cleanup.frame_rows import in_frame_order, runs_of
@@ -32,11 +33,11 @@ class FootLock:
     Attributes
     ----------
     n_contacts : int
-        Number of times a foot stands.
+        Number of contacts of a foot with the ground.
     before, after : float
-        Distance that feet slide while they stand, in total, figure units.
+        Total distance that feet slide while they are on the ground, figure units.
     lowered : float
-        Largest distance by which the body was lowered for legs that are too short.
+        Largest distance by which the body was lowered because a leg was too short.
     """
 
     n_contacts: int = 0
@@ -61,11 +62,11 @@ def legs_of(skeleton: Skeleton) -> list[Leg]:
 def lock_feet(
     figure: Figure, clip: SampledClip, up: int, way: float = 1.0
 ) -> tuple[SampledClip, FootLock]:
-    """Return a motion whose feet do not slide while they stand.
+    """Return a motion whose feet do not slide while they are on the ground.
 
-    In a contact of the ball of a foot, or else of its ankle, that joint stays at one place; the
-    foot keeps its orientation. Before and after contacts the correction fades. Hips and knees
-    rotate to reach the ankles; where a leg is too short, the body is lowered.
+    In a contact of the ball of a foot, or else of its ankle, that joint stays fixed; the foot keeps
+    its orientation. Before and after contacts the correction fades. Hips and knees rotate so that
+    the ankles reach their targets; if a leg is too short, the body is lowered.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 __all__ = ["Captured", "in_frame_order", "is_shared", "points_between", "runs_of", "with_rows"]
 
 Captured = SampledClip | PointClip
-"""Clips of frames: of joints, or of points."""
+"""A clip of sampled frames, of joints or of points."""
 Indices = NDArray[np.intp]
 
 
@@ -30,7 +30,7 @@ def runs_of(flags: Bools) -> list[tuple[int, int]]:
 
 
 def with_rows(clip: Captured, frames: Indices) -> Captured:
-    """Return a clip of some of the frames, each with a row of its own, in time order.
+    """Return a clip of some of the frames, each with a separate row, in time order.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def with_rows(clip: Captured, frames: Indices) -> Captured:
     arrays: dict[str, Any] = {}
     for field in fields(clip):
         value = getattr(clip, field.name)
-        # A single row that applies to all frames stays as it is.
+        # A single row that applies to all frames is unchanged.
         if (
             isinstance(value, np.ndarray)
             and len(value) == count
@@ -72,8 +72,8 @@ def is_shared(clip: Captured, name: str) -> bool:
 def points_between(clip: PointClip, times: Floats, interpolate: bool = False) -> Floats:
     """Return points (T, K, 4), interpolated where they are visible on both sides.
 
-    Other points have the values of the row before; ``interpolate``: across gaps, where other points
-    are invisible.
+    Other points keep the values of the previous row or, with ``interpolate``, which also
+    interpolates across gaps, are invisible.
 
     Parameters
     ----------

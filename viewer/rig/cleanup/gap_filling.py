@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frame_rows import Captured, is_shared, points_between, runs_of
@@ -43,7 +44,7 @@ def inner_gaps(clip: SampledClip | PointClip) -> list[Span]:
 
 
 def interpolate_gaps(clip: Captured, longest: int | None = None) -> tuple[Captured, Gaps]:
-    """Return a clip without its short gaps, rotations interpolated along the shorter arc.
+    """Interpolate the short gaps of a clip, rotations along the shorter arc.
 
     Everything else is interpolated linearly. Frames before the first and after the last one stay
     missing.

@@ -23,7 +23,7 @@ def common_frames(first: Captured, second: Captured) -> Ints:
 
 
 def joined_tracks(first: Captured, second: Captured) -> Captured:
-    """Return a clip with the frames of both; where both have data, those of the first.
+    """Return a clip with the frames of both clips; the first takes precedence.
 
     Parameters
     ----------

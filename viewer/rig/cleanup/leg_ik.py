@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 
 __all__ = ["Leg", "bend", "reach"]
 
 _STRAIGHT = 0.05  # sine of the knee's angle below which the plane of the leg is undefined
-_REACH = 0.9999  # relative to the length of the leg: a straight knee has no direction
+_REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +52,7 @@ def bend(
     hips, knees, ankles : (F, 3)
         Positions.
     targets : (F, 3)
-        Targets of the ankle; those out of reach are approached as far as possible.
+        Targets of the ankle; those out of reach are approached as closely as possible.
     axis : (F, 3)
         Normals of the leg's plane for frames in which the leg is straight, thigh x shin.
 

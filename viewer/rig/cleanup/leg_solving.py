@@ -111,7 +111,7 @@ def lowering(
     up : (3,)
         The up axis.
     extended : float
-        Legs extend up to this fraction of their full length, or as far as they did before.
+        Legs extend up to this fraction of their full length, or up to their previous extension.
 
     Returns
     -------
@@ -135,7 +135,7 @@ def lowering(
     width = 2 * max(1, round(EASE * rate)) + 1
     padded = np.pad(needed, width - 1, mode="edge")
     highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
-    # The moving average of moving maxima is nowhere below the values themselves.
+    # The moving average of moving maxima is never below the values themselves.
     return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)
 
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 
 __all__ = ["OneEuro"]
 
-_SETTLED = 1e-4  # remaining weight of the first value
-_LONGEST = 1000  # frames added at each end
+_SETTLED = 1e-4  # weight below which the first value is negligible
+_LONGEST = 1000  # maximum number of frames added at each end
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +21,7 @@ class OneEuro:
     """One Euro filter, applied forwards and then backwards, so that the delays cancel.
 
     First, the motion is extended beyond both ends by point reflection, long enough for a pass to
-    settle: uniform motion is unchanged up to its ends, and the end values are kept.
+    settle: uniform motion is unchanged up to its ends, and the end values are preserved.
 
     Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff
     is f = cutoff + beta |s|, where s is the speed, filtered with the cutoff ``speed_cutoff``. For
@@ -50,7 +50,7 @@ class OneEuro:
         return self._turned(once[::-1], rate)[::-1][inner]
 
     def positions(self, positions: Floats, rate: float, metres: float = 1.0) -> Floats:
-        """Return filtered positions (N, ..., 3); ``metres``: length of their unit."""
+        """Return filtered positions (N, ..., 3); ``metres`` is the length of their unit."""
         longer, inner = _continued(positions, self._settling(rate), _opposite_positions)
         once = self._shifted(longer, rate, metres)
         return self._shifted(once[::-1], rate, metres)[::-1][inner]
@@ -91,8 +91,8 @@ def _continued(
 ) -> tuple[Floats, slice]:
     """Return frames (N, ...) extended beyond both ends, and the range of the original ones.
 
-    ``count``: frames to add at each end.
-    ``opposite``: reflects values in a value.
+    ``count`` is the number of frames to add at each end; ``opposite`` reflects values about a
+    value.
     """
     total = len(values)
     added = 0

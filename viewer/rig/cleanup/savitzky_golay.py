@@ -3,33 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 
 __all__ = ["SavitzkyGolay"]
 
-_SECONDS = 0.2  # default length of the window
-_PASSES = 2  # the second is relative to the result of the first, which is less noisy
+_SECONDS = 0.2  # default length of the window, seconds
+_PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
 
 
 @dataclass(frozen=True, slots=True)
 class SavitzkyGolay:
     """Least-squares fit of a polynomial to a window of frames, evaluated at its middle.
 
-    Near the ends of a motion the window stays within it, and the polynomial is evaluated off its
-    middle. Rotations are fitted as rotation vectors relative to the frame's own, so constant and
-    uniform rotation are unchanged.
+    Near the ends of a motion, the window stays within the motion, and the polynomial is evaluated
+    away from the middle of the window. Rotations are fitted as rotation vectors relative to the
+    rotation of the frame, so constant and uniform rotations are unchanged.
 
     Attributes
     ----------
     window : int
         Odd number of frames; 0 for 0.2 seconds.
     order : int
-        Degree of the polynomial, below the window.
+        Degree of the polynomial, less than the window.
     """
 
     window: int = 0
@@ -64,7 +64,7 @@ class SavitzkyGolay:
     def _fitted(self, count: int, rate: float, at: Callable[[Ints], Floats]) -> Floats | None:
         """Return the fitted values of all frames; None if there are too few to fit.
 
-        ``at`` returns the values at one frame of each window, relative to the window's own frame.
+        ``at`` returns the values at one frame of each window, relative to the frame to be filtered.
         """
         window = self.used_frames(count, rate)
         if not window:
@@ -84,7 +84,7 @@ def _relative_to(found: Floats, known: Floats) -> Callable[[Ints], Floats]:
 
 
 def _smoothing_matrix(window: int, order: int) -> Floats:
-    """Return H = A (A^T A)^-1 A^T of polynomials: row i gives the fitted value at frame i."""
+    """Return H = A (A^T A)^-1 A^T of polynomials: row i yields the fitted value at frame i."""
     place = np.linspace(-1.0, 1.0, window)
     basis, _ = np.linalg.qr(np.vander(place, order + 1))
     return basis @ basis.T

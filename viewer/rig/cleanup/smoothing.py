@@ -22,7 +22,7 @@ class Filter(Protocol):
         """Return filtered unit quaternions (N, J, 4) of N frames at a rate per second."""
 
     def positions(self, positions: Floats, rate: float, metres: float) -> Floats:
-        """Return filtered positions (N, J, 3); ``metres``: length of their unit."""
+        """Return filtered positions (N, J, 3); ``metres`` is the length of their unit."""
 
 
 def smoothed(clip: Captured, chosen: Filter, metres: float = 1.0) -> Captured:
@@ -72,7 +72,7 @@ def run_lengths(clip: Captured) -> list[int]:
     Parameters
     ----------
     clip : SampledClip or PointClip
-        Any clip; each of its points has runs of its own.
+        Any clip; each of its points has separate runs.
     """
     if not isinstance(clip, PointClip):
         return [stop - start for start, stop in runs_of(clip.timing.present)]

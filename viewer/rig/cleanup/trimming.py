@@ -11,14 +11,14 @@ __all__ = ["trimmed"]
 
 
 def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
-    """Return some frames of a clip, which keep their times and numbers.
+    """Return a range of frames of a clip; they keep their times and numbers.
 
     Parameters
     ----------
     clip : SampledClip or PointClip
         Any clip.
     first, stop : int, optional
-        First frame and end frame (exclusive), by the numbers of the file; the clip's own ends if
+        First frame and end frame (exclusive), in the numbering of the file; the ends of the clip if
         omitted.
 
     Raises

@@ -1,4 +1,4 @@
-"""Comparison of what two figures contain besides joints and vertices: materials, names of parts."""
+"""Comparison of materials and of the names of parts, blend shapes and animations."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.material import Material, Texture
 
 __all__ = ["content_notes"]
 
-_ROUNDING = 1e-5  # of numbers that were written as text or as float32
+_ROUNDING = 1e-5  # relative tolerance for numbers that were written as text or as float32
 _WORDS = {"is_physical": "surface model", "double_sided": "sidedness", "unlit": "lighting"}
 
 
@@ -23,7 +23,8 @@ def content_notes(first: Figure, second: Figure) -> list[Diagnostic]:
     Parameters
     ----------
     first, second : Figure
-        The figures. Kinds that only one of them has are not mentioned: few formats store them.
+        The figures. Kinds of content that only one figure has are not reported: few formats store
+        them.
     """
     notes = []
     for what, names in (
@@ -61,7 +62,7 @@ def _lone(what: str, first: Sequence[str], second: Sequence[str]) -> list[Diagno
 
 
 def _materials(first: Figure, second: Figure) -> list[Diagnostic]:
-    """Return notes about materials, which are matched by name, or by index without names."""
+    """Return notes about materials, matched by name, or by index if unnamed."""
     if first.mesh is None or second.mesh is None:
         return []
     one, other = _named(first.mesh.materials), _named(second.mesh.materials)

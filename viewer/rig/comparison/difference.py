@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
 
@@ -21,7 +20,7 @@ class Measure:
     name : str
         ``"joint positions"``, ``"joint orientations"``, ``"vertices"`` …
     kind : "length", "angle" or "weight"
-        Lengths are in the first figure's unit, angles in radians, weights dimensionless.
+        Lengths are in the first figure's unit, angles in radians; weights are dimensionless.
     maximum, mean : float
         Maximum and mean over all compared items and steps.
     step, item : str
@@ -88,7 +87,7 @@ class Difference:
 
 
 class Tally:
-    """Accumulates a measure step by step.
+    """Accumulator of a measure over all steps.
 
     Parameters
     ----------
@@ -97,7 +96,7 @@ class Tally:
     count : int
         Number of joints or vertices.
     items : tuple of str
-        Names of these; empty for vertices, which have indices.
+        Names of the joints; empty for vertices, which have indices.
 
     Attributes
     ----------
@@ -114,7 +113,7 @@ class Tally:
         self.worst, self.step, self._item = -1.0, "", -1
 
     def add(self, step: str, values: Floats) -> None:
-        """Add the values of one step, NaN where nothing can be compared."""
+        """Add the values of one step, NaN for items that cannot be compared."""
         known = ~np.isnan(values)
         if not known.any():
             return

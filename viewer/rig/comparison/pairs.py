@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.skeleton import Skeleton, joint_labels
@@ -135,7 +136,7 @@ def pair_names(first: Sequence[str], second: Sequence[str], what: str) -> Pairs:
 def rotation_distance(first: Floats, second: Floats) -> Floats:
     """Return the angle between rotations: 2 asin(|A - B| / sqrt(8)), Frobenius norm.
 
-    It stays accurate for small angles, where the arc cosine of the trace does not.
+    It stays accurate for small angles, unlike the arc cosine of the trace.
 
     Parameters
     ----------

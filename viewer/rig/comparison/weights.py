@@ -17,21 +17,21 @@ __all__ = ["row_distances", "skin_at"]
 def row_distances(first: Skin, second: Skin, pairs: Pairs) -> Floats:
     """Return the L1 distance of each vertex's weights: sum over joints of |w - w'|.
 
-    The maximum for rows that sum to 1 is 2: all weight is on different joints.
+    The maximum for rows that sum to 1 is 2, if no joint has weight in both.
 
     Parameters
     ----------
     first, second : Skin
         Influences of the same V vertices.
     pairs : Pairs
-        Matched joints; weights of unmatched joints count in full.
+        Matched joints; weights of unmatched joints are included in full.
 
     Returns
     -------
     (V,)
         0 for equal rows, regardless of the order of influences and of duplicate joints.
     """
-    # Unmatched joints of the second skin get indices that the first does not use.
+    # Unmatched joints of the second skin get indices that the first skin does not use.
     names = np.arange(second.n_joints, dtype=np.int32) + first.n_joints
     names[pairs.second] = pairs.first
     return row_norms(
@@ -48,7 +48,7 @@ def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
     Parameters
     ----------
     skin : Skin
-        Influences on the mesh that the points lie on.
+        Influences on the mesh on which the points lie.
     triangles : (T, 3)
         Triangles of that mesh.
     found : SurfacePoints

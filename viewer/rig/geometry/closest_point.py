@@ -9,29 +9,29 @@ pieces of different sizes go into different trees, as one large r would slow eve
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
 __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
-_PAIRS = 1 << 19  # pairs of point and piece per batch, about 150 bytes each
-_LONG = 3.0  # pieces are split above this many times the median radius
+_PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
+_LONG = 3.0  # multiple of the median radius above which pieces are split
 # Pieces in the first query; if more pieces may lie within the bound, a second query finds all of
 # them.
 _NEAREST = 8
 _POINTS = 1 << 16  # points per batch
-_FLAT = 1e-20  # sin^2 of the angle below which a triangle counts as a segment
+_FLAT = 1e-20  # sin^2 of the angle below which a triangle is treated as a segment
 # Bounds are rounded up by this factor, so that rounding never excludes a triangle.
 _SLACK = 1.0 + 1e-9
-_ROUNDED = 1e-12  # rounding of a difference of squared distances, relative to the larger one
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_ROUNDED = 1e-12  # rounding error of a difference of squared distances, relative to the larger one
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -73,7 +73,7 @@ class Surface:
     positions : (V, 3)
         Any unit.
     triangles : (T, 3)
-        Vertex indices. Degenerate triangles count as segments or points.
+        Vertex indices. Degenerate triangles are treated as segments or points.
 
     Raises
     ------
@@ -91,7 +91,7 @@ class Surface:
                 f"triangles: expected vertex indices 0 to {len(positions) - 1}, "
                 f"found {triangles.min()} to {triangles.max()}"
             )
-        # Far from the origin, float64 has fewer digits left for small distances.
+        # Far from the origin, float64 leaves fewer digits for small distances.
         self._center = positions.mean(axis=0)
         self._corners = (positions - self._center)[triangles]
         self._all, self._levels = _levels(self._corners)
@@ -129,8 +129,8 @@ class Surface:
         """Return the closest triangle of each point."""
         best = np.zeros(len(points), dtype=np.int32)
         nearest = np.full(len(points), np.inf)
-        # A first guess tightens the bounds below. The search finds it again, so that ties between
-        # equally close triangles are always resolved alike.
+        # An initial candidate tightens the bounds below. The search finds that triangle again, so
+        # that ties between equally close triangles are always resolved in the same way.
         pieces = self._all.tree.query(points, workers=_workers(len(points)))[1]
         self._keep_nearer(self._all, points, np.arange(len(points)), pieces, best, nearest)
         nearest = np.nextafter(nearest, np.inf)
@@ -247,7 +247,7 @@ class _Level:
 
 
 def _levels(corners: Floats) -> tuple[_Level, list[_Level]]:
-    """Split triangles (T, 3, 3) into pieces: a level of all, and one per doubling of size."""
+    """Split triangles (T, 3, 3) into pieces: one level of all, or one per doubling of size."""
     pieces, triangles = _pieces(corners)
     radii = _radii(pieces)
     smallest = float(np.median(radii)) / 2.0
@@ -282,7 +282,7 @@ def _pieces(corners: Floats) -> tuple[Floats, Ints]:
 
 
 def _workers(n_points: int) -> int:
-    """Return the number of threads for a query: one, or -1 for all processors."""
+    """Return the number of threads for a query: 1, or -1 for all processors."""
     return 1 if n_points < _FEW else -1
 
 
@@ -312,7 +312,7 @@ def _may_be_nearer(
     A piece lies in a disc of radius r around its centroid. With the height h of the point above
     the disc's plane, the distance a from the centroid and s = sqrt(a^2 - h^2), the distance from
     the disc is sqrt(h^2 + max(0, s - r)^2). For distant points, this excludes all pieces except
-    those below the point, whereas the bounding sphere, a - r, would leave a wide circle of
+    those below the point, whereas the bounding sphere, a - r, would leave a large circle of
     candidates.
     """
     squared_heights = _dot(offsets, level.normals[pieces]) ** 2

@@ -74,7 +74,7 @@ def multiply(first: Floats, second: Floats) -> Floats:
 def slerp(start: Floats, end: Floats, fraction: Floats | float) -> Floats:
     """Interpolate rotations at constant speed along the shorter arc (Shoemake 1985).
 
-    q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), q1 negated where q0 . q1 < 0.
+    q(u) = (sin((1 - u) t) q0 + sin(u t) q1) / sin(t), with q1 negated if q0 . q1 < 0.
 
     Parameters
     ----------

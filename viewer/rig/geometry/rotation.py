@@ -212,7 +212,7 @@ def matrix_to_euler(matrices: Floats) -> Floats:
     m = np.asarray(matrices, dtype=np.float64)
     z = np.arctan2(m[..., 1, 0], m[..., 0, 0])
     sine, cosine = np.sin(z), np.cos(z)
-    # y and x are taken from Rz^T R, which is Ry Rx even where z is ill-conditioned.
+    # y and x are taken from Rz^T R, which is Ry Rx even if z is ill-conditioned.
     y = np.arctan2(-m[..., 2, 0], cosine * m[..., 0, 0] + sine * m[..., 1, 0])
     x = np.arctan2(
         sine * m[..., 0, 2] - cosine * m[..., 1, 2], cosine * m[..., 1, 1] - sine * m[..., 0, 1]
@@ -235,7 +235,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     stretches : (..., 3, 3)
         R^T M.
     """
-    # M = U S V^T gives R = U V^T, with the last column of U negated where that is a reflection.
+    # M = U S V^T gives R = U V^T, with the last column of U negated if that is a reflection.
     left, _, right = np.linalg.svd(matrices)
     signs = np.ones((*left.shape[:-2], 3))
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Edges", "components", "edges_of", "orientations", "welded"]
@@ -15,7 +14,7 @@ Indices = NDArray[np.int64]
 
 
 def welded(positions: Floats, triangles: Ints) -> Indices:
-    """Return triangles with coincident vertices merged, so that seams count as closed.
+    """Return triangles with coincident vertices merged, so that seams are closed.
 
     Parameters
     ----------
@@ -125,7 +124,8 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     component : (count,)
         Smallest triangle of each triangle's component.
     flipped : (count,) bool
-        The smaller part of each component; of equal parts, the one without the first triangle.
+        True for the smaller part of each component; of equal parts, for the one without the first
+        triangle.
     one_sided : (count,) bool
         Triangles of components that are not orientable.
     """
@@ -137,7 +137,7 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     labels = components(2 * count, nodes)
     plain, reverse = labels[:count], labels[count:]
     one_sided = plain == reverse
-    # The smallest triangle of a component has the smaller label unflipped, or flipped.
+    # The smallest triangle of a component has the smaller label either unflipped or flipped.
     component = np.minimum(plain, reverse) % count if count else plain
     is_against = plain > reverse
     against = np.bincount(component, is_against, minlength=count)

@@ -12,7 +12,7 @@ from viewer.rig.skinning import METHODS
 
 __all__ = ["explanation_text"]
 
-_LONGEST = 40  # characters of a joint's name
+_LONGEST = 40  # maximum number of characters of a joint's name
 _RIGID = 1e-9  # a stretch this close to the identity is a rounding error
 
 

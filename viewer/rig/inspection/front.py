@@ -25,19 +25,19 @@ from viewer.rig.skinning import joint_matrices
 __all__ = ["FRONTS", "Front", "front_axes", "guess_front", "usual_front"]
 
 Front: TypeAlias = str
-"""A signed axis, as ``"+z"``; never the up axis."""
+"""A signed axis, such as ``"+z"``; never the up axis."""
 
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """All signed axes; the two along a scene's up axis do not apply to it."""
 
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
-_N_TIMES = 9  # samples of a motion
-_SURE = 0.5  # smaller components of a vote along an axis are inconclusive
+_N_TIMES = 9  # number of samples of a motion
+_SURE = 0.5  # minimum component of a vote along an axis; smaller ones are inconclusive
 _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
 """Weight of each kind of evidence.
 
 Joint names state left and right explicitly; the other kinds are heuristics and outvote names
-only if they agree. Travel counts least, as a walk may go backwards.
+only if they agree. Travel has the smallest weight, as a person may walk backwards.
 """
 
 
@@ -60,7 +60,7 @@ def guess_front(scene: Scene) -> Front:
 
     Each actor votes by its posed joints (left and right, toes, face, head and tail) and the
     direction of its motion, or by the shape of its feet if it has neither joints nor captured
-    points. Votes of actors that face opposite directions cancel out.
+    points. The votes of actors that face opposite directions cancel out.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
     joints = joint_matrices(figure, actor.pose)[:, :3, 3]
     skeleton = figure.skeleton
     return (
-        # What the file states about its joints is more certain than their names.
+        # Joint roles stated by the file are more certain than joint names.
         joint_meanings(skeleton) if skeleton.humanoid is not None else skeleton.names,
         skeleton.parents,
         apply_transform(actor.placement, joints),

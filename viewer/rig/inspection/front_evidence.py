@@ -1,6 +1,6 @@
 """Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
 
-Each kind gives a horizontal vector towards the front. Its length is the confidence: 1 for complete
+Each kind yields a horizontal vector towards the front. Its length is the confidence: 1 for complete
 and consistent evidence, 0 for none.
 """
 
@@ -20,10 +20,10 @@ _LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable
 # Fraction of the figure's size: a head this far from the centre is in front of the body.
 _CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
-_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and ankles above them
-# Fraction of the vertices of a symmetric mesh whose mirror images are near other vertices.
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and range of the ankles
+# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
 _MIRRORED = 0.98
-_LOOKED_AT = 2000  # vertices in the symmetry test
+_LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
 
 
 def from_sides(names: Sequence[str], places: Floats, up: Floats) -> Floats:
@@ -67,7 +67,7 @@ def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -
 
 
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
-    """Return evidence from the ends of an animal: heads are in front of its centre, tails behind.
+    """Return evidence from the ends of an animal: the head is in front, the tail behind.
 
     A head directly above the centre, as in people, gives no evidence.
     """
@@ -86,7 +86,7 @@ def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_travel(places: Floats, size: float, up: Floats) -> Floats:
-    """Return evidence from a motion: figures mostly move forwards.
+    """Return evidence from a motion: figures usually move forwards.
 
     Parameters
     ----------
@@ -141,13 +141,13 @@ def from_soles(positions: Floats, up: Floats) -> Floats:
         return np.zeros(3)
     way = positions[soles].mean(axis=0) - positions[ankles].mean(axis=0)
     way[planes[0]] = 0.0
-    # Soles that extend in front of the ankles by 2 % of the height or more are full evidence.
+    # Soles that extend in front of the ankles by at least 2 % of the height are full evidence.
     way = _horizontal(way, up) / (2.0 * _LEAST * tall)
     return way / max(float(np.linalg.norm(way)), 1.0)
 
 
 def _is_symmetric(positions: Floats, axis: int) -> bool:
-    """Return whether a mesh is nearly symmetric about the plane through its centre."""
+    """Return whether a mesh is nearly symmetric about a plane through its centre."""
     size = _LEAST * _size(positions)
     mirrored = positions[:: max(len(positions) // _LOOKED_AT, 1)].copy()
     middle = bounding_box(positions).mean(axis=0)[axis]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["Ground", "ground_of", "resting_frames"]
@@ -14,19 +14,20 @@ __all__ = ["Ground", "ground_of", "resting_frames"]
 Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
 
 # Lengths are relative to the figure's height at rest: 0.01 is 17 mm for a person.
-_ALIKE = 0.005  # heights within this are one level: about half the tolerance for sunk feet
+_ALIKE = 0.005  # heights closer than this are one level: about half the tolerance for sunk feet
 _APART = 0.01  # minimum distance between separate levels
 _CUSTOM = 0.015  # maximum distance from a conventional ground: calibrations err by about 25 mm
-_NEAR = 0.03  # maximum distance of the lowest feet if they never rest
+_NEAR = 0.03  # maximum distance of the lowest feet from a conventional ground if they never rest
 _LONG = 0.1  # minimum seconds for which a foot rests
 _CALM = 0.006  # maximum vertical motion of a resting foot; at the top of a jump, it is 12 mm
-_MOST = 0.5  # fraction of these frames that must be this close to their mean height
+_MOST = 0.5  # minimum fraction of the frames of a rest that are this close to their mean height
 _RESTS = 0.2  # minimum fraction of resting frames: with fewer, equal heights may be coincidence
 _FRACTION = 0.1  # minimum fraction of the frames at rest for a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
 _ROLLS = 0.02  # minimum distance from the longest level: rolling feet create others this close
-_STEP = 0.06  # distance below the longest level: the ground may be this far below a step or a seat
+# Maximum distance of the ground below the longest level, which may be a step or a seat.
+_STEP = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,8 +39,8 @@ class Ground:
     height : float or None
         Along the up axis; None if unknown.
     levels : tuple of (float, int)
-        Heights at which feet rest with their numbers of frames, the most frequent first; if empty,
-        the height is a guess.
+        Heights at which feet rest and their numbers of frames, the most frequent first; if empty,
+        the height is only an estimate.
     """
 
     height: float | None
@@ -87,7 +88,7 @@ def ground_of(
 
 
 def _guess(lowest: Floats, size: float, likely: Sequence[float]) -> float | None:
-    """Return a guess of the ground height if feet never rest, as in noisy captures."""
+    """Return an estimate of the ground height if feet never rest, as in noisy captures."""
     if len(lowest) == 0:
         return None
     low, middle = np.quantile(lowest, [0.1, 0.5])
@@ -108,8 +109,8 @@ def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -
     """Return whether a level other than the longest may be the ground.
 
     A likely level with few frames just below the longest is not a rival, because feet have sunk
-    there. It is a rival if it is a step below, as for a person who sits or stands on a box, or
-    above, because feet may have sunk at the longest level.
+    into the ground there. It is a rival if it is a step below, as for a person who sits or stands
+    on a box, or above, because feet may have sunk into the ground at the longest level.
     """
     longest, count = levels[0]
     long = [h for h, n in levels[1:] if n > _CLEAR * count and abs(h - longest) > _ROLLS * size]
@@ -120,7 +121,7 @@ def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -
 def resting_frames(
     lowest: Floats, present: Bools, step: float, size: float, seconds: float = _LONG
 ) -> Bools:
-    """Return the frames in which the lower foot is at constant height for some time: (F,).
+    """Return a mask of the frames in which the lower foot rests at a constant height: (F,).
 
     Parameters
     ----------
@@ -134,7 +135,7 @@ def resting_frames(
     count = len(lowest) - width
     if count < 1:
         return rests
-    heights = np.where(present, lowest, np.inf)  # feet do not rest if the person leaves
+    heights = np.where(present, lowest, np.inf)  # feet do not rest while the person is absent
     windows = np.lib.stride_tricks.sliding_window_view(heights, width + 1)
     highest = windows.max(axis=1)
     calm = highest <= windows.min(axis=1) + _CALM * size
@@ -145,7 +146,7 @@ def resting_frames(
 
 
 def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
-    """Return the heights with high density, and their numbers of frames, most frequent first."""
+    """Return the most frequent heights and their numbers of frames, in decreasing order."""
     left = np.sort(heights)
     levels: list[Level] = []
     while len(left) and len(left) >= _FRACTION * len(heights):
@@ -158,5 +159,5 @@ def _levels(heights: Floats, size: float) -> tuple[Level, ...]:
         levels.append((level, int(counts[first])))
         left = left[np.abs(left - level) > _APART * size]
     # Of levels with the same number of frames, the upper one is first: at the lower one, feet have
-    # sunk.
+    # sunk into the ground.
     return tuple(sorted(levels, key=lambda level: (-level[1], -level[0])))

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -16,8 +15,8 @@ __all__ = ["DENSITY", "Measures", "measure"]
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 
-# Part of the surface that may be missing, as at the eyes or the mouth of a body, without making
-# the volume meaningless.
+# Maximum fraction of the surface that may be missing, as at the eyes or the mouth of a body, for a
+# meaningful volume.
 _HOLE = 0.01
 
 
@@ -34,7 +33,7 @@ class Measures:
     mass : float or None
         Volume times ``DENSITY``, kilograms; None without a volume, or unless the unit is metres.
     n_open_edges : int
-        Number of edges of one triangle only; vertices at the same position are one.
+        Number of edges that belong to a single triangle, with coincident vertices merged.
     """
 
     height: float
@@ -64,7 +63,7 @@ def measure(figure: Figure) -> Measures:
     positions, triangles = figure.mesh.positions, figure.mesh.triangles
     edges = _open_edges(positions, triangles)
     lengths = np.linalg.norm(positions[edges[:, 1]] - positions[edges[:, 0]], axis=1)
-    # No boundary of a given length encloses more than a circle.
+    # Of all boundaries of a given length, a circle encloses the largest area.
     hole = lengths.sum() ** 2 / (4.0 * np.pi)
     if not len(triangles) or hole > _HOLE * triangle_areas(positions, triangles).sum():
         return Measures(height, None, None, len(edges))
@@ -74,11 +73,11 @@ def measure(figure: Figure) -> Measures:
 
 
 def _open_edges(positions: Floats, triangles: Ints) -> Ints:
-    """Return the edges that belong to one triangle only, (E, 2) vertices."""
+    """Return the edges that belong to a single triangle, as vertices (E, 2)."""
     corners: Ints = triangles
     for merges in (False, True):
         if merges:
-            # Vertices are often doubled along texture seams.
+            # Vertices are often duplicated along texture seams.
             same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
             corners = same[triangles]
         following = np.roll(corners, -1, axis=1)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.inspection.ground_height import ground_of
 from viewer.rig.inspection.soles import extent, soles_of
 from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames
@@ -15,7 +14,7 @@ from viewer.rig.shape import shaped
 
 __all__ = ["RestingHeight", "resting_height"]
 
-_MOST = 4000  # frames that are evaluated
+_MOST = 4000  # maximum number of evaluated frames
 _LOW = 0.02  # quantile of the heights, for feet that never rest
 
 
@@ -28,7 +27,7 @@ class RestingHeight:
     height : float
         Along the scene's up axis, scene units.
     is_clear : bool
-        Whether feet rest at this height; otherwise it is that of the lowest positions.
+        Whether feet rest at this height; otherwise it is the height of the lowest positions.
     """
 
     height: float

@@ -20,16 +20,16 @@ __all__ = ["check_vertices", "deform_vertices", "rest_vertices"]
 def deform_vertices(
     figure: Figure, pose: Pose | None, skinning: Skinning, vertices: Ints
 ) -> tuple[Floats, Floats]:
-    """Skin some vertices only, with the same result as ``viewer.rig.skinning.deform``.
+    """Skin a selection of vertices, with the same result as ``viewer.rig.skinning.deform``.
 
     Parameters
     ----------
     figure : Figure
         Figure with a mesh.
     pose : Pose or None
-        None for the file's own pose.
+        None for the pose stored in the file.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning options of the drawn mesh.
     vertices : (N,)
         Indices.
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
@@ -17,8 +17,9 @@ from viewer.rig.skin import Skin, owners
 
 __all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
 
-_STRAYS = 0.001  # fraction of vertices at either end that are excluded from the height
-_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot while walking and on tiptoe
+_STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
+# Tilts of a foot, from walking to lying on its instep.
+_TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 
@@ -31,9 +32,9 @@ class Soles:
     joints : (N,) int32
         For each of N feet, the joint nearest to the ground: the ball of the foot, or the ankle.
     feet : (P,)
-        The foot that each point belongs to.
+        The foot to which each point belongs.
     movers : (P,) int32
-        The joint that each point moves with.
+        The joint with which each point moves.
     places : (P, 3)
         Positions of the points in that joint's space.
     above : (P,)
@@ -90,7 +91,7 @@ def _axis(figure: Figure) -> int:
 
 
 def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
-    """Return the soles of a skeleton with two feet by name, or None.
+    """Return the soles of a skeleton whose joint names identify two feet, or None.
 
     Parameters
     ----------
@@ -111,7 +112,7 @@ def soles_of(figure: Figure, is_bound: bool) -> Soles | None:
 
 
 def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool) -> Soles:
-    """Return the soles of given feet of a figure with a skeleton.
+    """Return the soles of the given feet of a figure with a skeleton.
 
     Parameters
     ----------
@@ -140,7 +141,7 @@ def soles_of_feet(figure: Figure, feet: Sequence[Sequence[int]], is_bound: bool)
 
 
 def _whole_foot(skeleton: Skeleton, found: Sequence[int]) -> Bools:
-    """Return the joints of a foot: the ankle, or the ball, and all joints below it. (J,)."""
+    """Return the joints of a foot: the ankle, or the ball, and all joints below it: (J,)."""
     result = np.zeros(skeleton.n_joints, dtype=np.bool_)
     result[list(found)] = True
     for joint, parent in enumerate(skeleton.parents.tolist()):
@@ -165,7 +166,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return the downward direction, and directions tilted from it to all sides: (D, 3)."""
+    """Return the downward direction, and directions tilted from it all around: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

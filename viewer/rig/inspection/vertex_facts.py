@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
@@ -20,8 +21,8 @@ from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["VertexFacts", "facts_text", "nearest_corner", "vertex_facts"]
 
-_LONGEST = 40  # characters of a name
-_MOST = 8  # influences that are listed individually
+_LONGEST = 40  # maximum number of characters of a name
+_MOST = 8  # maximum number of influences that are listed individually
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -69,9 +70,9 @@ def vertex_facts(
     figure : Figure
         Figure with a mesh.
     pose : Pose or None
-        None for the file's own pose, or a figure without a skeleton.
+        None for the pose stored in the file, or for a figure without a skeleton.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning options of the drawn mesh.
     vertex : int
         Index.
     triangle : int

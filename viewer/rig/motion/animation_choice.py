@@ -1,4 +1,4 @@
-"""Selection of a figure's animation by name or number, and its start."""
+"""Selection of a figure's animation by name or number, and its playback."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def animation_labels(figure: Figure) -> tuple[str, ...]:
 
 
 def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None:
-    """Return the animation selected by a text.
+    """Return the animation that a text selects.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
         Figures with animations; numbers refer to the figure with the most animations.
     wanted : str
         A name or label, matched exactly or else ignoring case; a number from 1; ``NONE``; or an
-        empty text for the first animation.
+        empty string for the first animation.
 
     Returns
     -------
@@ -109,7 +109,8 @@ def counterpart(figure: Figure, animation: Animation) -> int:
 def own_first(figure: Figure, others: Sequence[Figure]) -> int:
     """Return 0 if a figure shares no animation with the others of its file, else -1.
 
-    Such a figure is a character of its own, which plays its first animation whatever the others do.
+    Such a figure is an independent character, which plays its first animation whatever the others
+    play.
 
     Parameters
     ----------
@@ -131,8 +132,8 @@ def own_first(figure: Figure, others: Sequence[Figure]) -> int:
 def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) -> None:
     """Let an actor play one of its figure's animations, or none, in place.
 
-    Joints that the animation does not move return to the file's pose. The figure's placement and
-    blend shapes that neither animation moves are kept.
+    Joints that the animation does not move return to the pose stored in the file. The figure's
+    placement and blend shapes that neither animation moves are unchanged.
 
     Parameters
     ----------
@@ -157,7 +158,7 @@ def play_animation(actor: Actor, index: int, clip: TransformClip | None = None) 
 
 
 def _returned(actor: Actor, pose: Pose) -> Pose:
-    """Return the file's pose with the current placement and shape."""
+    """Return the pose stored in the file with the current placement and shape."""
     own = figure_pose(actor.figure)
     own.figure_scale, own.figure_translation = pose.figure_scale, pose.figure_translation
     weights = pose.shape_weights.copy()

@@ -1,4 +1,4 @@
-"""Edit keyed clips: every function returns a new channel or clip; the original is unchanged.
+"""Editing of keyed clips: every function returns a new channel or clip; the original is unchanged.
 
 Keys keep their order and therefore their indices: a moved key stops at an unmoved neighbour.
 """
@@ -42,7 +42,7 @@ __all__ = [
 ]
 
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
-_UNCHANGED = 1e-9  # radians or lengths: a DOF this close to its curve counts as unchanged
+_UNCHANGED = 1e-9  # radians or lengths; a DOF this close to its curve is treated as unchanged
 
 
 def add_key(
@@ -132,11 +132,11 @@ def move_keys(
     keys : iterable of int
         Indices, which do not change.
     dt : float
-        Seconds; reduced where a key would otherwise pass an unmoved key.
+        Seconds; reduced if a key would otherwise pass an unmoved key.
     dv : float
         Length or radians.
     gap : float
-        Minimum distance in seconds to unmoved keys that are at least this far away now.
+        Minimum distance in seconds to unmoved keys that are at least this far away initially.
     """
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True
@@ -160,7 +160,7 @@ def set_key(
     value: float | None = None,
     gap: float = 0.0,
 ) -> Channel:
-    """Return a channel with one key changed; its time stops at its neighbours, see move_keys."""
+    """Return a channel with one key changed; its neighbours limit its time, see ``move_keys``."""
     times, values = channel.times.copy(), channel.values.copy()
     if time is not None:
         now = channel.times[key]

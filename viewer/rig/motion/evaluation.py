@@ -1,14 +1,15 @@
-"""Evaluation of motions: posing a single actor, and many frames of one as arrays."""
+"""Evaluation of motions: posing of a single actor, and many frames of one actor as arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip, sample_points
@@ -48,7 +49,7 @@ __all__ = [
 ]
 
 JointMotion: TypeAlias = Clip | TransformClip | SampledClip
-"""A motion that poses a skeleton, and not captured points."""
+"""A motion that poses a skeleton rather than captured points."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -103,7 +104,7 @@ def time_span(actors: Iterable[Actor]) -> tuple[float, float]:
 def frame_rate(motion: Motion | None) -> float:
     """Return a motion's frames per second.
 
-    Keyed transforms have the rate that their keys are at, DOF curves ``DEFAULT_RATE``.
+    Keyed transforms have the rate of their keys, DOF curves have ``DEFAULT_RATE``.
     """
     if isinstance(motion, TransformClip):
         return key_rate(motion)
@@ -113,7 +114,7 @@ def frame_rate(motion: Motion | None) -> float:
 def scene_rate(actors: Iterable[Actor]) -> float:
     """Return the frames per second of a scene's timeline.
 
-    Those of its longest capture, or else of its longest motion of keyed transforms.
+    The rate is that of its longest capture, or else of its longest motion of keyed transforms.
     """
     clips = [actor.clip for actor in actors if actor.clip is not None]
     for kinds in ((SampledClip, PointClip), (TransformClip,)):
@@ -193,7 +194,7 @@ def frames_of(
     times : (F,)
         Seconds on the motion's own clock.
     base : Pose, optional
-        Provides shape and placement if the motion has none; those of the file if omitted.
+        Provides shape and placement if the motion has none; the values in the file if omitted.
     interpolate : bool
         Interpolate across gaps.
 
@@ -235,7 +236,7 @@ def frames_of(
 
 
 def _constrained(figure: Figure, frames: Frames) -> Frames:
-    """Return frames in which joints with a constraint follow their sources."""
+    """Return the frames with constraints applied: joints follow their sources."""
     skeleton = figure.require_skeleton()
     if not skeleton.constraints:
         return frames
@@ -248,7 +249,7 @@ def _constrained(figure: Figure, frames: Frames) -> Frames:
 
 
 def _shared(rows: Floats) -> Floats:
-    """Return a single row if all are equal."""
+    """Return a single row if all rows are equal."""
     return rows[:1] if len(rows) > 1 and (rows == rows[0]).all() else rows
 
 
@@ -334,7 +335,7 @@ def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
 
 
 def world_frames(figure: Figure, frames: Frames) -> Floats:
-    """Return every joint's world matrix in every frame; all frames are computed at once.
+    """Return every joint's world matrix in every frame; all frames are computed together.
 
     Parameters
     ----------
@@ -351,7 +352,7 @@ def world_frames(figure: Figure, frames: Frames) -> Floats:
     skeleton = figure.require_skeleton()
     frames, count = _constrained(figure, frames), frames.n_frames
     # The joint axis comes first, as forward_kinematics multiplies a joint's matrices of all frames
-    # at once.
+    # together.
     local = np.zeros((skeleton.n_joints, count, 4, 4))
     local[..., 3, 3] = 1.0
     linear = quaternion_to_matrix(frames.rotations)

@@ -119,7 +119,7 @@ def _pose_by_transforms(
 def _pose_by_frames(
     actors: list[Actor], clip: SampledClip, skeleton: Skeleton, times: Floats, interpolate: bool
 ) -> None:
-    """Pose by captured rotations, for skeletons whose joints' DOFs represent any rotation."""
+    """Pose by captured rotations, for skeletons whose joint DOFs can represent any rotation."""
     balls, rows = rotation_rows(skeleton), sample_rows(clip, times, interpolate)
     base = quaternion_to_matrix(skeleton.rest_rotations)
     within = np.swapaxes(base, -1, -2) @ quaternion_to_matrix(rows.rotations)
@@ -194,7 +194,7 @@ def worlds(skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None =
 def posed_worlds(
     skeleton: Skeleton, poses: Sequence[Pose], rotations: Floats | None = None
 ) -> Floats:
-    """Return ``worlds``, computed in one batch for poses without cached matrices, which are cached.
+    """Return ``worlds``; missing matrices are computed in one batch and cached in the poses.
 
     Parameters
     ----------

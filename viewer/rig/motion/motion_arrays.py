@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -35,7 +34,7 @@ class MotionArrays:
     frame_rate : float
         Frames per second.
     frames : (F,) int32
-        Numbers of the frames: those of the video or of the files, where they have numbers.
+        Numbers of the frames in the video or the files, if they are numbered there.
     present : (F,) bool
         Whether the person is present; the other arrays are held or undefined elsewhere.
     rotations : (F, J, 4)

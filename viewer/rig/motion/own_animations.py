@@ -14,7 +14,7 @@ __all__ = ["has_own_animations", "keeps_keys", "own_animations", "still_pose"]
 
 
 def has_own_animations(actor: Actor) -> bool:
-    """Return whether an actor has animations, and plays one of them, edited or not, or none.
+    """Return whether an actor has animations and plays either one of them, edited or not, or none.
 
     False if constraints also move its joints, because keys do not contain their effect.
     """
@@ -25,7 +25,7 @@ def has_own_animations(actor: Actor) -> bool:
 
 
 def keeps_keys(scene: Scene, actor: Actor) -> bool:
-    """Return whether an actor's animations can be written as they are, also if it is upright."""
+    """Return whether an actor's animations can be written unchanged, even if it is made upright."""
     return has_own_animations(actor) and not own_up(scene, actor)[1]
 
 

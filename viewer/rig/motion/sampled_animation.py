@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -112,7 +113,7 @@ def sample_animation(
 
 
 def frames_at(animation: SampledAnimation, times: Floats) -> Frames:
-    """Sample an animation's motion at given times (T,) s, rotated upright if its frames are."""
+    """Sample an animation's motion at times (T,) in seconds, rotated upright if its frames are."""
     found = frames_of(animation.figure, animation.motion, times, animation.base)
     return _rotated_upright(animation.figure, found) if animation.is_rotated else found
 
@@ -131,7 +132,7 @@ def frame_range(
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
     if not isinstance(motion, Clip):
-        stop = min(stop, count)  # DOF curves extend beyond their keys, other motions do not
+        stop = min(stop, count)  # unlike other motions, DOF curves extend beyond their keys
     if not 0 <= first < stop:
         found = f"{first} to {'the end' if asked is None else asked}"
         raise RigError(f"frames: expected a range within 0 to {count}, found {found}")
@@ -146,7 +147,7 @@ def upright_animation(
     interpolate: bool = False,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Sample an actor's clip, rotated upright if its own world is upside down.
+    """Sample an actor's clip, rotated upright if its world is upside down.
 
     Parameters
     ----------

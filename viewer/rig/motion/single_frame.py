@@ -31,7 +31,7 @@ def single_frame(
     Parameters
     ----------
     actor : Actor
-        Actor with joints; an absent actor gives a missing frame.
+        Actor with joints; the frame of an absent actor is missing.
     rate : float
         Nominal frames per second of the animation.
     number : int
@@ -42,7 +42,7 @@ def single_frame(
     Returns
     -------
     SampledAnimation
-        Its ``motion`` contains the frame as well: one key per DOF for rigs with keyed clips.
+        Its ``motion`` also contains the frame: one key per DOF for rigs with keyed clips.
 
     Raises
     ------
@@ -78,7 +78,7 @@ def upright_single_frame(
     time: float = 0.0,
     keeps_world: bool = False,
 ) -> tuple[SampledAnimation, str]:
-    """Return an actor's current pose, rotated upright if its own world is upside down.
+    """Return an actor's current pose, rotated upright if its world is upside down.
 
     Parameters
     ----------
@@ -123,7 +123,8 @@ def pose_frames(
     place, scale = np.zeros((1, 3)), np.ones(1)
     rotated, moved, scales = np.zeros((1, 0, 4)), np.zeros((1, 0, 3)), np.zeros((1, 0, 3))
     if pose is not None:
-        weights[0, : len(pose.shape_weights)] = pose.shape_weights  # missing weights count as 0
+        # Missing weights are treated as 0.
+        weights[0, : len(pose.shape_weights)] = pose.shape_weights
         place, scale = pose.figure_translation[None].copy(), np.array([pose.figure_scale])
     if pose is not None and skeleton is not None:
         scales = pose.scales[None].copy()

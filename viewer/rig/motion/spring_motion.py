@@ -43,16 +43,16 @@ _MOST_TRACKS = 4
 
 
 class SpringMotion:
-    """Simulation of an actor's spring joints; ``Actor.springs`` holds it while it is on.
+    """Simulation of an actor's spring joints; ``Actor.springs`` holds it while springs are enabled.
 
-    Copies of an actor may share it. Results are kept until the clip changes, or the part of the
-    pose that the clip does not animate.
+    Copies of an actor may share it. Results are cached until the clip, or the part of the pose that
+    the clip does not animate, changes.
 
     Parameters
     ----------
     up : (3,), optional
-        The direction that is up in the world of the clip, in figure space: that of the figure if
-        omitted. Gravity is rotated with it.
+        Up direction of the clip's world in figure space; the up axis of the figure if omitted.
+        Gravity is rotated with it.
     """
 
     def __init__(self, up: Floats | None = None) -> None:
@@ -88,7 +88,7 @@ class SpringMotion:
             while len(self._tracks) >= _MOST_TRACKS:
                 del self._tracks[next(iter(self._tracks))]
             track = SpringTrack(self.skeleton_of(figure), clip.start, clip.end)
-            # The clip is kept alive, so that no other clip gets its id.
+            # A reference to the clip keeps it alive, so that no other clip gets its id.
             self._tracks[key] = clip, track
         track = self._tracks[key][1]
         return track.rotations(times, lambda at: _posed(figure, clip, at, base))
@@ -102,7 +102,7 @@ class SpringMotion:
         middle = unit(own + self._up)
         if not middle.any():
             middle = np.eye(3)["yzx".index(figure.up)]
-        # Two rotations by 180 degrees: about the figure's up axis, and about the middle of both
+        # Two rotations by 180 degrees: about the figure's up axis, and about the bisector of both
         # axes.
         first = 2.0 * np.outer(own, own) - np.eye(3)
         turn = (2.0 * np.outer(middle, middle) - np.eye(3)) @ first
@@ -117,7 +117,7 @@ def springs_for(actor: Actor, up: str) -> SpringMotion | None:
     Parameters
     ----------
     actor : Actor
-        Its placement is that of the scene.
+        Actor placed in the scene.
     up : "y" or "z"
         Up axis of the scene.
     """
@@ -135,7 +135,7 @@ def has_springs(actor: Actor) -> bool:
 
 
 def release_springs(actor: Actor) -> None:
-    """Return the spring joints of a pose to rest, in place, for instance to switch them off."""
+    """Reset the spring joints of a pose to rest, in place, for instance to switch them off."""
     skeleton = actor.figure.skeleton
     if skeleton is not None and skeleton.springs is not None and actor.pose is not None:
         _rest(actor.figure, skeleton.springs, actor.pose)
@@ -205,7 +205,7 @@ def _still(actor: Actor, clip: JointMotion) -> Pose:
 
 
 def _rest(figure: Figure, springs: Springs, pose: Pose) -> None:
-    """Return spring joints to their rest rotation, in place."""
+    """Reset spring joints to their rest rotation, in place."""
     own, skeleton = figure_pose(figure), figure.require_skeleton()
     pose.rotations[springs.joints] = own.rotations[springs.joints]
     chosen = np.isin(skeleton.dof_joints, springs.joints) & (skeleton.dof_kinds >= 3)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
@@ -25,13 +25,13 @@ SLOWEST, FASTEST = 1e-6, 1e6
 """Limits of the frame rate, outside which the times of long motions lose precision."""
 
 DEFAULT_RATE = 30.0
-"""Frames per second of motions without a frame rate of their own."""
+"""Frames per second of motions that have no frame rate."""
 
 RATES = f"{SLOWEST:g} to {FASTEST:,.0f} frames per second"
-"""The limits as text, for messages."""
+"""Limits of the frame rate as text for messages."""
 
-_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame count as that frame
-# The same for the ends of motions, which files store in seconds of single precision.
+_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame are treated as that frame
+# The same tolerance for the ends of motions, which files store as single-precision seconds.
 _AT_FRAME = 1e-3
 
 
@@ -56,7 +56,7 @@ def frame_at(seconds: float, rate: float) -> int:
 def frame_times(start: float, end: float, rate: float) -> Floats:
     """Return the times of all frames from a start to an end (F,), seconds."""
     times: Floats = start + np.arange(frame_at(end - start, rate) + 1) / rate
-    # A repeating curve would be back at its start just after its end.
+    # Just after its end, a repeating curve would be at its start again.
     return np.minimum(times, end)
 
 
@@ -102,7 +102,7 @@ class Timing:
 
     @property
     def present(self) -> Bools:
-        """Which frames exist: (F,)."""
+        """Mask of the frames that exist: (F,)."""
         return self.rows >= 0
 
     def time(self, frame: int) -> float:
@@ -122,7 +122,7 @@ class Timing:
         Returns
         -------
         before, after : (T,)
-            Rows; both are -1 where there is no data.
+            Rows; both are -1 if there is no data.
         fraction : (T,)
             0 at ``before``, 1 at ``after``; exactly 0 on a frame.
         """

@@ -11,10 +11,9 @@ that a step would move beyond a limit stop there, and the others compensate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
@@ -24,11 +23,11 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
-_CLOSE = 1e-7  # fraction of the chain's length; a smaller error counts as 0
+_CLOSE = 1e-7  # fraction of the chain's length; smaller errors are treated as 0
 _STILL = 1e-10  # radians; smaller steps end the search
-_LARGEST_STEP = 0.5  # radians; beyond it the linearisation is poor
-_BEND = 0.02  # radians; bends a straight chain out of a singular pose
-_LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # relative to the chain's length
+_LARGEST_STEP = 0.5  # radians; the linearisation is poor for larger steps
+_BEND = 0.02  # radians by which a straight chain is bent out of a singular pose
+_LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # limits of the damping, relative to the chain's length
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,16 +50,16 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may rotate to move a joint: its nearest ancestors with free rotations.
+    """Return the joints that may rotate to move a joint: the nearest ancestors with free rotations.
 
     Parameters
     ----------
     skeleton : Skeleton
         Provides the hierarchy and the DOF table.
     joint : int
-        The joint to move; its own rotations do not move it.
+        The joint to move; its rotations do not move its origin.
     length : int
-        Maximum number of joints; joints without a free rotation do not count.
+        Maximum number of joints, not counting joints without a free rotation.
 
     Returns
     -------
@@ -145,7 +144,7 @@ def rotation_axes(skeleton: Skeleton, pose: Pose, joint: int) -> dict[int, Float
 def reach(
     skeleton: Skeleton, pose: Pose, joint: int, target: Floats, length: int = 2, rounds: int = 60
 ) -> Reach:
-    """Return DOFs that move a joint as close to a target as its chain allows.
+    """Return the DOFs that move a joint as close to a target as its chain allows.
 
     Parameters
     ----------
@@ -236,12 +235,12 @@ class _Solver:
         return False
 
     def _step(self, jacobian: Floats, error: Floats, start: Floats) -> Floats:
-        """Return the damped step; DOFs that reach a limit stop there, the others continue."""
+        """Return the damped step; DOFs that reach a limit stop there, and the others continue."""
         step = np.zeros(len(start))
         free: Bools = np.ones(len(start), dtype=bool)
         damp = (self.damping * self.size) ** 2 * np.eye(3)
         for _ in range(len(start)):
-            # DOFs stopped at a limit move by a known amount; the step is solved for the others.
+            # DOFs stopped at a limit move by a known amount; the step is solved for the other DOFs.
             part = jacobian[:, free]
             left = error - jacobian[:, ~free] @ step[~free]
             step[free] = part.T @ np.linalg.solve(part @ part.T + damp, left)
@@ -257,10 +256,10 @@ class _Solver:
         return np.clip(start + step, self.low, self.high) - start
 
     def _bend(self, error: Floats) -> bool:
-        """Bend a chain that is collinear with its target, where no small rotation moves it closer.
+        """Bend a chain that is collinear with its target: no small rotation moves it closer.
 
         Each DOF is tried in the direction with more room to its limits; the bend after which the
-        next step comes closest to the target is kept.
+        next step comes closest to the target is used.
         """
         start, damping = self.pose.dofs[self.rows].copy(), self.damping
         best, nearest = None, float(np.linalg.norm(error))

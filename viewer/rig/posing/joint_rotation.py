@@ -2,7 +2,7 @@
 
 A joint's rotation relative to its parent is R(quaternion) E_n ... E_1, where each E rotates about
 one axis. Three DOFs about three different axes have a closed form with two solutions (Tait-Bryan
-angles); the solution within the limits that is closer to the current values is taken. Otherwise
+angles); of the solutions within the limits, the one closer to the current values is used. Otherwise
 each DOF is set in turn to its optimum with the others fixed, repeatedly: with M the product of the
 factors around E_k and of the target rotation's transpose, the trace to maximise is
 
@@ -12,10 +12,10 @@ factors around E_k and of the target rotation's transpose, the trace to maximise
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
 from viewer.rig.pose import Pose
@@ -24,8 +24,8 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 __all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _SWEEPS = 200
-_STILL = 1e-10  # radians; a sweep with smaller changes is the last
-_ROUNDING = 1e-9  # radians; a value this far beyond its limit counts as within it
+_STILL = 1e-10  # radians; a sweep with smaller changes is the last one
+_ROUNDING = 1e-9  # radians; a value that exceeds its limit by this much is treated as within it
 _TURN = 2.0 * math.pi
 
 
@@ -86,7 +86,7 @@ def nearest_dofs(skeleton: Skeleton, pose: Pose, joint: int, rotation: Floats) -
     skeleton : Skeleton
         Provides the DOFs and their limits.
     pose : Pose
-        Current pose, not modified; among equally good solutions, the closest to its DOFs is taken.
+        Current pose, not modified; of equally good solutions, the one closest to its DOFs is used.
     joint : int
         The joint to rotate.
     rotation : (3, 3)
@@ -132,7 +132,8 @@ class _Solver:
         starts = [self.present, *(np.clip(values, self.low, self.high) for values in exact)]
         found = [self._improved(start.copy()) for start in starts]
         errors = [self.error(values) for values in found]
-        # The current values are tried first: they are kept unless others are clearly better.
+        # The current values are tried first; other values replace them only if they are clearly
+        # better.
         return found[int(np.argmin(np.round(errors, 7)))]
 
     def error(self, values: Floats) -> float:
@@ -151,7 +152,7 @@ class _Solver:
         return product
 
     def _exact(self) -> list[Floats]:
-        """Return both closed-form solutions for three different axes; none for other axes."""
+        """Return both closed-form solutions for three different axes; an empty list otherwise."""
         if len(self.axes) != 3 or len(set(self.axes)) != 3:
             return []
         # Axes are renamed to x, y, z; an odd permutation is a reflection, which negates angles.
@@ -173,7 +174,7 @@ class _Solver:
         return np.where(is_inside, near, inside)
 
     def _improved(self, values: Floats) -> Floats:
-        """Optimise each value with the others fixed, until none changes."""
+        """Optimise each value with the others fixed until none changes."""
         count = len(values)
         for _ in range(_SWEEPS):
             before = values.copy()
@@ -189,12 +190,12 @@ class _Solver:
         return values
 
     def _best_one(self, place: int, around: Floats, now: float) -> float:
-        """Return the angle within the limits that maximises the trace, nearest to the current."""
+        """Return the angle within the limits that maximises the trace; of several, the nearest."""
         axis = self.axes[place]
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
-            return now  # all angles are equally good
+            return now  # all angles are equally suitable
         # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)

@@ -19,7 +19,7 @@ def parameter_pose(
 ) -> Pose:
     """Return the pose that SAM 3D Body stores for MHR.
 
-    Its vertices and joints are those of the pose times 0.01, with y and z negated.
+    The tool's vertices and joints are those of the pose times 0.01, with y and z negated.
 
     Parameters
     ----------
@@ -28,7 +28,7 @@ def parameter_pose(
     parameters : (P,)
         ``mhr_model_params``: placement, pose and scales.
     identity, expression : (N,), (M,)
-        ``shape_params`` and ``expr_params``; missing trailing ones count as 0.
+        ``shape_params`` and ``expr_params``; missing trailing ones are treated as 0.
 
     Raises
     ------

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -38,16 +39,15 @@ PARTS = {
 }
 """Rotation vectors of single joints under the names used by smplx."""
 
-_BODY = 21  # joints of body_pose in models with fingers or a face; only SMPL has two more
-_LONGEST_BODY = 23
-_SMALLEST, _LARGEST = 1e-6, 1e6  # scales that can be drawn in float32
-_FARTHEST = 1e9  # figure units
+_BODY, _LONGEST_BODY = 21, 23  # joints of body_pose in models with fingers or a face, and in SMPL
+_SMALLEST, _LARGEST = 1e-6, 1e6  # range of scales that can be drawn in float32
+_FARTHEST = 1e9  # largest translation, figure units
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseRecord:
-    """Contents of a pose file; missing parts leave the pose at rest.
+    """Contents of a pose file; missing parts remain at rest.
 
     Attributes
     ----------
@@ -68,11 +68,11 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
         only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; if None, they are unless there are 45 values.
+        Whether hand poses are coefficients; if None, all but those of 45 values are.
     joint_rotations : JointRotations or None
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
-        use all other parts, as far as they have the blend shapes.
+        use all other parts, except coefficients of blend shapes that they lack.
     line_of : callable or None
         Returns the line in the source file, given a part and the name of a DOF in it, as in
         ``PosePartError``.
@@ -119,7 +119,7 @@ def _part(part: str, name: str = "") -> Iterator[None]:
 
 
 def record_of(figure: Figure, pose: Pose) -> PoseRecord:
-    """Return a complete pose both by DOF names and as the model's own vector.
+    """Return a complete pose both by DOF names and as the model's pose vector.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def apply_record(
         with _part(name):
             notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
-    # A pose of a figure with the same skeleton is applied as far as possible.
+    # Everything possible is applied from a pose of a figure with the same skeleton.
     drop_excess = record.joint_rotations is not None or (drop_excess and has_shapes)
     with _part("shape"):
         notes += apply_coefficients("shape", record.shape, figure, work, drop_excess)
@@ -266,7 +266,8 @@ def _dof(figure: Figure, label: str) -> int:
     try:
         return find_dof(figure.require_skeleton(), label)
     except RigError as problem:
-        why = str(problem).removeprefix(f'"{label}": ')  # the caller adds the label
+        # The label is removed here, as the caller adds it.
+        why = str(problem).removeprefix(f'"{label}": ')
         values = {"figure": figure.name, "found": label, "reason": why}
         raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
 
@@ -277,7 +278,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's own pose vector, or that of another member of the SMPL family."""
+    """Apply the model's pose vector, or that of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers
@@ -292,7 +293,7 @@ def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic
     if names is None:
         values = {"expected": own, "figure": figure.name, "found": len(vector)}
         raise RigError(Diagnostic("F002.pose-vector", values=values))
-    # Joints that the vector's model lacks return to rest.
+    # Joints that the model of the vector lacks are reset to rest.
     joints = np.arange(skeleton.n_joints, dtype=np.int32)
     wanted = np.zeros((skeleton.n_joints, 3))
     rows = vector.reshape(-1, 3)
@@ -329,7 +330,7 @@ def _apply_part(
 
 
 def _apply_body(values: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Rotate the joints after the root; SMPL's two hand joints have no equivalent elsewhere."""
+    """Rotate the joints after the root; other models have no equivalent of SMPL's hand joints."""
     skeleton = figure.require_skeleton()
     has_more = "left_wrist" in skeleton.names and "left_hand" not in skeleton.names
     own = _BODY if has_more else skeleton.n_joints - 1

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.geometry.rotation import (
@@ -84,7 +83,7 @@ def set_joint_rotations(
 ) -> None:
     """Set the rotations of joints relative to their parents, in place.
 
-    A ball joint's DOFs take the rotation as angles about x, y, z; other joints keep their DOFs as
+    A ball joint's DOFs are set to the angles about x, y, z; other joints keep their DOFs as
     close to 0 as the limits allow and store the remaining rotation as a quaternion.
 
     Parameters

@@ -2,8 +2,8 @@
 
 The trunk stands upright in its mean posture, the legs hang straight down with the knees' axes
 sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
-level. All other joints keep their mean rotation. A bend of the spine or a twist of the
-forearms that never changes cannot be seen: it counts as part of the rest pose.
+level. All other joints keep their mean rotation. A bend of the spine or a twist of the forearms
+that never changes cannot be detected and becomes part of the rest pose.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ __all__ = ["anatomical_rest", "upright_frames"]
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
 _UPRIGHT = np.cos(np.radians(30.0))
 _STOOPED = np.cos(np.radians(60.0))
-_ENOUGH = 0.05  # fraction of the frames
-_SLOPE = np.radians(30.0)  # from the ankle down to the ball of a standing foot
-_STANCE = 25.0  # percent of the frames in which a foot is lowest, and its sole level
+_ENOUGH = 0.05  # minimum fraction of upright frames
+_SLOPE = np.radians(30.0)  # slope from the ankle down to the ball of a standing foot
+_STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sole level
 
 
 def upright_frames(postures: Postures) -> Postures | None:
@@ -43,18 +43,18 @@ def anatomical_rest(
     Parameters
     ----------
     postures : Postures
-        Upright poses of the motion, or righted ones.
+        Poses of the motion, upright or rotated upright.
     skeleton : Skeleton
         Its skeleton.
     has_stances : bool
-        Whether the poses are upright, and show the soles; otherwise the feet point forwards.
+        Whether the poses are upright and show the soles; otherwise the feet point forwards.
 
     Returns
     -------
     rotations : (J, 3, 3)
         World rotations, in the skeleton's axes.
     limbs : list of LimbAxes
-        The limbs; those whose axis is not seen have an estimated roll.
+        The limbs; if the motion does not show a limb's axis, its roll is estimated.
     """
     parents = skeleton.parents
     body = _body_axes(postures)
@@ -162,7 +162,7 @@ def _foot(postures: Postures, side: str, stands: Floats) -> dict[int, Floats]:
 
 
 def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Floats]:
-    """Return the rotation of a leg's foot: sideways like its knee, with the toes forward."""
+    """Return the rotation of a foot: side axis parallel to the knee's, toes forward."""
     side = limb.upper.partition("_")[0]
     ankle, toes = postures.joints[f"{side}_ankle"], postures.joints.get(f"{side}_foot")
     if toes is None:

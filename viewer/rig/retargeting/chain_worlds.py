@@ -1,12 +1,12 @@
-"""World matrices of some joints of a moving skeleton, without computing all others."""
+"""World matrices of a subset of the joints of a moving skeleton."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics

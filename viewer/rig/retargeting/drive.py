@@ -1,10 +1,10 @@
-"""Motions that drive figures, stored so that they can be retargeted again with another match."""
+"""Motions that drive figures, stored so that they can be retargeted with another match."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from viewer.data_classes import dataclass
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap
@@ -14,20 +14,20 @@ __all__ = ["Drive"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with other joints, and the retargeting options.
+    """A motion that drives a figure with different joints, and the retargeting options.
 
     Attributes
     ----------
     motion : SkeletonMotion
         The motion of the source.
     source_rest : int, "zero" or "auto"
-        Its rest pose, see ``viewer.rig.retargeting.source_rest``.
+        Rest pose of the motion, see ``viewer.rig.retargeting.source_rest``.
     joint_map : JointMap or None
         The requested match of joints; None for the automatic one.
     keeps_up : bool
-        Whether the result keeps the up axis of the motion's world instead of the figure's.
+        Whether the result keeps the up axis of the motion's world instead of using the figure's.
     plants_feet : bool
-        Whether feet stay planted while those of the source stand.
+        Whether feet stay planted while those of the source are on the ground.
     hangs : bool
         Whether the up axis of the motion points down.
     finish : callable or None

@@ -10,17 +10,17 @@ from viewer.rig.retargeting.joint_matches import Matches
 __all__ = ["ground_offset"]
 
 _FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
-# Cosine of the maximum angle between the up axis and the legs of somebody who stands.
+# Cosine of the maximum angle between the up axis and the legs of a standing person.
 _UPRIGHT = np.cos(np.radians(25.0))
 
 
 def ground_offset(
     source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
 ) -> Floats:
-    """Return the offset that puts the target's feet where those of the scaled source are.
+    """Return the offset that moves the target's feet to those of the scaled source.
 
-    The path is scaled by the ratio of leg lengths from hip to ankle; feet and hips may have another
-    ratio. Without this offset, a body with high ankles sinks into the ground.
+    The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
+    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def ground_offset(
     Returns
     -------
     (3,)
-        Along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
+        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
         source does not stand in its rest pose.
     """
     place = {

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
@@ -19,7 +19,7 @@ __all__ = ["Matches", "match_joints"]
 _LIMBS = ("left_hip left_knee", "right_hip right_knee", "left_shoulder left_elbow",
           "right_shoulder right_elbow")  # fmt: skip
 
-_Names = tuple[tuple[str, ...], tuple[str, ...]]  # of the source, and of the target
+_Names = tuple[tuple[str, ...], tuple[str, ...]]  # names of the source, and of the target
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,8 @@ class Matches:
     origins : tuple of J str
         How each joint was matched: ``"map"`` by the joint map, ``"hierarchy"`` with the whole
         hierarchy, ``"humanoid"`` by the human bones that a file states, ``"name"`` by a known name,
-        ``"place"`` by its place among other joints, ``"same name"``; empty for unmatched joints.
+        ``"place"`` by its position in the hierarchy, ``"same name"`` by an equal name; empty for
+        unmatched joints.
     """
 
     partners: Ints
@@ -57,8 +58,8 @@ def match_joints(
 ) -> Matches:
     """Match joints by mapping, then by the meaning of names, then by equal names.
 
-    A source joint of the mapping is not matched again automatically. A mapping that states the
-    automatic match has the same result as none.
+    A source joint of the mapping is not matched again automatically. A mapping that equals the
+    automatic match has the same result as no mapping.
 
     Parameters
     ----------
@@ -190,7 +191,7 @@ def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str]
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[Diagnostic]:
-    """Return messages about matched joints and unmatched ones."""
+    """Return messages about matched and unmatched joints."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
         Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])

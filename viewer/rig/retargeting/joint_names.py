@@ -3,8 +3,8 @@
 The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
 MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
 Max's Biped, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify. Sides are detected as ``L``,
-``R``, ``Left`` or ``Right`` at either end of a name; prefixes that most joints have
-(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are dropped.
+``R``, ``Left`` or ``Right`` at either end of a name; prefixes shared by most joints
+(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are removed.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ _WORDS = {
     "eye": "eye eyesmplhf eyeball",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
-# Removed before a side or a word.
+_AMBIGUOUS = {"foot", "shoulder", "hand"}  # words for different joints in different conventions
+# Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
 _SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
@@ -53,8 +53,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # fraction of the joints; a first word that more joints share is a prefix
-_MOST = 2000  # number of joints; a skeleton with more is not a body
+_SHARED = 0.6  # fraction of the joints; a first word shared by more joints is a prefix
+_MOST = 2000  # maximum number of joints; a skeleton with more is not a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
@@ -63,7 +63,7 @@ _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that every program can read: unique, and consisting of ``[A-Za-z0-9_]`` only.
+    """Return names that every program can read: unique, and consisting only of ``[A-Za-z0-9_]``.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     Returns
     -------
     list of J (str, str)
-        ``"left"``, ``"right"`` or ``""``, and the rest in lower case.
+        ``"left"``, ``"right"`` or ``""``, and the remaining word in lower case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
@@ -119,7 +119,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return the SMPL family's name for each joint, as its file states it or its name implies.
+    """Return the SMPL family's name for each joint, as stated by its file or implied by its name.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
     Returns
     -------
     tuple of J str
-        As ``canonical_names``.
+        Names as returned by ``canonical_names``.
     """
     if skeleton.humanoid is not None:
         return _stated(skeleton.humanoid, skeleton.n_joints)
@@ -137,7 +137,7 @@ def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
 
 
 def joints_by_place(skeleton: Skeleton) -> set[int]:
-    """Return the joints whose meaning follows from their place in the hierarchy, not their names.
+    """Return the joints identified by their position in the hierarchy, not by their names.
 
     These are the pelvis above two legs, and the head at the end of a spine. A skeleton with a
     humanoid has none.
@@ -282,10 +282,10 @@ def _tokens(name: str) -> list[str]:
 
 
 def _key(tokens: list[str]) -> _Key:
-    """Return the side, taken from either end, and the word of a name."""
+    """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM
+    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM have the prefix c
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
@@ -297,7 +297,7 @@ def _key(tokens: list[str]) -> _Key:
         return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
     word = _word(tokens)
     for letters in ("left", "right", "l", "r"):
-        # lfemur: a lower-case side without a separator counts only before a known word.
+        # lfemur: a lower-case side without a separator is recognised only before a known word.
         if word.startswith(letters) and word not in _ROLES and _is_known(word[len(letters) :]):
             return _SIDES[letters], word[len(letters) :]
     return "", word
@@ -329,7 +329,7 @@ def _unambiguous(keys: list[_Key]) -> list[_Key]:
 
 
 def _role(key: _Key) -> str:
-    """Return the canonical name of one joint, or the chain that it belongs to."""
+    """Return the canonical name of one joint, or the chain to which it belongs."""
     side, word = key
     finger = _finger(word)
     if finger:

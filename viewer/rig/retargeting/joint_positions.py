@@ -41,7 +41,7 @@ def rest_positions(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
 def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Floats:
     """Return the axes of a front view: left of the body, up, and forward, as rows: (3, 3).
 
-    The left side of the body is found from known joints; without any, it is along x.
+    The left side of the body is found from known joints; without such joints, it is along x.
 
     Parameters
     ----------

@@ -10,11 +10,11 @@ from viewer.rig.cleanup.leg_ik import Leg
 __all__ = ["animal_legs"]
 
 # Lengths are relative to the height of the skeleton.
-_FOOT = 0.12  # height of the last joint of a leg
+_FOOT = 0.12  # maximum height of the last joint of a leg
 _TOE = 0.05  # maximum height of the joint on which a foot stands
-_PAW = 0.15  # extent of the toes of one foot
-_MIRRORED = 0.05  # distance between a foot and the mirrored foot of the other side
-_FEWEST = 4  # legs
+_PAW = 0.15  # maximum extent of the toes of one foot
+_MIRRORED = 0.05  # maximum distance between a foot and the mirrored foot of the other side
+_FEWEST = 4  # minimum number of legs
 
 
 def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
@@ -34,7 +34,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     list of Leg
         Hip, knee and ankle are the two long bones of a leg, without a scapula. The ankle is the
         hock of a hind leg and the wrist of a front leg. Chains without a counterpart on the other
-        side, such as a tail, are left out. Empty if there are fewer than four legs.
+        side, such as a tail, are omitted. Empty if there are fewer than four legs.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())

@@ -1,24 +1,23 @@
 """Bending axes of knees and elbows, found from the motion.
 
 A joint bends about the normal of its two bones, cross(upper, lower), whose length is the sine of
-the angle. Knees bend backwards and elbows forwards, so that the sign of the normal tells left from
-right. Its mean over the motion, in the axes of a joint, is the joint's own axis.
+the angle. Knees bend backwards and elbows forwards, so the sign of the normal distinguishes left
+from right. Its mean over the motion, in the axes of a joint, is the bending axis of the joint.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.postures import SIDES, Postures, unit
 
 __all__ = ["LimbAxes", "limb_axes"]
 
 _LIMBS = (("hip", "knee", "ankle", -1.0), ("shoulder", "elbow", "wrist", 1.0))
-_BENT = np.sin(np.radians(15.0))  # a joint that never bends further shows no axis
-_COHERENT = 0.7  # length of the mean of the normals in proportion to their mean length
+_BENT = np.sin(np.radians(15.0))  # sine of the minimum bend that shows the axis of a joint
+_COHERENT = 0.7  # minimum ratio of the length of the mean normal to the mean length of the normals
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,8 +26,8 @@ _NEAR = 0.02
 def mirror_axis(figure: Figure) -> int:
     """Return the axis across which a figure is symmetric: 0 for x, 1 for y.
 
-    With a symmetry map, it is the axis with the smallest error; otherwise y for z-up figures, whose
-    left is +y, and x for y-up figures.
+    With a symmetry map, it is the axis with the smallest error; otherwise it is y for z-up figures,
+    whose left is +y, and x for y-up figures.
     """
     if figure.symmetry is None or figure.mesh is None:
         return 1 if figure.up == "z" else 0
@@ -91,9 +91,9 @@ def joint_partners(figure: Figure) -> Ints:
 def posing_partners(figure: Figure) -> Ints:
     """Return each joint's counterpart for mirrored poses: (J,) int32.
 
-    That of ``joint_partners`` for symmetric skeletons. Pairs of other humanoids are found by the
-    bones that their file states and by names (``Ear_L``, ``Ear_R``), and joints in the mirror
-    plane are their own; -1 for joints on one side only, such as a sword.
+    The result is that of ``joint_partners`` for symmetric skeletons. Pairs of other humanoids are
+    found by the bones that their file states and by names (``Ear_L``, ``Ear_R``), and joints in the
+    mirror plane are their own counterparts; -1 for joints on one side only, such as a sword.
 
     Raises
     ------
@@ -142,9 +142,9 @@ def _sided(meaning: str) -> tuple[str, str]:
 def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     """Return the mirrored pose, with left and right exchanged.
 
-    World rotations relative to the rest pose are reflected, D' = F D F, and each joint takes that
-    of its counterpart; rest rotations may therefore differ between the sides. Joints without a
-    counterpart keep their local rotation.
+    World rotations relative to the rest pose are reflected, D' = F D F, and each joint gets the
+    rotation of its counterpart; rest rotations may therefore differ between the sides. Joints
+    without a counterpart keep their local rotation.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     Raises
     ------
     RigError
-        If the skeleton is neither symmetric nor a stated humanoid.
+        If the skeleton is not symmetric and the file states no human bones.
     """
     partners = posing_partners(figure)
     skeleton = figure.require_skeleton()

@@ -1,15 +1,16 @@
 """Transfer of a pose to another figure whose joints have the same names.
 
-Joints are matched by name and take the matching joint's rotation relative to the rest pose, in the
+Joints are matched by name and get the matching joint's rotation relative to the rest pose, in the
 figure's axes, so DOF orders, rest rotations and intermediate joints may differ. With the
 world rotations W of the pose and W0 of the skeleton with all DOFs at 0,
 
     W_target = C W_source W0_source^T C^T W0_target
 
-where C rotates the source's up axis to the target's, and its left if the file of either states
-human bones: their joints match by these bones, and may face another way. Of the source, only the
-rotations W_source W0_source^T are needed: they accompany a pose in files and on the clipboard.
-Figures with the source's skeleton take its DOFs, base rotations and translations instead.
+where C rotates the source's up axis to the target's, and also its left if the file of either states
+human bones: their joints match by these bones, and the figures may face different directions. Of
+the source, only the rotations W_source W0_source^T are needed: they accompany a pose in files and
+on the clipboard. Figures with the source's skeleton get its DOFs, base rotations and translations
+instead.
 """
 
 from __future__ import annotations
@@ -17,10 +18,11 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import printable
@@ -48,8 +50,8 @@ __all__ = [
     "rotate_joints",
 ]
 
-_INEXACT = 1e-4  # radians; a rotation with a smaller error counts as reached
-_REST_DIGITS = 5  # decimals to which equal rest rotations agree
+_INEXACT = 1e-4  # radians; a rotation with a smaller error is treated as reached
+_REST_DIGITS = 5  # number of decimals to which equal rest rotations agree
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +77,7 @@ class JointRotations:
     meanings : tuple of J str
         For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
     left : (3,)
-        The figure's left, a horizontal direction; that of figures with meanings is measured.
+        The figure's left, a horizontal direction; measured for figures with meanings.
     """
 
     figure: str
@@ -127,7 +129,7 @@ def dof_layout(figure: Figure) -> str:
         Figure with a skeleton.
     """
     skeleton = figure.require_skeleton()
-    # Adding 0 turns -0 into 0.
+    # Adding 0 replaces -0 by 0.
     rest = quaternion_to_matrix(skeleton.rest_rotations).round(_REST_DIGITS) + 0.0
     parts = (
         repr((skeleton.names, figure.up)).encode("utf-8", "surrogatepass"),
@@ -141,7 +143,7 @@ def dof_layout(figure: Figure) -> str:
 
 
 def has_layout_of(source: JointRotations, figure: Figure) -> bool:
-    """Return whether a figure can take a pose's DOFs directly, not only its joint rotations.
+    """Return whether a pose's DOFs, not only its joint rotations, can be applied to a figure.
 
     Parameters
     ----------
@@ -205,7 +207,7 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
 def rotate_joints(
     source: JointRotations, target: Figure, start: Pose
 ) -> tuple[Pose, list[Diagnostic]]:
-    """Return a figure's pose with the joints rotated like those of another figure.
+    """Return a figure's pose with its joints rotated like those of another figure.
 
     Parameters
     ----------
@@ -262,7 +264,7 @@ def _partners(source: JointRotations, target: Skeleton) -> Ints:
 
 
 def left_of(figure: Figure) -> Floats:
-    """Return the left of a figure whose file states human bones; of others +x, as is usual.
+    """Return the left of a figure whose file states human bones; +x, the usual left, for others.
 
     Characters of VRM 0.x face -z: their left is -x.
     """

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -16,7 +17,7 @@ __all__ = ["SIDES", "Postures", "postures_of", "rest_posture", "unit"]
 
 SIDES = ("left", "right")
 _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_MOST = 4000  # frames; of longer motions, every n-th frame is used
+_MOST = 4000  # maximum number of frames; of longer motions, every n-th frame is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -34,7 +35,7 @@ class Postures:
     joints : dict of str to int
         Joints by their names in SMPL.
     up : (3,)
-        The up axis of the file; the body's own up axis if it is upside down.
+        The up axis of the file; the up axis of the body if it is upside down.
     """
 
     rows: Ints
@@ -77,7 +78,7 @@ class Postures:
         )
 
     def chosen(self, frames: Bools) -> Postures:
-        """Return some of the poses."""
+        """Return the poses at the given indices."""
         return replace(
             self,
             rows=self.rows[frames],

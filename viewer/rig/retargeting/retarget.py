@@ -7,16 +7,17 @@ of source and target::
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
 where B rotates the figure's rest pose to the source's at that joint, for instance from a T-pose
-to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg lengths.
+to an A-pose. Lengths are those of the figure; the path is scaled by the ratio of leg lengths.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -84,7 +85,7 @@ def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> Skel
 
 
 def _in_path_unit(motion: SkeletonMotion) -> SkeletonMotion:
-    """Return the same motion of a skeleton in the unit of its path, as that of MHR in metres."""
+    """Return the same motion of a skeleton in the unit of its path, such as metres for MHR."""
     clip, scales = motion.clip, motion.clip.figure_scales
     usual = 1.0 if scales is None or len(scales) == 0 else float(np.median(scales))
     if scales is None or usual == 1.0 or not 0.0 < usual < np.inf:
@@ -104,7 +105,7 @@ class Retargeted:
     clip : SampledClip
         Motion of the figure.
     notes : list of Diagnostic
-        Messages, as of ``retarget``.
+        Messages as returned by ``retarget``.
     source : SkeletonMotion
         The motion, with the rest pose that was used.
     matches : Matches
@@ -133,8 +134,8 @@ def retarget(
 
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
-    and hierarchy matches joint by joint. Limbs take the directions of the source's limbs, exactly;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
+    spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters
@@ -217,14 +218,14 @@ class _Job:
     target: Skeleton
     rests: tuple[RestPose, RestPose]  # in the figure's axes
     matches: Matches
-    to_target: Floats  # (3, 3), the source's axes to the figure's
+    to_target: Floats  # (3, 3), from the source's axes to the figure's
     is_same: bool
 
 
 def _job(
     motion: SkeletonMotion, source: Skeleton, to: tuple[Skeleton, str], matches: Matches
 ) -> _Job:
-    """Return the inputs of a retargeting; ``to``: the figure's skeleton and up axis."""
+    """Return the inputs of a retargeting; ``to`` is the figure's skeleton and up axis."""
     target, up = to
     to_target = up_rotation(motion.figure.up, up)
     rests = rest_of(source, to_target, up), rest_of(target, np.eye(3), up)

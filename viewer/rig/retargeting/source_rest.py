@@ -24,13 +24,13 @@ from viewer.rig.skeleton import Skeleton
 __all__ = ["SourceRest", "rest_fault", "with_source_rest"]
 
 SourceRest = int | str
-"""Number of a frame, ``"zero"`` for the zero pose, or ``"auto"``."""
+"""A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
 
-_FOLDED = np.cos(np.radians(60.0))  # legs this close to the trunk's direction are no legs
+_FOLDED = np.cos(np.radians(60.0))  # joint chains this close to the trunk's direction are not legs
 _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
-_A_POSE = np.radians(55.0)  # steepest arms of an A-pose, below the horizontal
-_T_POSE = np.radians(20.0)  # steepest arms of a T-pose
-_ROLLED = np.cos(np.radians(60.0))  # limbs that are rolled further are no T- or A-pose
+_A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
+_T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
+_ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pose
 
 
 def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
@@ -54,14 +54,14 @@ def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
 def with_source_rest(
     motion: SkeletonMotion, choice: SourceRest
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
-    """Return a motion whose skeleton has the requested rest pose; the motion is the same.
+    """Return a motion whose skeleton has the requested rest pose; the motion itself is unchanged.
 
     Parameters
     ----------
     motion : SkeletonMotion
         Skeleton and clip.
     choice : int, "zero" or "auto"
-        The frame that is the rest pose; the skeleton's own rest pose; or that one if it is a
+        The frame that is the rest pose; the skeleton's own rest pose; or the latter if it is a
         standing pose or its limbs have no known names, otherwise the best T- or A-pose among the
         frames, otherwise an estimate from the anatomy.
 
@@ -70,7 +70,7 @@ def with_source_rest(
     motion : SkeletonMotion
         The same clip, with another rest pose of the skeleton.
     notes : list of Diagnostic
-        The chosen rest pose, unless it is the skeleton's own.
+        The chosen rest pose, unless it is that of the skeleton.
 
     Raises
     ------
@@ -103,7 +103,7 @@ def with_source_rest(
 def _estimated(
     motion: SkeletonMotion, skeleton: Skeleton, upright: Postures
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
-    """Return a motion with a rest pose from its upright frames."""
+    """Return a motion with a rest pose estimated from its upright frames."""
     called = {"motion": motion.figure.name}
     row, drop = _calibration(upright)
     if row >= 0:
@@ -121,7 +121,7 @@ def _estimated(
 
 
 def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other world rotations: (J, 3, 3)."""
+    """Return a motion whose skeleton has other world rotations at rest: (J, 3, 3)."""
     above = worlds[skeleton.parents]
     above[skeleton.parents < 0] = np.eye(3)
     local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
@@ -129,7 +129,7 @@ def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> Skele
 
 
 def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other local rotations: (J, 4)."""
+    """Return a motion whose skeleton has other local rotations at rest: (J, 4)."""
     rested = replace(skeleton, rest_rotations=local)
     return replace(motion, figure=replace(motion.figure, skeleton=rested))
 
@@ -185,7 +185,7 @@ def _calibration(postures: Postures) -> tuple[int, float]:
 
 
 def _is_rolled(postures: Postures, left: Floats, forward: Floats) -> Bools:
-    """Return in which frames a limb's bending axis is not that of a T- or A-pose: (F,)."""
+    """Return a mask of the frames whose bending axes are not those of a T- or A-pose: (F,)."""
     result = np.zeros(len(postures.rows), dtype=bool)
     for limb in limb_axes(postures):
         if limb.is_seen:

@@ -6,12 +6,12 @@ A quantity is named by its key, followed by its joint or field if it has one: ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from keyword import iskeyword
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats
@@ -47,7 +47,8 @@ __all__ = [
     "strongest",
 ]
 
-_NOISE = 1e-9  # relative to the figure's size for lengths, otherwise absolute
+# Smaller values are 0; relative to the figure's size for lengths, otherwise absolute.
+_NOISE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +64,7 @@ class Quantity:
     needs : str
         Part that a figure must have, as named in the message if it is missing.
     kind : str
-        ``"sequential"``: amounts from 0; ``"diverging"``: below or above 0; ``"discrete"``:
+        ``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0; ``"discrete"``:
         counts; ``"categorical"``: indices of named items.
     unit : str
         ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
@@ -144,7 +145,7 @@ SCALARS = {
         "Classes", "fields", "classes", "categorical", "", moves=False, about="field"
     ),
 }
-"""Quantities by name, in the order of menus."""
+"""Quantities by name, in menu order."""
 
 
 def split_name(name: str) -> tuple[str, str]:
@@ -191,7 +192,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
     pose : Pose or None
         None for the mesh in the bind pose.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning options of the drawn mesh.
 
     Returns
     -------
@@ -215,7 +216,7 @@ def compute(name: str, figure: Figure, pose: Pose | None, skinning: Skinning) ->
         Asked(figure, pose, skinning, index, about)
     )
     if quantity.moves:
-        # Otherwise, rounding errors would span the whole colour map if the pose has no effect.
+        # Otherwise, rounding errors would span the whole colour map if the pose had no effect.
         size = box_size(bounding_box(mesh.positions)) if quantity.unit == "length" else 1.0
         values[np.abs(values) < _NOISE * size] = 0.0
     return values
@@ -261,7 +262,7 @@ def quantity_title(name: str, figure: Figure, skinning: Skinning) -> str:
     figure : Figure
         Provides the names of joints and fields.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning options of the drawn mesh.
 
     Raises
     ------
@@ -330,5 +331,5 @@ def _missing(needs: str, figure: Figure) -> str:
 
 
 def strongest(figure: Figure) -> int:
-    """Return the largest number of influences of any vertex."""
+    """Return the maximum number of influences of a vertex."""
     return 0 if figure.skin is None else int(np.diff(figure.skin.starts).max(initial=0))

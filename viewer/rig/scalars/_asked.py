@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import shown_joint_of
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import Skinning, skin_used
 
-_FOUR = 4  # influences per vertex in most engines
+_FOUR = 4  # maximum number of influences per vertex in most engines
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +25,7 @@ class Asked:
     pose : Pose or None
         Pose; not None for quantities that depend on it.
     skinning : Skinning
-        How the mesh is drawn.
+        Skinning options of the drawn mesh.
     joint : int
         Index of a joint of the skin, -1 for quantities without a joint.
     about : str
@@ -41,7 +42,7 @@ class Asked:
     def skin(self) -> Skin:
         """The effective influences: as stored, or pruned and normalised as requested.
 
-        Those of auxiliary joints are influences of the joints that are shown for them.
+        Influences of auxiliary joints are assigned to the joints that are shown in their place.
         """
         skin, skeleton = skin_used(self.figure.require_skin(), self.skinning), self.figure.skeleton
         if skeleton is None or skeleton.auxiliary is None:
@@ -50,5 +51,5 @@ class Asked:
 
 
 def influences_kept(skinning: Skinning) -> int:
-    """Return the number of influences to compare with: the chosen limit, or four."""
+    """Return the number of influences for the comparison: the chosen limit, or four."""
     return skinning.max_influences or _FOUR

@@ -32,5 +32,5 @@ def joint_of(figure: Figure, text: str) -> int:
 
 
 def joint_text(figure: Figure, joint: int) -> str:
-    """Return the label of a joint, ``"#4"`` without a name."""
+    """Return the label of a joint, such as ``"#4"`` if it has no name."""
     return f"#{joint}" if figure.skeleton is None else joint_label(figure.skeleton, joint)

@@ -12,7 +12,7 @@ __all__ = ["class_", "field"]
 
 
 def field(asked: Asked) -> Floats:
-    """Return the values of a field: (V,), in its own unit."""
+    """Return the values of a field: (V,), in the unit of the field."""
     return _values(asked, is_class=False)
 
 

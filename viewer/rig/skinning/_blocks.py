@@ -1,16 +1,17 @@
 """Weights as dense blocks: a few hundred vertices times the joints that influence any of them.
 
-Vertices that are close in a file mostly have the same joints, so the blocks stay small, and one
-product of two dense matrices per block is several times faster than summing a flat list in numpy.
+Vertices that are close to each other in a file usually have the same joints, so the blocks stay
+small, and one product of two dense matrices per block is several times faster than summing a flat
+list in numpy.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.skin import Skin, has_influence
@@ -47,13 +48,13 @@ _kept: Memo[Skin, tuple[Block, ...] | None] = Memo()
 
 
 def blocks_of(skin: Skin) -> Iterator[Block]:
-    """Yield a skin's blocks, cached as long as the skin lives unless they are unusually large."""
+    """Yield a skin's blocks, cached for the skin's lifetime unless they are unusually large."""
     kept = _kept.get(skin, None, lambda: _within_limit(skin))
     yield from _blocks(skin) if kept is None else kept
 
 
 def _within_limit(skin: Skin) -> tuple[Block, ...] | None:
-    """Return all blocks of a skin, or None if they are too large to keep."""
+    """Return all blocks of a skin, or None if they are too large to be cached."""
     blocks, size = [], 0
     for block in _blocks(skin):
         size += block.weights.size

@@ -15,7 +15,8 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 14  # matrices per chunk, which fit into the processor's cache and limit the memory
+# Number of matrices per chunk, which fits into the processor's cache and limits the memory.
+_CHUNK = 1 << 14
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 
@@ -24,8 +25,8 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Transform by blended matrices: v' = B [v 1], n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
-    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If some
-    scale or shear, they use its inverse transpose, n' = unit(B^-T n).
+    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If any
+    joint scales or shears, normals use its inverse transpose, n' = unit(B^-T n).
 
     Parameters
     ----------

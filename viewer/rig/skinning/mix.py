@@ -19,7 +19,7 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Interpolate each vertex: (1 - blend_factor) LBS + blend_factor DQS.
 
-    Where joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
+    If joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
 
     Parameters
     ----------

@@ -1,1 +1,1 @@
-"""Spring joints, which lag behind the motion of others, such as hair and skirts."""
+"""Spring joints, such as those of hair and skirts, which lag behind the motion of other joints."""

@@ -1,12 +1,12 @@
 """Simulation of spring joints by Verlet integration, in steps of equal length.
 
-With the position c of the point now and p in the step before, the head h and rest direction a of
+With the position c of the point now and p one step before, the head h and rest direction a of
 the joint in its posed parent, and a step of t seconds, a step computes ::
 
     n = c + (1 - drag) (c - p) + t (stiffness a + gravity)
     n = h + length (n - h) / |n - h|
 
-and then moves n out of each collider, along the shortest way, and back to its length. The joint's
+and then moves n out of each collider along the shortest path and restores its length. The joint's
 rotation is the smallest one that points it at n. Inertia, the first two terms, is evaluated in the
 space of the joint's centre. Joints are updated from the root to the tips.
 
@@ -15,10 +15,9 @@ Source: ``VRMC_springBone`` 1.0, github.com/vrm-c/vrm-specification.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -29,17 +28,17 @@ from viewer.rig.springs.springs import Springs
 __all__ = ["STEPS_PER_SECOND", "Simulation", "Tails"]
 
 STEPS_PER_SECOND = 60
-"""Steps of the simulation per second; the result depends on it, as in other programs."""
+"""Simulation steps per second; the result depends on this rate, as in other programs."""
 
 _STEP = 1.0 / STEPS_PER_SECOND
 _SHORT = 1e-12
 _OPPOSITE = 1e-9
-_FLAT = 1e-30  # determinant below which a matrix has no inverse
+_FLAT = 1e-30  # determinant below which a matrix is treated as singular
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Tails:
-    """The points that swing, each in the space of its centre: (N, 3) now and one step before."""
+    """The swinging points, each in the space of its centre: (N, 3) now and one step before."""
 
     now: Floats
     before: Floats
@@ -50,7 +49,8 @@ class _Level:
     """Joints at one depth below the topmost spring joint.
 
     ``joints``, ``parents`` (L,): indices of joints; a parent may be -1.
-    ``rows`` (N',): indices of the spring joints among them, and ``places`` (N',) where they are.
+    ``rows`` (N',): indices of the spring joints among them; ``places`` (N',): their positions in
+    ``joints``.
     ``hits``: pairs of positions in ``rows`` and colliders, one collider per spring joint at a time.
     """
 
@@ -86,7 +86,7 @@ class Simulation:
         return self._rests
 
     def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> Tails:
-        """Return points at rest, in the rest pose of the spring joints; as for ``step``."""
+        """Return points at rest, with spring joints in rest pose; arguments as for ``step``."""
         springs, world = self._springs, world.copy()
         points = np.zeros((springs.n_joints, 3))
         for level in self._levels:
@@ -140,7 +140,7 @@ class Simulation:
         return Tails(now, tails.now), rotations
 
     def _heads(self, level: _Level, world: Floats, local: Floats, place: Floats) -> Floats:
-        """Return world matrices without own scale, spring joints in their rest rotation."""
+        """Return world matrices without the joints' own scales, spring joints in rest rotation."""
         own = local[level.joints]
         own[level.places, :3, :3] = self._linear[level.rows]
         above = np.where((level.parents >= 0)[:, None, None], world[level.parents], place)
@@ -201,7 +201,7 @@ class Simulation:
 
 
 def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
-    """Return the spring joints and all joints below them by depth."""
+    """Return the spring joints and all joints below them, grouped by depth."""
     depths = np.full(skeleton.n_joints, -1)
     is_spring = np.zeros(skeleton.n_joints, dtype=np.bool_)
     is_spring[springs.joints] = True
@@ -221,7 +221,7 @@ def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
 
 
 def _hits(listed: list[tuple[int, ...]]) -> tuple[tuple[Ints, Ints], ...]:
-    """Return the first collider of all points that have one, then the second ones, and so on."""
+    """Return the first colliders of all points, then the second colliders, and so on."""
     most = max(map(len, listed), default=0)
     pairs = []
     for rank in range(most):
@@ -244,9 +244,9 @@ def _inverse(matrices: Floats) -> Floats:
 
 
 def _regular(linear: Floats) -> Floats:
-    """Return matrices (N, 3, 3) with the identity in place of those that have no inverse.
+    """Return matrices (N, 3, 3), with singular ones replaced by the identity.
 
-    Joints are hidden by a scale of 0, which leaves nothing to swing.
+    A scale of 0 hides joints, whose points then cannot swing.
     """
     is_flat = np.abs(np.linalg.det(linear)) < _FLAT
     found: Floats = np.where(is_flat[:, None, None], np.eye(3), linear)
@@ -260,7 +260,7 @@ def _scaled(matrices: Floats, scales: Floats) -> Floats:
 
 
 def _at_length(points: Floats, origins: Floats, lengths: Floats, rest: Floats) -> Floats:
-    """Return points moved to a distance from their origins; the rest direction if undefined."""
+    """Move points to a distance from their origins, in the rest direction if it is undefined."""
     away = points - origins
     distance = np.linalg.norm(away, axis=-1, keepdims=True)
     away = np.where(distance > _SHORT, away / np.maximum(distance, _SHORT), unit(rest))

@@ -1,11 +1,12 @@
-"""Spring joints of a skeleton and the shapes that they collide with, as in VRM."""
+"""Spring joints of a skeleton and the shapes with which they collide, as in VRM."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -49,7 +50,7 @@ def _no_colliders() -> Colliders:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Springs:
-    """Joints whose rotation follows from the inertia of a point below them.
+    """Joints whose rotation is determined by the inertia of a point below them.
 
     Attributes
     ----------
@@ -58,13 +59,13 @@ class Springs:
     tails : (N, 3)
         The point that swings, in the rest space of the joint.
     stiffness : (N,)
-        Speed towards the rest direction, per second.
+        Speed towards the rest direction, scene units per second.
     drags : (N,)
         Fraction of the speed that is lost in each step, 0 to 1.
     gravities : (N, 3)
         Constant speed in figure space, per second.
     radii : (N,)
-        Radius of the sphere around the point that collides.
+        Radius of the colliding sphere around the point.
     centers : (N,) int32
         Joint relative to which inertia is evaluated; -1 for figure space.
     colliders : Colliders

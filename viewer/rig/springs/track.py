@@ -1,17 +1,17 @@
 """Rotations of spring joints over the time of a motion, computed once and in order.
 
 The simulation starts at rest at the start of the motion and proceeds in equal steps, so the result
-at a given time does not depend on what was played before. Between two steps, rotations are
+at a given time does not depend on what was played previously. Between two steps, rotations are
 interpolated.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.skeleton import Skeleton
@@ -19,9 +19,9 @@ from viewer.rig.springs.simulation import STEPS_PER_SECOND, Simulation, Tails
 
 __all__ = ["PosedJoints", "PosesAt", "SpringTrack"]
 
-_BLOCK = 64  # steps that are computed and kept together
-_MOST_BLOCKS = 256  # kept; earlier ones are computed again from their stored start
-_ON_STEP = 1e-6  # fraction of a step
+_BLOCK = 64  # number of steps that are computed and cached together
+_MOST_BLOCKS = 256  # maximum number of cached blocks; others are recomputed from their stored start
+_ON_STEP = 1e-6  # fraction of a step; times this close to a step are treated as that step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class SpringTrack:
     skeleton : Skeleton
         Skeleton with springs.
     start, end : float
-        Range of the motion in seconds; the rotations are constant outside.
+        Range of the motion in seconds; the rotations are constant outside this range.
     """
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:

@@ -1,4 +1,4 @@
-"""Edit keyed transforms: every function returns a new clip; the original is unchanged.
+"""Editing of keyed transforms: every function returns a new clip; the original is unchanged.
 
 The three components of a translation, rotation or scale share their keys, and so do the weights of
 one channel: keys are moved in time, added and deleted for all of them. Keys keep their order and
@@ -40,7 +40,7 @@ __all__ = [
 Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
 
-_STEEPEST = math.radians(90.0)  # limit of the middle angle; above it, angles are ambiguous
+_STEEPEST = math.radians(90.0)  # limit of the middle angle; beyond it, angles are ambiguous
 
 
 def with_transform_channel(
@@ -74,7 +74,7 @@ def move_transform_keys(
     places : iterable of (row, key)
         Selected keys.
     dt : float
-        Seconds; reduced where a key would otherwise come closer than ``gap`` to an unmoved one.
+        Seconds; reduced if a key would otherwise come closer than ``gap`` to an unmoved key.
     dv : float
         Change of the value of each selected component: radians, length, factor or weight.
     gap : float

@@ -53,8 +53,8 @@ def set_joint_translations(
     skeleton : Skeleton
         Provides the DOF table.
     pose : Pose
-        A joint's translation DOFs take the offset from rest, within their limits; the pose's
-        translations take the remainder.
+        A joint's translation DOFs receive the offset from rest, within their limits; the pose's
+        translations receive the remainder.
     joints : (N,)
         Joints to move.
     translations : (N, 3)
@@ -69,7 +69,7 @@ def set_joint_translations(
     wanted = np.zeros((skeleton.n_joints, 3))
     wanted[joints] = offsets
     owners, axes = skeleton.dof_joints[moves], skeleton.dof_kinds[moves]
-    # Of several DOFs along one axis, the first takes the offset.
+    # Of several DOFs along one axis, the first receives the offset.
     _, first = np.unique(owners * FIRST_ROTATION + axes, return_index=True)
     values = np.zeros(len(moves))
     values[first] = wanted[owners[first], axes[first]]

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.motion.transform_clip import TransformClip, TransformPath
@@ -59,7 +58,7 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     a span of h seconds (glTF 2.0, appendix C):
     (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u) b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with
     incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
-    first key and after its last, a channel keeps the value of that key.
+    first key and after its last key, a channel keeps the value of that key.
 
     Parameters
     ----------
@@ -141,7 +140,7 @@ def _cubics(curves: Curves, timelines: Timelines, spans: Ints, fractions: Floats
 
 
 def _normalised(quaternions: Floats) -> Floats:
-    """Return unit quaternions; where a spline passes through 0, the rotation is arbitrary."""
+    """Return unit quaternions; if a spline passes through 0, the rotation is arbitrary."""
     lengths = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     still = np.array([0.0, 0.0, 0.0, 1.0])
     return np.where(lengths > 0.0, quaternions / np.where(lengths > 0.0, lengths, 1.0), still)

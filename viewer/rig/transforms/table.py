@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformChannel, TransformPath
 
@@ -101,7 +101,7 @@ class Curves:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Targets:
-    """Joints or shapes that one path animates, in the order of the samples.
+    """Joints or shapes animated by one path, in the order of the samples.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
         unit[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
         chords = np.linalg.norm(np.diff(unit, axis=0, append=unit[-1:]), axis=1)
         keys.append(unit)
-        # The chord is accurate at small angles, where the arccosine loses half the digits.
+        # The chord is accurate at small angles, whereas the arccosine loses half the digits.
         angles.append(np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST))
         bases.append(row)
         row += len(unit)
