@@ -26,7 +26,8 @@ _SAME = np.cos(np.radians(20.0))
 _NATURAL = np.cos(np.radians(25.0))
 # Cosine of the maximum angle of an upright body from the up axis.
 _UPRIGHT = np.cos(np.radians(25.0))
-_SHORT = 1e-6  # fraction of the skeleton's size; shorter bones have no reliable direction
+# Minimum length of bones with a reliable direction, as a fraction of the skeleton's size.
+_SHORT = 1e-6
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
@@ -208,7 +209,7 @@ def _matched_above(matches: Matches, parents: Ints) -> Ints:
     for joint, parent in enumerate(parents):
         if parent >= 0:
             above[joint] = parent if matches.partners[parent] >= 0 else above[parent]
-    above[matches.partners < 0] = -2  # unmatched joints are not children of any joint
+    above[matches.partners < 0] = -2  # Unmatched joints are not children of any joint.
     return above
 
 
