@@ -119,8 +119,7 @@ class _Solver:
         self.present = np.clip(present, low, high)
 
     def best(self) -> Floats:
-        """Return the angles: exact and nearest the current ones or, failing that, nearest the
-        goal."""
+        """Return the exact angles nearest to the current ones; without exact ones, the best."""
         exact = self._exact()
         within = [
             values

@@ -225,8 +225,7 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
 
 
 def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
-    """Name the pelvis: the joint above both legs; if unknown, above the first leg or spine
-    joint."""
+    """Name the pelvis: the joint above both legs; otherwise, above the first leg or spine."""
     legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
     paths = [_ancestors(joint, parents) for joint in legs]
     shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
