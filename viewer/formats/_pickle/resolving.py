@@ -86,7 +86,7 @@ class _Resolver:
 
     def text(self, span: Span) -> str | bytes:
         if span.coding is None:
-            self.budget -= len(span)  # Bytes are copied for each use, whereas a string is shared.
+            self.budget -= len(span)  # bytes are copied for each use, whereas a string is shared
             return span.raw() if self.budget >= 0 else b""
         try:
             return span.text()

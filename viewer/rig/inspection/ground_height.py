@@ -135,7 +135,7 @@ def resting_frames(
     count = len(lowest) - width
     if count < 1:
         return rests
-    heights = np.where(present, lowest, np.inf)  # Feet do not rest while the person is absent.
+    heights = np.where(present, lowest, np.inf)  # feet do not rest while the person is absent
     windows = np.lib.stride_tricks.sliding_window_view(heights, width + 1)
     highest = windows.max(axis=1)
     calm = highest <= windows.min(axis=1) + _CALM * size

@@ -18,7 +18,7 @@ from viewer.rig.scene import Motion
 
 __all__ = ["MotionPath", "motion_path", "path_times", "segments"]
 
-_KEYED_RATE = 60.0  # number of points per second along curves, which have no frames
+_KEYED_RATE = 60.0  # points per second along curves, which have no frames
 _MOST = 20_000  # maximum number of points of a path along curves
 _BLOCK = 1 << 14  # number of matrices per batch, which limits the memory for long captures
 

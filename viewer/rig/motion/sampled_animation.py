@@ -131,7 +131,7 @@ def frame_range(
     first, asked = (0, None) if frames is None else frames
     stop = count if asked is None else asked
     if not isinstance(motion, Clip):
-        stop = min(stop, count)  # Unlike other motions, DOF curves extend beyond their keys.
+        stop = min(stop, count)  # unlike other motions, DOF curves extend beyond their keys
     if not 0 <= first < stop:
         found = f"{first} to {'the end' if asked is None else asked}"
         raise RigError(f"frames: expected a range within 0 to {count}, found {found}")

@@ -194,7 +194,7 @@ def joined(clips: Sequence[SampledClip], timing: Timing) -> SampledClip:
     if len(clips) == 1:
         return replace(first, timing=timing)
     rotations = stack("rotations")
-    assert rotations is not None  # Every clip has rotations.
+    assert rotations is not None  # every clip has rotations
     return SampledClip(
         first.name,
         timing,

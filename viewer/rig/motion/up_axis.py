@@ -47,7 +47,7 @@ def guess_up(actors: Iterable[Actor]) -> str:
     lengths = np.linalg.norm(steps, axis=1)
     mean = (steps[lengths > 0.0] / lengths[lengths > 0.0, None]).sum(axis=0)
     axis = int(np.abs(mean).argmax())
-    if axis == 0:  # The axis is also 0 if all sums are 0.
+    if axis == 0:  # the axis is also 0 if all sums are 0
         return CUSTOM
     return ("-" if mean[axis] < 0.0 else "") + "xyz"[axis]
 

@@ -70,7 +70,7 @@ def upright_actor(scene: Scene, actor: Actor) -> Actor:
         pose = _rotated_upright(actor.figure, pose)
     points = actor.points
     if hangs and points is not None:
-        points = points * np.append(_OVER, 1.0)  # Confidences are unchanged.
+        points = points * np.append(_OVER, 1.0)  # confidences are unchanged
     if figure is actor.figure and pose is actor.pose and points is actor.points:
         return actor
     return replace(actor, figure=figure, pose=pose, points=points)

@@ -195,7 +195,7 @@ class _Solver:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
-            return now  # All angles are equally suitable.
+            return now  # all angles are equally suitable
         # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)

@@ -369,7 +369,7 @@ def _apply_hand(
     assert skeleton is not None
     side = _HAND_PARTS[name]
     if hand is None and side and len(figure.hands) == 1 and not figure.hands[0].side:
-        hand = figure.hands[0]  # MANO is a model of one hand, left or right.
+        hand = figure.hands[0]  # MANO is a model of one hand, left or right
     first = f"{side}_index1" if side else "index1"
     if hand is None and len(values) == 45 and first in skeleton.names:
         start = skeleton.names.index(first)

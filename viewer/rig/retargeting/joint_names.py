@@ -285,7 +285,7 @@ def _key(tokens: list[str]) -> _Key:
     """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # Centre joints in VRM have the prefix c.
+    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM have the prefix c
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]

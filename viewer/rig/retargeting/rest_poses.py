@@ -209,7 +209,7 @@ def _matched_above(matches: Matches, parents: Ints) -> Ints:
     for joint, parent in enumerate(parents):
         if parent >= 0:
             above[joint] = parent if matches.partners[parent] >= 0 else above[parent]
-    above[matches.partners < 0] = -2  # Unmatched joints are not children of any joint.
+    above[matches.partners < 0] = -2  # unmatched joints are not children of any joint
     return above
 
 

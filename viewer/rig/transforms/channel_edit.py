@@ -101,7 +101,7 @@ def _smooth(times: Floats, values: Floats) -> Floats:
 def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
     """Return the value and slope of a cubic channel, before normalisation of rotations: (C,)."""
     times, values = channel.times, channel.values
-    assert channel.tangents is not None  # The caller has checked for cubic interpolation.
+    assert channel.tangents is not None  # the caller has checked for cubic interpolation
     if not times[0] < time < times[-1]:
         return values[0 if time <= times[0] else -1], np.zeros(channel.n_components)
     key = int(np.searchsorted(times, time, side="right")) - 1
