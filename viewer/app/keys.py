@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -13,6 +13,7 @@ from viewer.app.files.state import Files
 from viewer.app.palette.palette_window import Palette
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
+from viewer.data_classes import dataclass
 
 __all__ = ["Keyboard", "handle_keys"]
 

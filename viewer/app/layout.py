@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 from imgui_bundle import imgui
@@ -10,6 +10,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
 from viewer.app.shown_panels import ShownPanels, is_open, set_open, show_panel
+from viewer.data_classes import dataclass
 
 __all__ = [
     "Layout",

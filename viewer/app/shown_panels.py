@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
+from viewer.data_classes import dataclass
 
 __all__ = ["ShownPanels", "is_open", "reset_layout", "set_open", "show_panel"]
 

@@ -7,9 +7,9 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, SUFFIXES
 from viewer.phrases import counted, printable

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Item", "Result", "Status"]
 

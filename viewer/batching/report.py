@@ -12,12 +12,13 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.diagnostics.describing import plain
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable

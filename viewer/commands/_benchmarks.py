@@ -9,10 +9,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.data_classes import dataclass
 from viewer.errors import RenderError
 from viewer.loading import bundled_body, bundled_files, load
 

@@ -8,12 +8,12 @@ import platform
 import subprocess
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
 
 import viewer
 from viewer.commands._printing import print_line
+from viewer.data_classes import dataclass
 from viewer.errors import RenderError
 from viewer.phrases import counted, printable
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.scene import Actor
 

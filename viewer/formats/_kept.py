@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.formats._source import Source
 from viewer.rig.figure import Figure

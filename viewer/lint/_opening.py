@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError
@@ -146,7 +147,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         figure = replace(figure, animations=valid)
     try:
         if figure.correctives is not None:
-            figure.correctives.values()
+            figure.correctives.check_values()
     except FormatError as problem:
         refusals.append(of_error(problem))
         figure = replace(figure, correctives=None)

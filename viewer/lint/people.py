@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices
 from viewer.rig.arrays import Bools, Floats

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.carrying import carrying_drive
@@ -83,7 +84,7 @@ class Builder:
     hangs : bool
         Whether the axis along which people stand points down before placement.
     defers : bool
-        Whether ``finish`` is called with the final motions after everything has been read.
+        Whether the caller computes the final motions and passes them to ``finish``.
     """
 
     capture: Capture

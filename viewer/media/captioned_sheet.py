@@ -6,11 +6,11 @@ Pillow is imported on first use.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.media.picture_sinks import sheet_layout
 from viewer.rig.arrays import Bytes
 

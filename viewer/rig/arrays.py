@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,9 @@ class Deferred:
         Element type declared by the file.
     load : callable
         Reads the array; called once; may raise a ``FormatError``.
+    blocks : callable, optional
+        Yields the array in blocks of a given number of rows, each valid until the next one, without
+        reading it as a whole; may raise a ``FormatError``.
 
     Attributes
     ----------
@@ -37,12 +40,17 @@ class Deferred:
         Whether the values are in memory.
     """
 
-    __slots__ = ("_load", "_values", "dtype", "shape")
+    __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
 
     def __init__(
-        self, shape: tuple[int, ...], dtype: DTypeLike, load: Callable[[], NDArray[Any]]
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike,
+        load: Callable[[], NDArray[Any]],
+        blocks: Callable[[int], Iterator[NDArray[Any]]] | None = None,
     ) -> None:
         self.shape, self.dtype, self._load = shape, np.dtype(dtype), load
+        self._by_blocks = blocks
         self._values: NDArray[Any] | None = None
 
     @property
@@ -63,6 +71,15 @@ class Deferred:
             values.flags.writeable = False
             self._values = values
         return self._values
+
+    def blocks(self, count: int) -> Iterator[NDArray[Any]]:
+        """Yield blocks of at most ``count`` rows, each valid until the next; raises as above."""
+        if self._by_blocks is not None and self._values is None:
+            yield from self._by_blocks(count)
+            return
+        values = self.values()
+        for start in range(0, len(values), count):
+            yield values[start : start + count]
 
 
 def frozen(

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
+from viewer.data_classes import dataclass
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.evaluation import scene_rate, time_span
 from viewer.rig.motion.instances import pose_actors

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.motion_extent import MotionExtent
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
+
+from viewer.data_classes import dataclass
 
 __all__ = ["KINDS", "Message", "MessageLog", "Messages", "Note", "message_line"]
 

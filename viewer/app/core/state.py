@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +16,7 @@ from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.stats import Stats
 from viewer.app.core.undo_history import History
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit

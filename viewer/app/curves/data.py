@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import partial
 
 from viewer.app.curves.data import channel_of, keyed_values
 from viewer.app.curves.state import KeyPlace
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.clip import Channel, Clip, Tangent, slopes
 from viewer.rig.motion.clip_edit import (

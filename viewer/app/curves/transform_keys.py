@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from viewer.app.curves.state import KeyPlace
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.transform_clip import Interpolation, TransformChannel, TransformClip
 from viewer.rig.scene import Actor

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import (

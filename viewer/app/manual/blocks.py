@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import groupby
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Block", "blocks_of"]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui
@@ -12,6 +11,7 @@ from viewer.app.core.fields import drag_float, in_row
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
 from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.data_classes import dataclass
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.motion.transform_clip import TransformClip

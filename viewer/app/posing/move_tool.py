@@ -7,13 +7,12 @@ translation DOFs, are translated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
 from viewer.app.posing.state import Outcome
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.number_text import number_text

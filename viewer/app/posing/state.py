@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 from viewer.app.core.view_frame import ViewFrame
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor

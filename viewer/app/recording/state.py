@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+
+from viewer.data_classes import dataclass
 
 __all__ = ["KINDS", "LEAST_PIXELS", "VIDEO_KINDS", "RecordSettings", "Recording"]
 

@@ -5,7 +5,6 @@ It is drawn behind the panels over the scene's image, and does not appear in sav
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect
 from viewer.app.view.camera_actions import fly_to
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 
 __all__ = ["AxisGizmo", "draw_axis_gizmo", "gizmo_rect", "holds_gizmo", "is_over_gizmo"]

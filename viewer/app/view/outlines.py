@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from viewer.app.core.state import AppState
 from viewer.app.view.hovering import Hovered
 from viewer.app.weights.state import Weights
+from viewer.data_classes import dataclass
 from viewer.rendering.outlined import Outlined
 from viewer.rendering.shown import shows_skeleton
 from viewer.rig.geometry.transform import apply_transform

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui
@@ -15,6 +14,7 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.actions import explained, toggle_picking, unpin
 from viewer.app.weights.explanation_lines import influence_colors
 from viewer.app.weights.state import Weights
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats

@@ -8,13 +8,14 @@ missing from one of them biases the result. Near convergence, surfaces may slide
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import SurfaceSamples, sample_surface, triangle_normals
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface

@@ -9,11 +9,11 @@ the generator cancels the running items.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 
 __all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
 

@@ -8,13 +8,13 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 from viewer.batching.engines import Job
 from viewer.batching.engines._process_limits import limit_memory
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import name_worker
+from viewer.data_classes import dataclass
 from viewer.version import VERSION
 
 __all__ = ["ENDED", "Call", "OtherVersion", "run_item"]

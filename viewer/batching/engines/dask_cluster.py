@@ -10,7 +10,7 @@ import itertools
 import time
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
-from dataclasses import astuple, dataclass, replace
+from dataclasses import astuple, replace
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 from uuid import uuid4
@@ -19,6 +19,7 @@ from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.batching.engines._remote import ENDED, Call, OtherVersion, run_item
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.version import VERSION

@@ -13,7 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.engines._process_limits import limit_memory, signals_blocked
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.phrases import printable

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from viewer.commands._numbers import number
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.scene import Actor, Scene

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
 from viewer.commands._sequence.frame_numbers import Numbering, Range, numbering_of
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.media.video_kinds import MOST_GIF_RATE
 from viewer.phrases import printable

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.commands._numbers import number
@@ -12,6 +11,7 @@ from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_not
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.commands._writing.baked_springs import add_spring_argument
 from viewer.commands._writing.written_actors import left_out_notes, written_actors
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (

@@ -12,10 +12,11 @@ A joint with p = o in every frame needs no position channels.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.export._bvh.angles import euler_angles
 from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints

@@ -12,11 +12,12 @@ skinned with LBS, with pose correctives from the file's rotations.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._bvh.body import Space, rest_matrices
 from viewer.export._losses.skinned import Poses, Side, anchored, bare_poses, figure_side
 from viewer.rig.arrays import Floats
@@ -51,7 +52,7 @@ class BvhFile:
     reference : int
         Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index of the animation's first frame in this motion; negative if that begins later.
+        Index of the animation's first frame in this motion; negative if the motion begins later.
     """
 
     motion: SkeletonMotion

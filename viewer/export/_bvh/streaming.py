@@ -6,11 +6,12 @@ The file and the notes are those of ``viewer.export.bvh.export_animation``.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._bvh.angles import Unroller
 from viewer.export._bvh.body import Body, Conversion, shape_at
@@ -116,7 +117,7 @@ class _Stream:
         self.losses = JointLosses(options.skinning, animation.n_frames)
 
     def _measure(self, n_first: int) -> None:
-        """Convert the frames that show which joints move."""
+        """Convert the frames that determine which joints are translated."""
         done = 0
         for part in self._animation.parts():
             report(done, self._animation.n_frames, "frames", "finding joints that move")

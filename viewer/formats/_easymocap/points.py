@@ -7,12 +7,13 @@ face may have separate keys. A confidence of 0 means "not detected".
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.buffers import Buffers, View
 from viewer.formats._gltf.elements import Element, Table
 from viewer.rig.arrays import Floats, Ints

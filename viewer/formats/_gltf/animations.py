@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.channels import read_channels, sampler_of
 from viewer.formats._gltf.document import Document

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.attributes import (
     Attributes,
     read_colors,

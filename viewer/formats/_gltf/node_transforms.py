@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.elements import Table
 from viewer.formats._gltf.member_rows import member_rows
 from viewer.rig.arrays import Floats, Ints

@@ -16,12 +16,13 @@ KHR_meshopt_compression, appendix A.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_attributes"]

@@ -9,10 +9,11 @@ skin undoes quantisation, and the units and axes of the mesh.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeSkin
 from viewer.formats._nodes.joints import Joints, rest_worlds
 from viewer.rig.arrays import Bools, Floats, Ints

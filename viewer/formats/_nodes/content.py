@@ -7,11 +7,12 @@ Readers guarantee that indices are valid, numbers are finite, and the parents fo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
@@ -261,6 +262,8 @@ class NodeExpression:
         Key of ``PROCEDURAL``; empty for other expressions.
     overrides : dict of str
         Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
+    materials : tuple of (int, str, (4,))
+        Material, kind and target of each change of a material; see ``MaterialBinds``.
     """
 
     name: str
@@ -268,6 +271,7 @@ class NodeExpression:
     is_binary: bool = False
     kind: str = ""
     overrides: Mapping[str, str] = field(default_factory=dict)
+    materials: tuple[tuple[int, str, Floats], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

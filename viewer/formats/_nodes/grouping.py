@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree
 from viewer.rig.arrays import Bools, Ints

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeTree
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.bindings import Bindings
 from viewer.formats._nodes.content import NodeFile, Primitive
 from viewer.formats._nodes.flat_normals import flat_shaded

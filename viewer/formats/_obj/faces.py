@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._obj.lines import Lines, Places, Rows, rows_of
 from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.rig.arrays import Bools, Floats

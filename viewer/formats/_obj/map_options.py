@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from viewer.data_classes import dataclass
 from viewer.formats._text.numbers import is_number, to_number
 
 __all__ = ["MapOptions", "map_options"]

@@ -20,11 +20,12 @@ not drawn. Programs differ in details, see ``_REPLACING``, ``name_here`` and ``i
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._mesh.texture import load_image
 from viewer.formats._obj.image_kinds import is_cut_out, is_normal_map
@@ -116,7 +117,9 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     """Return the libraries of one ``mtllib``: a file whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     folder = source.path.parent
-    names = whole.split() if " " in whole and name_here(folder, whole) is None else [whole]
+    # A single suffix means a single name, even if the file is missing.
+    is_one = whole.lower().count(".mtl") == 1 or name_here(folder, whole) is not None
+    names = [whole] if is_one else whole.split()
     found = []
     for written in names:
         name = name_here(folder, written) or written

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field, replace
 
 import numpy as np
 
-from viewer.formats._obj.faces import FaceRows, read_faces
+from viewer.data_classes import dataclass
+from viewer.formats._obj.faces import FEWEST, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
 from viewer.formats._source import Source
@@ -20,6 +21,7 @@ __all__ = ["ObjParts", "read_parts"]
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
 _SHAPES = {b"l": "line", b"p": "point"}
 _RUNS = (b"usemtl", b"g", b"o")
+_NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -143,10 +145,24 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
             gathered.tables[keyword].append(read(source, lines, gathered))
     if len(lines.of["f"]):
         faces = read_faces(lines, gathered.before)
+        if faces is None:
+            lines = _without_edges(lines, gathered)
+            faces = read_faces(lines, gathered.before) if len(lines.of["f"]) else _NO_FACES
         gathered.faces.append(faces or faulty_faces(source, lines, gathered.before))
     _read_others(source, lines, gathered)
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
+
+
+def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
+    """Return lines without faces of one or two corners, as which Blender once wrote loose edges."""
+    counts = np.array([len(lines.text(line).split()) - 1 for line in lines.of["f"].tolist()])
+    is_edge = (counts > 0) & (counts < FEWEST)
+    if not is_edge.any():
+        return lines
+    first = lines.base + int(lines.starts[lines.of["f"][is_edge.argmax()]])
+    gathered.leave_out("edges", int(is_edge.sum()), first)
+    return replace(lines, of={**lines.of, "f": lines.of["f"][~is_edge]})
 
 
 def _rows(

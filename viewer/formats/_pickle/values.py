@@ -9,13 +9,14 @@ from __future__ import annotations
 import codecs
 import io
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.element_types import array_dtype, item_count, shaped
 from viewer.formats._archive.file_window import Data

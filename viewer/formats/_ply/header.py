@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 

@@ -8,12 +8,13 @@ the order of a space-filling curve, it is shaded once or twice (``tests/bench/be
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.surfaces import PLAIN, Surface
 from viewer.rendering.gpu.upload import buffer
 from viewer.rig.arrays import Bools, Floats, Ints

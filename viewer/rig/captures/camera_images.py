@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bytes
 
 __all__ = ["CameraImage", "CameraImages"]

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames

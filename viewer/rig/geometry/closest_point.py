@@ -9,12 +9,12 @@ pieces of different sizes go into different trees, as one large r would slow eve
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints, frozen

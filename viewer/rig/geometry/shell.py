@@ -6,11 +6,10 @@ opening. It hits the back first only if skinning turns the surface inside out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh, area_vectors
@@ -82,7 +81,9 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     pairs, is_open = found
     if is_open.sum() > _MOST_OPEN or not _face_outwards(mesh.positions, corners, pairs, is_open):
         return None
-    borders = np.unique(corners.ravel()[is_open]).astype(np.int32)
+    is_border = np.zeros(mesh.n_vertices, dtype=np.bool_)
+    is_border[corners.ravel()[is_open]] = True
+    borders = np.flatnonzero(is_border).astype(np.int32)
     return Shell(borders, copies, originals)
 
 

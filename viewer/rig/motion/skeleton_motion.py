@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

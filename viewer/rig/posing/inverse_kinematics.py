@@ -11,10 +11,9 @@ that a step would move beyond a limit stop there, and the others compensate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix

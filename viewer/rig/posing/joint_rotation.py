@@ -12,10 +12,10 @@ factors around E_k and of the target rotation's transpose, the trace to maximise
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
 from viewer.rig.pose import Pose

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -38,8 +39,7 @@ PARTS = {
 }
 """Rotation vectors of single joints under the names used by smplx."""
 
-_BODY = 21  # number of joints of body_pose in models with fingers or a face; only SMPL has two more
-_LONGEST_BODY = 23
+_BODY, _LONGEST_BODY = 21, 23  # joints of body_pose in models with fingers or a face, and in SMPL
 _SMALLEST, _LARGEST = 1e-6, 1e6  # range of scales that can be drawn in float32
 _FARTHEST = 1e9  # largest translation, figure units
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}

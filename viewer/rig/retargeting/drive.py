@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from viewer.data_classes import dataclass
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap

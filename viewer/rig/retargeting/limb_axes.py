@@ -7,10 +7,9 @@ from right. Its mean over the motion, in the axes of a joint, is the bending axi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.postures import SIDES, Postures, unit
 

@@ -8,11 +8,12 @@ the ankles reach their targets, and the body is lowered if a leg is too short.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order

@@ -10,10 +10,10 @@ be flat: every contact has its own height, as on stairs.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.foot_contacts import mean_speeds
 from viewer.rig.cleanup.frame_rows import runs_of

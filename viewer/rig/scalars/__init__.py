@@ -6,12 +6,12 @@ A quantity is named by its key, followed by its joint or field if it has one: ``
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from keyword import iskeyword
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import shown_joint_of

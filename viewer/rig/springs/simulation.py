@@ -15,10 +15,9 @@ Source: ``VRMC_springBone`` 1.0, github.com/vrm-c/vrm-specification.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
