@@ -60,7 +60,7 @@ def test_several_gaps_are_listed(info, tmp_path):
 def test_undetected_keypoints_have_no_bounding_box(info, tmp_path):
     unseen = {"id": 0, "keypoints3d": [[0.0] * 4] * 25}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {0: [unseen], 1: [unseen]})
-    lines, found, err = info(folder)
+    lines, found, err = info(folder, "--fps", "30")
     assert lines[1] == "  box        none: nothing is visible, z up"
     assert found["actors"][0]["present"] and found["actors"][0]["box"] is None
     assert err == "note: kp: no keypoint of person 0 is ever visible: every confidence is 0\n"

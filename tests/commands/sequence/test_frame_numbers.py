@@ -126,7 +126,8 @@ def hundred(tmp_path):
     straight = {"Rh": [[0.0, 0.0, 0.0]], "poses": [[0.0] * 72], "shapes": [[0.0] * 10]}
     frames = {100 + n: [body(0, Th=[[0.0, float(n), 0.0]], **straight)] for n in range(5)}
     folder = write_frames(tmp_path / "take" / "smpl", frames)
-    return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
+    model_path = str(tmp_path / "SMPL.npz")
+    return [str(folder), "--model", model_path, "--up", "y", "--fps", "30"]
 
 
 def root_height(folder, *arguments) -> float:

@@ -169,7 +169,8 @@ def pair(tmp_path) -> list[str]:
     np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
     people = [body(person, Th=[[2.0 * person, 0.0, 0.0]]) for person in (3, 5)]
     folder = write_frames(tmp_path / "take" / "smpl", {0: people, 1: people})
-    return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
+    model_path = str(tmp_path / "SMPL.npz")
+    return [str(folder), "--model", model_path, "--up", "y", "--fps", "30"]
 
 
 def test_follow_reports_the_chosen_person_if_two_have_the_joint(draw, pair):

@@ -147,3 +147,30 @@ def test_names_with_parent_folders_are_treated_as_plain_names() -> None:
     data = zipped({"../../etc/x.npy": npy(header(), bytes(8)), "a\nb.npy": npy(header(), b"")})
     problem = Phrase("array-bytes", shape=(1,), dtype="float64", found=0)
     assert refusal(data) == ("F002.archive-value", None, {"item": r"a\nb", "problem": problem})
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("count", [1, 4, 100])
+def test_blocks_of_rows_are_those_of_the_whole_array(packed: bool, count: int) -> None:
+    given = GIVEN | {"many": np.arange(66.0).reshape(11, 3, 2)}
+    archive = opened(npz(packed=packed, **given))
+    for key, value in given.items():
+        if value.ndim and value.dtype.kind in "biuf":
+            array = archive.array(key)
+            blocks = [block.copy() for block in array.blocks(count)]
+            assert all(len(block) <= count for block in blocks)
+            joined = np.concatenate(blocks) if blocks else np.zeros((0, *value.shape[1:]))
+            assert_array_equal(joined, value)
+            # Rows in C order and in the machine's byte order are not read as a whole.
+            if key == "many":
+                assert not array.is_loaded
+
+
+def test_damage_is_found_while_reading_blocks() -> None:
+    values = np.arange(60_000.0).reshape(-1, 3)
+    data = bytearray(npz(v=values))
+    data[len(data) // 2] ^= 1
+    array = opened(bytes(data)).array("v")
+    with pytest.raises(FormatError):
+        for _ in array.blocks(100):
+            pass
