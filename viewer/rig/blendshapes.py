@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.bodies.deferred_offsets import DeferredOffsets
 from viewer.rig.bodies.feature import Feature
 from viewer.rig.bodies.shape_space import ShapeSpace
 from viewer.rig.bodies.sparse_offsets import SparseOffsets
@@ -19,35 +18,9 @@ __all__ = [
     "BlendShapes",
     "Correctives",
     "JointRegressor",
-    "SummedOffsets",
     "corrective_weights",
     "regress_joints",
 ]
-
-
-class SummedOffsets(Deferred):
-    """Offsets of blend shapes whose weighted sum does not need the whole array.
-
-    Parameters
-    ----------
-    shape : (int, int, int)
-        S, V, 3.
-    load : callable
-        Returns the array; see ``Deferred``.
-    total : callable
-        Returns sum_s w_s d_s, (V, 3), for weights (S,).
-    """
-
-    __slots__ = ("total",)
-
-    def __init__(
-        self,
-        shape: tuple[int, int, int],
-        load: Callable[[], Floats],
-        total: Callable[[Floats], Floats],
-    ) -> None:
-        super().__init__(shape, np.float64, load)
-        self.total = total
 
 
 _BLOCK = 9  # number of correctives per joint in SMPL
@@ -197,7 +170,7 @@ class BlendShapes:
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
-        if isinstance(offsets, SummedOffsets):
+        if isinstance(offsets, DeferredOffsets):
             whole = np.zeros(self.n_shapes)
             whole[: len(weights)] = weights
             return offsets.total(whole)
