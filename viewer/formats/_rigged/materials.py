@@ -12,6 +12,7 @@ The rim light and the outline of a toon material are objects in its record, with
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -28,7 +29,7 @@ from viewer.rig.mesh import Mesh
 __all__ = ["material_arrays", "read_materials", "texts"]
 
 _PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
-_LOOKS: dict[str, type[Rim | Outline]] = {"rim": Rim, "outline": Outline}
+_LOOKS: dict[str, Callable[..., Any]] = {"rim": Rim, "outline": Outline}
 _NUMBERS = tuple(
     field.name for field in fields(Material) if field.name not in ("name", *TEXTURES, *_LOOKS)
 )
