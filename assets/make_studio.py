@@ -1,4 +1,4 @@
-"""Generate the light of metallic-roughness shading, and the matcaps, in assets/studio.
+"""Generate the light of metallic-roughness shading, and the matcaps in assets/studio.
 
 Run ``python assets/make_studio.py`` from any folder; it takes about two minutes. Needs numpy.
 Writes ``studio.npz``:

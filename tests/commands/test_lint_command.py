@@ -32,7 +32,7 @@ def test_a_finding_is_a_line_with_location_and_hint(rig, capsys) -> None:
         "an error of 0.25)"
     )
     assert lines[at + 1] == (
-        "    weights do not sum to 1: normalise them (--normalize shows the effect)"
+        "    weights do not sum to 1; remedy: normalise them (--normalize shows the effect)"
     )
     assert lines[-1].endswith("in 2 files")
 
@@ -157,5 +157,5 @@ def test_hints_suit_findings_without_a_line(tmp_path: Path, capsys) -> None:
     (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "    malformed file: export it again, or open another file"
-    assert lines[3] == "    malformed file: fix the line or export the file again"
+    assert lines[1] == "    malformed file; remedy: export it again, or open another file"
+    assert lines[3] == "    malformed file; remedy: fix the line or export the file again"

@@ -255,7 +255,11 @@ def test_people_must_be_compatible(family, tmp_path):
         ([], [], "expected at least one person to write, found none"),
         ([animation, animation], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
         ([animation, other], None, "expected one frame rate for all people, found 25, 50"),
-        ([replace(animation, first_frame=-2)], None, "walk: expected frames from 0 on, found -2"),
+        (
+            [replace(animation, first_frame=-2)],
+            None,
+            "walk: expected frame numbers from 0, found -2",
+        ),
     ):
         with pytest.raises(RigError) as caught:
             easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)

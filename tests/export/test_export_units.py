@@ -171,7 +171,8 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     assert notes[1:] == [
         "lengths were converted from centimetres to metres",
         "translations are relative to the skeleton's root at rest, (0.01, 0.95, 0.02) m: a model "
-        "with another rest root is offset by the difference (use --model for exact translations)",
+        "with a different root position at rest is offset by the difference (use --model for exact "
+        "translations)",
     ]
 
 

@@ -78,7 +78,9 @@ def test_one_person_tracked_twice_is_merged_with_the_frames_of_the_first():
     scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=0.1)])
     notes = clean_up(scene, CleanUp(merged=((1, 0),)))
     assert keys(notes) == ["X006.merged", "X006.overlap"]
-    assert "2 frames (frames 128 to 129), 100 mm apart: those of person 1 are used" in str(notes[1])
+    assert "2 frames (frames 128 to 129), 100 mm apart: the frames of person 1 are used" in str(
+        notes[1]
+    )
     (actor,) = scene.actors
     places = actor.clip.figure_translations[actor.clip.timing.rows, 0]
     assert_array_equal(places, [0.0] * 28 + [0.1] * 32)

@@ -1,4 +1,4 @@
-"""Small rigs for tests of the maths, and a plain reference implementation."""
+"""Small rigs for tests of the maths, and a simple reference implementation of skinning."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def turn_z(angle):
 
 
 def plain_kinematics(parents, local):
-    """Multiply each joint's chain of matrices separately, from the joint up to its root."""
+    """Multiply the matrices of each joint's chain separately, from the joint up to its root."""
     world = []
     for joint in range(len(parents)):
         product = np.eye(4)
@@ -74,7 +74,7 @@ def plain_kinematics(parents, local):
 
 
 def plain_skinning(positions, normals, influences, palette):
-    """Skin vertex by vertex and influence by influence, literally by the formula."""
+    """Skin vertex by vertex and influence by influence, following the formula literally."""
     out_positions, out_normals = [], []
     for position, normal, pairs in zip(positions, normals, influences, strict=True):
         if not any(weight != 0.0 for _, weight in pairs):

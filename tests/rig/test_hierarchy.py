@@ -26,12 +26,12 @@ def test_cycle_members_are_their_own_ancestors(seed: int) -> None:
     assert cycle_members(parents).tolist() == expected
 
 
-def test_invalid_index_is_not_a_parent() -> None:
+def test_invalid_index_counts_as_no_parent() -> None:
     parents = np.array([-1.0, 0.5, np.nan, 99.0, -7.0, 5.0])
     assert cycle_members(parents).tolist() == [False] * 5 + [True]
 
 
-def test_a_long_cycle() -> None:
+def test_long_cycle_is_found() -> None:
     parents = np.roll(np.arange(1000), 1)
     assert cycle_members(parents).all()
     parents[0] = -1

@@ -1,8 +1,8 @@
 """Exporter of VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
 
-A figure from a VRM file keeps its version and all data of its extensions. Any other figure with the
-required human bones becomes VRM 1.0: at rest in a T-pose, in metres, facing +z. Specification:
-``github.com/vrm-c/vrm-specification``.
+A figure from a VRM file keeps its version and all data of its extensions, unless VRM 0.x is to
+become 1.0. Any other figure with the required human bones becomes VRM 1.0: at rest in a T-pose, in
+metres, facing +z. Specification: ``github.com/vrm-c/vrm-specification``.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from viewer.export._vrm.made import made_character
 from viewer.export._vrm.maps import Maps
 from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export._vrm.standing import in_t_pose, standing
+from viewer.export._vrm.upgraded import upgraded
 from viewer.formats._vrm.json_parts import part
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
@@ -43,6 +44,7 @@ _STRAIGHT = 1e-4  # radians
 _CONSTRAINT = "VRMC_node_constraint"
 _TOON = "VRMC_materials_mtoon"
 _UNLIT = "KHR_materials_unlit"
+_TRANSFORM = "KHR_texture_transform"
 
 
 def export(
@@ -79,6 +81,12 @@ def export(
     record = None if figure.record is None else figure.record.vrm
     notes = _left_out(actor)
     still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    if record is not None and record.version == 0 and given.upgrades:
+        figure, record, lost = upgraded(figure, record, bones)
+        still = replace(still, figure=figure, pose=figure_pose(figure))
+        _require_author(record, given, figure.name)
+        if lost:
+            notes.append(Diagnostic("X003.vrm-upgrade", values={"names": lost, "n": len(lost)}))
     if record is not None:
         extend = partial(_add_kept, record, given)
         return gltf.export(still, path, skinning, optimizes, extend) + notes
@@ -92,6 +100,12 @@ def export(
     notes += _unit_notes(actor.figure)
     extend = partial(_add_made, bones, told)
     return gltf.export(still, path, skinning, optimizes, extend) + notes
+
+
+def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
+    """Raise RigError if neither the file nor the options name an author."""
+    if not any(record.extensions["VRMC_vrm"]["meta"]["authors"]):
+        checked_meta(replace(meta, licence=meta.licence or LICENCE), figure)
 
 
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
@@ -144,6 +158,11 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
         if _TOON in given:
             item[_TOON] = kept_toon(given[_TOON], maps)
             _declare(document, _TOON)
+            if any(_TRANSFORM in part(each, "extensions") for each in _textures(item[_TOON])):
+                _declare(document, _TRANSFORM)
+        if _UNLIT in given:
+            item[_UNLIT] = given[_UNLIT]
+            _declare(document, _UNLIT)
         if not item:
             del document.root["materials"][written]["extensions"]
     items = document.root.get("materials", ())
@@ -151,6 +170,11 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
     used = document.root.get("extensionsUsed", [])
     if _UNLIT in used and not is_used:
         used.remove(_UNLIT)
+
+
+def _textures(toon: Mapping[str, Any]) -> list[Any]:
+    """Return the textures of toon shading that have extensions."""
+    return [each for each in toon.values() if isinstance(part(each, "extensions"), dict)]
 
 
 def _add_made(

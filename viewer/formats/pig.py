@@ -101,7 +101,7 @@ def read(source: Source) -> Figure:
 
 
 def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error for a part whose number of rows differs from another part's."""
+    """Return the error for a part whose number of rows differs from that of another part."""
     return part.source.fault(
         "F002.pig-rows-as",
         part.odd_offset(wanted),

@@ -17,11 +17,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Part, Phrase
 from viewer.formats._skel.keywords import KEYWORDS, UNLIMITED
 from viewer.formats._source import Source

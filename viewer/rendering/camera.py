@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pyrr import matrix44
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 

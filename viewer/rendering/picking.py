@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers

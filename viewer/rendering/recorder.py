@@ -20,12 +20,13 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Protocol
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.target import Target, picture_rows, straight
 from viewer.rendering.gpu.upload import checked

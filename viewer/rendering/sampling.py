@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import instance_groups

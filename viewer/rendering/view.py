@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera, camera_axes
 from viewer.rendering.effects import NO_EFFECTS, Effects
 from viewer.rendering.gpu.program import set_uniforms

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import TYPE_CHECKING, Literal, Protocol, TypeAlias
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
@@ -45,9 +46,9 @@ if TYPE_CHECKING:
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
-# The camera frames the box that excludes this fraction of outlying points ...
+# The camera ignores this fraction of outlying points ...
 _OUTLIER_FRACTION = 0.001
-# ... if the box of all points is this many times larger.
+# ... if the bounding box of all points is this many times larger.
 _OUTLIER_RATIO = 100.0
 
 
@@ -89,7 +90,7 @@ class Actor:
     animation : int
         Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
     origin : Path or None
-        File of its figure; figures of one file play their animations together.
+        File of its figure; figures from the same file play their animations together.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
     hidden_parts : frozenset of int
@@ -136,7 +137,7 @@ class Actor:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is drawn, being visible and present at the current time."""
+        """Whether it is drawn: visible and present at the current time."""
         return self.visible and self.is_present
 
     def __post_init__(self) -> None:

@@ -38,7 +38,7 @@ _shaped: Memo[Figure, Figure] = Memo(kept=32)  # maximum number of shapes in use
 def shaped(figure: Figure, weights: Floats) -> Figure:
     """Return the figure with its blend shapes applied: mesh, normals, joints and bindings.
 
-    The last few results are cached, as several passes and panels need the same one.
+    The last few results are cached, as several passes and panels need the same result.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     Returns
     -------
     Figure
-        With new normals, rest translations and inverse bind matrices.
+        Figure with new normals, rest translations and inverse bind matrices.
     """
     from viewer.rig.blendshapes import regress_joints
 
@@ -155,7 +155,7 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
-    """Return the rest translations for new joint positions; rest rotations and scales are kept.
+    """Return the rest translations for new joint positions, with unchanged rotations and scales.
 
     Parameters
     ----------
@@ -175,7 +175,7 @@ def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     above = parents[has_parent]
     translations = joints.copy()
     offsets = joints[..., has_parent, :] - joints[..., above, :]
-    # Solved instead of multiplied by the transpose, as rest transforms may scale.
+    # A linear system is solved, as the transpose is not the inverse if rest transforms scale.
     translations[..., has_parent, :] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
     return translations
 

@@ -185,7 +185,7 @@ def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
     assert "s-2.png: already exists" in capsys.readouterr().err
     (rigs / "in" / "b" / "p-2.skel").write_text(SKEL)
     assert run([*command, "out/b/p.png"]) == 2
-    assert "sheet 2: out/b/p-2.png: expected a file of its own" in capsys.readouterr().err
+    assert "sheet 2: out/b/p-2.png: expected a separate file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def test_keypoints_at_one_frame_keep_the_frame_number(keypoints, tmp_path, capsy
 @pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
 def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, arguments):
     name, *others = arguments
-    assert convert(keypoints, "-o", tmp_path / name, *others) == 2
+    assert convert(keypoints, "-o", tmp_path / name, "--fps", 30, *others) == 2
     assert capsys.readouterr().err == (
         "viewer: there are only keypoints: a motion of joints cannot be written "
         "(.npz stores points)\n"
@@ -93,7 +93,8 @@ def test_keypoints_omitted_next_to_bodies_are_reported(recording, tmp_path, caps
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+        "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+        "keypoints3d folder"
     )
 
 
@@ -159,7 +160,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "nobody is present in frame 23: there is nothing to write"
+    message = "no person is present in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
@@ -167,7 +168,7 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
 def test_time_at_which_everyone_is_absent_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "nobody is present at that time: there is nothing to write"
+    message = "no person is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 

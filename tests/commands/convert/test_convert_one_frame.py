@@ -19,7 +19,8 @@ from viewer.cli import run
 
 STILL = "one frame: nothing moves, so the current pose was written"
 POINTS = (
-    "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+    "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+    "keypoints3d folder"
 )
 PRINTED = 1e-5  # units: six decimals, summed along an arm
 

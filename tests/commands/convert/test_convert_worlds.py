@@ -48,7 +48,10 @@ def convert(*arguments):
 
 def test_upside_down_world_is_reported_when_detected(hanging, smpl):
     scene = viewer.load(smpl, hanging)
-    told = f"{hanging}: -y up, estimated from the poses: everything is flipped; --up overrides it"
+    told = (
+        f"{hanging}: -y up, estimated from the poses: the capture is upside down and is rotated "
+        "upright; --up overrides it"
+    )
     assert told in scene.warnings
     assert scene.up == "y"
     assert_allclose(scene.actors[0].placement[:3, :3], OVER, atol=1e-12)

@@ -111,3 +111,36 @@ def test_animations_without_effect_are_reported(tmp_path: Path) -> None:
     notes = export_clips(Actor(figure), tmp_path / "a.glb", clips=[idle, *clips()])
     lost = {note.key: note.values["names"] for note in notes if note.key.startswith("X003.idle")}
     assert lost == {"X003.idle-animations": ["blink"], "X003.idle-shapes": ["wide"]}
+
+
+def with_extras(name: str, extras: object) -> Actor:
+    figure = two_parts()
+    return Actor(replace(figure, name=name, record=replace(figure.record, extras=extras)))
+
+
+def test_different_application_data_is_listed_by_figure(tmp_path: Path) -> None:
+    actors = [with_extras("a", {"k": 1}), with_extras("b", [2]), with_extras("c", {"k": 1})]
+    plain = with_extras("d", None)
+    export_figures([*actors, plain], tmp_path / "some.glb")
+    expected = {
+        "sources": [
+            {"figures": ["a", "c"], "extras": {"k": 1}},
+            {"figures": ["b"], "extras": [2]},
+        ]
+    }
+    assert Evaluator(tmp_path / "some.glb").root["extras"] == expected
+    # A file that is read back, alone or with further figures, adds only what is new.
+    back = viewer.load(tmp_path / "some.glb").actors
+    export_figures(back, tmp_path / "same.glb")
+    assert Evaluator(tmp_path / "same.glb").root["extras"] == expected
+    export_figures([*back, with_extras("e", 3)], tmp_path / "more.glb")
+    more = {"figures": ["e"], "extras": 3}
+    assert Evaluator(tmp_path / "more.glb").root["extras"]["sources"] == [
+        *expected["sources"],
+        more,
+    ]
+
+
+def test_equal_application_data_is_unchanged(tmp_path: Path) -> None:
+    export_figures([with_extras("a", {"k": 1}), with_extras("b", {"k": 1})], tmp_path / "a.glb")
+    assert Evaluator(tmp_path / "a.glb").root["extras"] == {"k": 1}

@@ -1,4 +1,4 @@
-"""Rotation vectors, quaternions, Euler angles and nearest rotations, each against closed forms."""
+"""Rotation vectors, quaternions, Euler angles and nearest rotations, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def unit_axis(axis):
 
 
 def random_rotations(count, seed=0):
-    """Return random rotations of all directions and angles, as orthonormalised frames."""
+    """Return random rotations about all axes and by all angles, as orthonormalised frames."""
     frames, upper = np.linalg.qr(np.random.default_rng(seed).normal(size=(count, 3, 3)))
     frames *= np.sign(np.diagonal(upper, axis1=1, axis2=2))[:, None, :]
     return frames * np.sign(np.linalg.det(frames))[:, None, None]
@@ -60,7 +60,7 @@ def angle_between(first, second):
 @pytest.mark.parametrize("axis", AXES)
 def test_rotation_vector_rotates_about_its_direction_by_its_length(axis, angle):
     found = rotation_vector_to_matrix(angle * unit_axis(axis))
-    # An angle of 100 is itself rounded to 1e-14.
+    # An angle of 100 is rounded to 1e-14.
     assert_allclose(found, about(axis, angle), atol=ROUNDING * max(1.0, angle))
 
 
@@ -74,8 +74,8 @@ def test_zero_vector_is_the_identity_exactly():
     assert rotation_vector_to_matrix(np.zeros((2, 3))).tolist() == [np.eye(3).tolist()] * 2
 
 
-def test_tiny_rotation_keeps_its_digits():
-    # sin t / t is 1 to the last digit, t^2 / 2 is below it: R = I + [r]x.
+def test_tiny_rotation_keeps_its_precision():
+    # sin t / t is 1 to the last digit, and t^2 / 2 is smaller than that, so R = I + [r]x.
     found = rotation_vector_to_matrix(np.array([1e-9, -2e-9, 3e-9]))
     assert_allclose(found[[2, 0, 1], [1, 2, 0]], [1e-9, -2e-9, 3e-9], rtol=1e-8)
     # Near 0 the diagonal holds -t^2 / 2, which (1 - cos t) / t^2 would lose.
@@ -157,11 +157,11 @@ def test_euler_angles_round_trip():
     rng = np.random.default_rng(2)
     angles = rng.uniform(-1.0, 1.0, (500, 3)) * [np.pi, 1.5, np.pi]
     matrices = np.array([plain_euler(*row) for row in angles])
-    # 0.07 short of a right angle an error in R grows fourteenfold.
+    # At 0.07 from a right angle, an error in R is amplified fourteenfold.
     assert_allclose(matrix_to_euler(matrices), angles, atol=20 * ROUNDING)
 
 
-def test_euler_angles_stay_in_their_ranges_and_give_the_rotation():
+def test_euler_angles_are_in_their_ranges_and_reproduce_the_rotation():
     matrices = random_rotations(1_000, seed=3)
     angles = matrix_to_euler(matrices)
     assert (np.abs(angles) <= np.array([np.pi, np.pi / 2, np.pi])).all()
@@ -171,7 +171,7 @@ def test_euler_angles_stay_in_their_ranges_and_give_the_rotation():
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
 @pytest.mark.parametrize("gap", [0.0, 1e-16, 1e-15, 1e-12, 1e-10, 1e-9, 1e-6])
-def test_euler_angles_give_the_rotation_at_a_right_angle_about_y(gap, side):
+def test_euler_angles_reproduce_the_rotation_at_a_right_angle_about_y(gap, side):
     rng = np.random.default_rng(4)
     for x, z in rng.uniform(-np.pi, np.pi, (50, 2)):
         matrix = plain_euler(x, side * (np.pi / 2 - gap), z)
@@ -179,7 +179,7 @@ def test_euler_angles_give_the_rotation_at_a_right_angle_about_y(gap, side):
         assert_allclose(again, matrix, atol=1e-12)
 
 
-def test_euler_angles_of_an_exact_right_angle():
+def test_euler_angles_of_an_exact_right_angle_are_exact():
     # Whole numbers, so both cosines of the formula are exactly 0.
     matrix = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
     x, y, z = matrix_to_euler(matrix)
@@ -197,7 +197,7 @@ def test_rotation_and_stretch_are_separated():
     rotations = random_rotations(200, seed=6)
     stretches = np.array([random_stretch(rng) for _ in rotations])
     found, left = nearest_rotations(rotations @ stretches)
-    assert_allclose(found, rotations, atol=1e-13)  # stretches differ by up to 25 times
+    assert_allclose(found, rotations, atol=1e-13)  # stretches differ by a factor of up to 25
     assert_allclose(left, stretches, atol=5e-14)
 
 
@@ -212,7 +212,7 @@ def test_shear_rotates_by_the_angle_of_its_polar_decomposition(shear):
     matrix = np.eye(3)
     matrix[0, 1] = shear
     rotation, stretch = nearest_rotations(matrix)
-    # In the plane R has the angle of (m00 + m11, m10 - m01).
+    # In the plane, the angle of R is that of the vector (m00 + m11, m10 - m01).
     assert_allclose(rotation, turn_z(np.arctan2(-shear, 2.0)), atol=ROUNDING)
     assert_allclose(stretch, stretch.T, atol=ROUNDING * (1 + shear))
     assert_allclose(rotation @ stretch, matrix, atol=ROUNDING * (1 + shear))
@@ -230,7 +230,7 @@ def test_reflection_gives_a_proper_rotation_and_a_reflecting_stretch():
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
-def test_no_other_rotation_is_nearer(mirror):
+def test_nearest_rotation_is_nearer_than_any_other(mirror):
     rng = np.random.default_rng(7)
     others = random_rotations(3_000, seed=8)
     for matrix in rng.normal(size=(20, 3, 3)):

@@ -1,4 +1,4 @@
-"""Closed surfaces: which meshes are closed, and where their openings are."""
+"""Closed surfaces: recognition of closed meshes, and the borders of openings."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from viewer.rig.geometry.topology import welded
 from viewer.rig.mesh import Mesh
 from viewer.rig.skin import skin_from_lists
 
-# A cube from 0 to 1: corner 4 x + 2 y + z.
+# A cube from 0 to 1; corner (x, y, z) has the index 4 x + 2 y + z.
 CORNERS = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
 SQUARES = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
 TRIANGLES = np.array([t for a, b, c, d in SQUARES for t in ((a, b, c), (a, c, d))])
@@ -46,23 +46,23 @@ def test_a_cube_is_closed() -> None:
         TRIANGLES[:, ::-1],  # faces inwards
         np.concatenate([TRIANGLES[:1, ::-1], TRIANGLES[1:]]),  # one triangle is reversed
         np.concatenate([TRIANGLES, [[0, 1, 6]]]),  # an edge of three triangles
-        TRIANGLES[2:],  # an opening too large for the sign of the volume
+        TRIANGLES[2:],  # an opening too large to determine the sign of the volume
         TRIANGLES[:0],
     ],
     ids=["inwards", "inconsistent", "three at an edge", "open", "empty"],
 )
-def test_other_meshes_are_not_closed(triangles) -> None:
+def test_meshes_with_other_faults_are_not_closed(triangles) -> None:
     assert shell_of(cube(triangles), None) is None
 
 
-def test_a_mesh_with_an_inward_facing_part_is_not_closed() -> None:
+def test_mesh_with_an_inward_facing_part_is_not_closed() -> None:
     both = np.concatenate([TRIANGLES, TRIANGLES[:, ::-1] + 8])
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is None
     both[12:] = TRIANGLES + 8
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is not None
 
 
-def test_a_small_opening_has_its_corners_as_border() -> None:
+def test_small_opening_has_its_corners_as_border() -> None:
     mesh = fine_cube()
     opened = cube(mesh.triangles[1:], mesh.positions)
     shell = shell_of(opened, None)
@@ -71,9 +71,9 @@ def test_a_small_opening_has_its_corners_as_border() -> None:
     assert {tuple(point) for point in mesh.positions[shell.borders].tolist()} == missing
 
 
-def test_seams_are_closed_while_their_vertices_move_together() -> None:
+def test_seams_are_closed_if_their_vertices_move_together() -> None:
     mesh = fine_cube(2)
-    # 8 corners of 3 vertices and 12 middles of 2: 28 copies.
+    # 8 corners with 3 vertices each and 12 middles with 2 have 28 copies.
     shell = shell_of(mesh, None)
     assert shell is not None and len(shell.copies) == 28
     assert shell.is_closed(2.0 * mesh.positions)
@@ -82,7 +82,7 @@ def test_seams_are_closed_while_their_vertices_move_together() -> None:
     assert not shell.is_closed(moved)
 
 
-def test_seams_with_other_weights_are_open() -> None:
+def test_seams_with_different_weights_are_open() -> None:
     mesh = fine_cube(2)
     pairs = [[(0, 0.5), (1, 0.5)] for _ in mesh.positions]
     inverse_bind = np.tile(np.eye(4), (2, 1, 1))

@@ -1,4 +1,4 @@
-"""Many actors at once: the same results as one by one."""
+"""Batched posing of many actors, compared with posing them one by one."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-EXACT = 1e-13  # the same products, summed in another order
+EXACT = 1e-13  # the same products, summed in a different order
 
 
 def moving_skeleton() -> Skeleton:
-    """Two roots, DOFs of all kinds in any order, limits, and a joint without DOFs."""
+    """Return two roots with unordered DOFs of all kinds, limits, and a joint without DOFs."""
     dofs = [(0, "tx", 0.3), (0, "z", 0.1), (0, "x", 0.0), (1, "y", 0.2, -0.5, 0.5)]
     dofs += [(2, "tz", 0.0), (2, "tz", 0.1), (2, "x", 0.4), (2, "y", -0.3), (2, "z", 0.0)]
     return skeleton([-1, 0, 1, -1], dofs, offsets=np.arange(12.0).reshape(4, 3))
@@ -89,7 +89,7 @@ def same(first: Actor, second: Actor) -> None:
 
 
 def both_ways(make, time: float, interpolate: bool = False) -> list[Actor]:
-    """Return actors posed together, after comparing them with actors posed one by one."""
+    """Pose actors together, compare them with actors posed one by one, and return them."""
     together, alone = make(), make()
     pose_actors(together, time, interpolate)
     for first, second in zip(together, alone, strict=True):
@@ -113,7 +113,7 @@ def test_curves_pose_actors_together(time):
     actors = both_ways(
         lambda: [Actor(figure, clip=clip, offset=0.1 * number) for number in range(5)], time
     )
-    # Joint 1's angle is limited to half a radian, and its neighbours differ in time.
+    # The angle of joint 1 is limited to half a radian, and neighbouring actors differ in time.
     assert max(actor.pose.dofs[3] for actor in actors) <= 0.5
     if time == 0.4:
         assert len({actor.pose.dofs[2] for actor in actors}) > 1

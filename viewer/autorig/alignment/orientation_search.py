@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from viewer.autorig.alignment.icp import Cloud, gaps_between, iterate
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import SurfaceSamples
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 

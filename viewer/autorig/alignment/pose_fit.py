@@ -9,7 +9,6 @@ for lowered and outstretched arms, and come closer with every iteration.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from viewer.autorig.alignment.pose_step import AlignedTemplate, Pairs, PoseStep,
 from viewer.autorig.alignment.proportions import Limbs, limbs_of, resized
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.surface.samples import even_vertices
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure

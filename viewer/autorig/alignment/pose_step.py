@@ -21,11 +21,10 @@ surface does not determine, such as the rotation of a limb about its own axis.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.autorig.alignment.proportions import Limbs
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["AlignedTemplate", "Pairs", "PoseStep", "solve_step"]

@@ -10,7 +10,7 @@ are fitted.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from viewer.autorig.alignment.surface_alignment import (
     misfit,
 )
 from viewer.autorig.surface.samples import sample_surface
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -8,7 +8,6 @@ is close to the wrong part but faces the other way: its weights are inpainted.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -16,6 +15,7 @@ import numpy as np
 
 from viewer.autorig.correspondence.same_vertices import at_vertices, same_vertices
 from viewer.autorig.surface.welding import Welded, weld
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolate

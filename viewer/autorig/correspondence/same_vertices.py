@@ -22,7 +22,7 @@ __all__ = ["at_vertices", "same_vertices"]
 
 _EDGES = 0.8  # minimum fraction of a vertex's edges that are also edges of the template
 _SLID = 0.5  # maximum shift along the surface, relative to the mean length of a vertex's edges
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:

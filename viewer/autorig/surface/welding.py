@@ -6,11 +6,11 @@ these as borders, or the mesh would tear there.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Floats, Ints
 

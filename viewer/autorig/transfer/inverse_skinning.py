@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from viewer.autorig.surface.welding import edges, weld
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import nearest_rotations

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.transfer.leg_scale import leg_scale
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
@@ -129,7 +130,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
     ways = joints[below] - joints[above]
-    # Solved instead of multiplied by the transpose, as poses may scale joints.
+    # A linear system is solved, as the transpose is not the inverse if poses scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
     return offsets
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.autorig.correspondence.matching import Matches
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints

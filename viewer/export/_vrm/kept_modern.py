@@ -86,7 +86,7 @@ def _expression(told: Any, maps: Maps) -> Any:
 
 
 def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the spring bones; chains with a lost joint are left out as a whole."""
+    """Return the spring bones; chains with a lost joint are omitted as a whole."""
     result, places, colliders = dict(told), dict[int, int](), list[Any]()
     for index, each in enumerate(listed(told, "colliders")):
         node = maps.joint(part(each, "node"), "colliders")
@@ -132,7 +132,7 @@ def _spring(told: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, 
 
 
 def kept_toon(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the toon shading of a material; textures that cannot be read are left out."""
+    """Return the toon shading of a material; textures that cannot be read are omitted."""
     result = {}
     for name, each in told.items():
         if name.endswith("Texture") and isinstance(each, dict):

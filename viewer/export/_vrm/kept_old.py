@@ -88,7 +88,7 @@ def _first_person(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
 
 
 def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the springs; groups of colliders keep their places, because springs index them."""
+    """Return the springs; groups of colliders keep their indices, because springs refer to them."""
     groups = []
     for each in listed(told, "boneGroups"):
         if not isinstance(each, dict):

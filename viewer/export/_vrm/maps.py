@@ -58,7 +58,7 @@ class Maps:
 
     @property
     def materials(self) -> dict[int, int]:
-        """The written material of each material of the file that is used."""
+        """Written materials, by material of the original file; only those in use."""
         return self._materials
 
     def meshes(self, mesh: Any, kind: str) -> list[int]:

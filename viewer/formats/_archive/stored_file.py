@@ -78,7 +78,7 @@ class StoredFile:
         return file
 
     def fault(self, key: str, problem: Phrase) -> FormatError:
-        """Return an error that gives the file and the key."""
+        """Return an error that states the file and the key."""
         values = {"item": printable(key, 60), "problem": problem}
         return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
 

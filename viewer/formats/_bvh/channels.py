@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._bvh.hierarchy import BvhJoint, called
 from viewer.formats._neutral import held_rows

@@ -8,11 +8,12 @@ finds and reports all errors.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._bvh.channels import (
     Table,
@@ -79,19 +80,22 @@ class BvhStream:
         """Whether a joint with a parent has position channels."""
         return bool(inner_moves(self.table))
 
-    def clips(self) -> Iterator[SampledClip]:
-        """Yield the frames as clips of consecutive parts, each of which starts at 0 seconds.
+    def clips(self, first: int, stop: int) -> Iterator[SampledClip]:
+        """Yield a range of frames as clips of consecutive parts, each starting at 0 seconds.
 
-        Raises Irregular if a part is invalid, also after other parts have been yielded.
+        Raises Irregular if any part of the file is invalid, also after parts have been yielded.
         """
-        clip, count = self.motion.clip, 0
-        is_zero = True
+        clip, count, is_zero = self.motion.clip, 0, True
         for part in _parts(self.path, self.start):
             values = parsed_rows(part, self.table.n_channels)
             is_zero = is_zero and not _moves_inner(self.table, values)
+            chosen = values[max(first - count, 0) : max(stop - count, 0)]
             count += len(values)
-            yield clip_of(self.table, values, clip.name, clip.timing.frame_rate)
-        # The whole reader reports position channels of inner joints that are all zero.
+            if len(chosen):
+                yield clip_of(self.table, chosen, clip.name, clip.timing.frame_rate)
+            if len(chosen) < len(values):
+                _check_reach(self.table, values)
+        # Reading the whole file reports position channels of inner joints that are all zero.
         base = offsets_replaced(self.table)
         if count != self.n_frames or (is_zero and base[inner_moves(self.table)].any()):
             raise Irregular
@@ -178,12 +182,17 @@ def clip_of(table: Table, values: Floats, name: str, rate: float) -> SampledClip
     """Return frames as a clip; raises Irregular if a translation is beyond the limit."""
     translations = None
     if table.moves:
-        shifts = shifts_of(table, values, offsets_replaced(table))
-        if is_beyond(shifts).any():
-            raise Irregular
-        translations = placed(table, shifts)
+        translations = placed(table, _check_reach(table, values))
     rows = np.arange(len(values), dtype=np.int32)
     return SampledClip(name, Timing(rate, rows), rotations_of(table, values), translations)
+
+
+def _check_reach(table: Table, values: Floats) -> Floats:
+    """Return the translations of frames: (N, M); raises Irregular if one is beyond the limit."""
+    shifts = shifts_of(table, values, offsets_replaced(table))
+    if is_beyond(shifts).any():
+        raise Irregular
+    return shifts
 
 
 def _moves_inner(table: Table, values: Floats) -> bool:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._easymocap.json_frames import (
     RecordError,
@@ -152,7 +153,8 @@ class Rows:
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)  # indices in the files' lists of people
+    # Indices of the records in the files' lists of people.
+    places: list[int] = field(default_factory=list)
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
         """Store the origin of an accepted record."""

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.formats._source import Source
 from viewer.phrases import printable
 

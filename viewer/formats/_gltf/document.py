@@ -109,7 +109,7 @@ def _check_version(root: Element) -> None:
         return
     stated = asset.values.get("version")
     # Some files of glTF 0.8 and 1.0 state the version as a number.
-    if isinstance(stated, int | float) and type(stated) is not bool and stated < 2:
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and stated < 2:
         raise asset.fault("F002.gltf-version", "version", found=stated)
     version = asset.text("version", "2.0")
     if version.partition(".")[0] != "2":

@@ -105,7 +105,7 @@ class Element:
         name : str
             Name of the member.
         count : int
-            Number of elements that it can refer to.
+            Number of elements to which it can refer.
         what : str
             Name of these elements in the root: ``"nodes"``.
 

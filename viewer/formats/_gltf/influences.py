@@ -1,4 +1,4 @@
-"""Influences of the vertices of a primitive: all sets of joints and weights side by side."""
+"""Influences of the vertices of a primitive: all sets of joints and weights in one table."""
 
 from __future__ import annotations
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import Any, cast
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.elements import Element
 from viewer.formats._nodes.content import NodeMesh, NodeTree
 from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformPath

@@ -10,10 +10,11 @@ a warning, because the shape can still be shown.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness

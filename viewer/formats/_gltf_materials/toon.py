@@ -15,13 +15,15 @@ between c = toony - 1 - shift and c = 1 - toony - shift.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.toon_ramp import modern_ramp
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["MTOON", "Toon", "read_toon"]
@@ -102,8 +104,7 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
     if color is not None:
         color = decode_srgb(color[:3].clip(0.0, 1.0))
     if toony is not None and shift is not None:
-        toony += (1.0 - toony) * (0.5 + 0.5 * shift)
-        shift = -shift - (1.0 - toony)
+        toony, shift = modern_ramp(toony, shift)
     return Toon(_values(color, toony, shift), shade)
 
 

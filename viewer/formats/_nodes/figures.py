@@ -127,7 +127,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, at the first one."""
+    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
     odd = [piece for piece in pieces if piece.influences.n_deviating]
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree
 from viewer.rig.arrays import Bools, Ints
@@ -30,7 +31,7 @@ class Members:
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str
-        Name of the topmost node that is in no other figure; empty for the only figure of a file.
+        Name of the topmost node that is not in another figure; empty for the only figure of a file.
     """
 
     nodes: list[int] = field(default_factory=list)
@@ -286,7 +287,7 @@ def _preorder(tree: NodeTree, tops: Iterable[int]) -> list[int]:
     """Return the nodes of some trees in preorder, with children in file order."""
     order = np.argsort(tree.parents, kind="stable")
     starts = np.searchsorted(tree.parents[order], np.arange(tree.n_nodes + 1)).tolist()
-    # Reversed, so that the first child is taken from the stack first.
+    # Children are pushed in reverse order, so that the first child is popped first.
     children = order.tolist()
     found: list[int] = []
     stack = [*tops][::-1]

@@ -104,7 +104,7 @@ class Machine:
         """Continue with the budget that a nested machine has left."""
         self._budget = inner._budget
 
-    # Reading bytes.
+    # Methods that read bytes.
 
     def number(self, size: int, *, is_signed: bool = False) -> int:
         """Read an integer of ``size`` bytes, least significant first."""
@@ -156,7 +156,7 @@ class Machine:
         """Return the error for a file damaged by a text-mode transfer."""
         return self.source.fault("F002.pickle-line-ends")
 
-    # The stack.
+    # Methods of the stack.
 
     def push(self, value: object) -> None:
         """Push a value onto the stack."""
@@ -195,7 +195,7 @@ class Machine:
         else:
             self.pop()
 
-    # The memo.
+    # Methods of the memo.
 
     def remember(self, index: int) -> None:
         """Store the topmost value in the memo."""

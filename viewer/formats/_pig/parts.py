@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part as FaultPart
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.checking import archive_of, finite
@@ -95,7 +96,7 @@ class Part:
 
 @dataclass(slots=True)
 class PigFiles:
-    """All arrays that were found."""
+    """All arrays of a model that are present."""
 
     parts: dict[str, Part] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
@@ -59,7 +60,7 @@ class Table:
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
-    """Read all elements, by name.
+    """Read all elements and return them by name.
 
     Raises
     ------
@@ -104,14 +105,14 @@ class _Text:
         if bad >= 0:
             self.values = parse_words(self.data, self.start, len(self.data))
         self.has_bad = bad >= 0
-        # The first word of every non-empty line, and its number of words.
+        # Find the first word and the number of words of every non-empty line.
         self.counts = line_sizes(self.data, self.start)
         self.firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
         self.line = 0
         self._begins: Places | None = None
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         last = self.line + element.count
         if self.has_bad or element.count == 0 or last > len(self.counts):
@@ -281,7 +282,7 @@ class _Binary:
         return None
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         if element.count == 0:
             return False

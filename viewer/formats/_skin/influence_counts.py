@@ -11,8 +11,8 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["find_heads"]
 
-_LEAP = 16  # vertices that each step of the Python loop skips
-_SMALL = 1 << 29  # up to this count of numbers, three times the count fits an int32
+_LEAP = 16  # number of vertices that each step of the Python loop skips
+_SMALL = 1 << 29  # maximum count of numbers for which three times the count fits into an int32
 
 
 def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:

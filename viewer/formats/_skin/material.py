@@ -33,7 +33,7 @@ def read_material(
     keywords : container of bytes
         Keywords of sections, which cannot be part of a name.
     pictures : dict
-        Images loaded so far, by name; this material's is added.
+        Images loaded so far, by name; the image of this material is added.
 
     Returns
     -------

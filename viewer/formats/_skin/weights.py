@@ -79,7 +79,8 @@ def _whole_influences(
     begin, end = block.start, block.end
 
     def offset_of(vertex: int) -> int:
-        # It is preceded by one count per vertex and two words per influence.
+        # The vertex's words follow one count per earlier vertex and two words per earlier
+        # influence.
         return source.number_offset(begin, end, vertex + 2 * int(starts[vertex]))
 
     return starts, joints, weights, offset_of

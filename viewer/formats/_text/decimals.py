@@ -141,7 +141,7 @@ def _placed(numbers: Words, exponents: Indices, decimals: Indices, most: int, le
     is_exponential = (exponents < -4) | (exponents >= most)
     tails = None
     if is_exponential.any():
-        # One digit before the point.
+        # Write one digit before the point.
         decimals = np.where(is_exponential, decimals + exponents, decimals)
         tails = np.where(is_exponential, _TAILS.take(exponents + 99, mode="clip"), _U(0))
     numbers = numbers * _TENS.take(np.maximum(-decimals, 0))

@@ -2,7 +2,7 @@
 
 Python's parser is fast, but it does not record offsets. If there is an error, the text is scanned a
 second time, token by token. By then, it is known to be valid JSON, except that it may be nested too
-deeply and contain NaN and infinities.
+deeply or contain NaN and infinities.
 """
 
 from __future__ import annotations

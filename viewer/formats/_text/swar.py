@@ -38,7 +38,7 @@ ZEROS = _U(0x3030303030303030)
 _LOW7 = _U(0x7F7F7F7F7F7F7F7F)
 _HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
 _SIXES = _U(0x0606060606060606)
-# The mask of the last k characters of a word.
+# Masks of the last k characters of a word.
 _KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], dtype=np.uint64)
 
 

@@ -17,10 +17,10 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
@@ -203,7 +203,7 @@ def _found(
 def _people(
     source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]]
 ) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are the frames of few people.
+    """Return the tracks of people: dicts of single frames are combined into people.
 
     Single frames with different joints or numbers of coefficients are different people.
     """

@@ -17,11 +17,11 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
@@ -124,7 +124,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
 
 
 def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
-    """Return values with an axis of frames."""
+    """Return values with a first axis of frames."""
     return values if lead else values[None]
 
 
@@ -181,7 +181,7 @@ def claims_folder(source: Source, names: set[str]) -> bool:
     file = Source(source.path / first, max_size=source.max_size)
     try:
         return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
-    except FormatError:  # a file of another kind in a folder of another format
+    except FormatError:  # the folder is of another format
         return False
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 
+from viewer.data_classes import dataclass
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 

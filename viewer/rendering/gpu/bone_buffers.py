@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.bone_links import BoneLinks, bone_links
 from viewer.rendering.gpu.bone_shapes import arrow, ball, octahedron, stick
 from viewer.rendering.gpu.box_buffers import joint_colors

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices

@@ -6,8 +6,9 @@ import ctypes
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from viewer.data_classes import dataclass
 
 __all__ = ["EglDevice", "device_of_worker", "egl_devices"]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_layout import lay_out
 from viewer.rendering.overlay.lettering import Lettering
 from viewer.rendering.overlay.segments import Segments, SegmentStyle

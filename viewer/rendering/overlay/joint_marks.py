@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.box_buffers import joint_colors
 from viewer.rendering.overlay.segments import Segments, dots
 from viewer.rendering.projection import picture_scale, project, project_segments

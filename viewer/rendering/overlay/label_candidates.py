@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_cells import Dots
 from viewer.rig.arrays import Bools, Floats, Ints
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_candidates import (
     Places,
     clear_places,

@@ -7,11 +7,11 @@ them.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.passes.shadow_pass import parallel_view

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import colorsys
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bytes
 
 __all__ = ["CameraImage", "CameraImages"]
@@ -12,7 +12,7 @@ __all__ = ["CameraImage", "CameraImages"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraImage:
-    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, not undistorted."""
+    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, with lens distortion."""
 
     pixels: Bytes
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -124,7 +125,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
     Parameters
     ----------
     view : CameraView
-        Fixed or moving camera; a fixed one has the time 0.
+        Fixed or moving camera; a fixed camera has only the time 0.
     most : int
         Maximum number of times, at least 2.
     """

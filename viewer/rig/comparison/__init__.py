@@ -70,7 +70,7 @@ def compare(
 
 
 class _Comparison:
-    """Two actors, their matched parts, and the tallies of their differences."""
+    """Two actors, their matched parts, and their accumulated differences."""
 
     def __init__(self, first: Actor, second: Actor, skinning: Skinning, steps: Steps) -> None:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps

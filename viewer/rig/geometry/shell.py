@@ -6,11 +6,10 @@ opening. It hits the back first only if skinning turns the surface inside out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh, area_vectors
@@ -18,9 +17,10 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["Shell", "shell_of"]
 
-_MOST_TRIANGLES = 500_000  # for larger meshes, the check takes longer than it saves
+# Maximum number of triangles, above which the check takes longer than it saves.
+_MOST_TRIANGLES = 500_000
 _MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
-# Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
+# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
 _CLOSED = 0.25
 _HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 
@@ -81,7 +81,9 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     pairs, is_open = found
     if is_open.sum() > _MOST_OPEN or not _face_outwards(mesh.positions, corners, pairs, is_open):
         return None
-    borders = np.unique(corners.ravel()[is_open]).astype(np.int32)
+    is_border = np.zeros(mesh.n_vertices, dtype=np.bool_)
+    is_border[corners.ravel()[is_open]] = True
+    borders = np.flatnonzero(is_border).astype(np.int32)
     return Shell(borders, copies, originals)
 
 

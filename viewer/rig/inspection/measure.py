@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -78,7 +77,7 @@ def _open_edges(positions: Floats, triangles: Ints) -> Ints:
     corners: Ints = triangles
     for merges in (False, True):
         if merges:
-            # Vertices are often doubled along texture seams.
+            # Vertices are often duplicated along texture seams.
             same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
             corners = same[triangles]
         following = np.roll(corners, -1, axis=1)

@@ -41,7 +41,7 @@ class Animation:
         self._clip: TransformClip | None = None
 
     def plays(self, clip: object) -> bool:
-        """Return whether a motion is the one of this animation."""
+        """Return whether a motion is that of this animation."""
         return clip is not None and clip is self._clip
 
     def clip(self) -> TransformClip:

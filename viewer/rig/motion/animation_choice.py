@@ -54,7 +54,7 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
         Figures with animations; numbers refer to the figure with the most animations.
     wanted : str
         A name or label, matched exactly or else ignoring case; a number from 1; ``NONE``; or an
-        empty text for the first animation.
+        empty string for the first animation.
 
     Returns
     -------

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, frozen
@@ -178,7 +178,7 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
 
 
 def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
-    """Return why a clip cannot move a skeleton, as a phrase that follows the name, or None."""
+    """Return the reason why a clip cannot move a skeleton, phrased to follow its name, or None."""
     if not is_course_rig(skeleton):
         return Phrase("not-course-rig", reason=_first_misfit(skeleton))
     if len(clip.channels) != skeleton.n_dofs:
@@ -199,7 +199,7 @@ def _first_misfit(skeleton: Skeleton) -> Phrase:
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Raise if a clip was made for a different skeleton.
+    """Raise an error if a clip was made for a different skeleton.
 
     Raises
     ------

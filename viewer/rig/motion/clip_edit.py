@@ -136,7 +136,7 @@ def move_keys(
     dv : float
         Length or radians.
     gap : float
-        Minimum distance in seconds to unmoved keys that are at least this far away now.
+        Minimum distance in seconds to unmoved keys that are at least this far away initially.
     """
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True

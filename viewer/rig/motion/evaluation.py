@@ -1,14 +1,15 @@
-"""Evaluation of motions: posing a single actor, and many frames of one as arrays."""
+"""Evaluation of motions: posing of a single actor, and many frames of one actor as arrays."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.captures.points import PointClip, sample_points

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.geometry.quaternion import slerp
@@ -70,7 +71,7 @@ class SampledClip:
 
     @property
     def n_rows(self) -> int:
-        """Number of frames that hold data, N."""
+        """Number of frames with data, N."""
         return len(self.rotations)
 
     @property
@@ -103,7 +104,7 @@ class SampledRows:
 
 
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
-    """Interpolate a clip at given times: rotations along the shorter arc, the rest linearly.
+    """Interpolate a clip at given times: rotations along the shorter arc, other values linearly.
 
     Exactly at a frame, the stored values are returned unchanged.
 

@@ -16,7 +16,7 @@ from viewer.rig.shape import shaped_skeleton
 
 __all__ = ["own_up", "upright_actor", "upright_placement"]
 
-_OVER = np.array([1.0, -1.0, -1.0])  # 180 degrees about x
+_OVER = np.array([1.0, -1.0, -1.0])  # rotation by 180 degrees about x
 
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
@@ -48,7 +48,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
     """Return an actor whose figure records the up axis of its pose, rotated if upside down.
 
-    A body in a z-up capture stands along z, regardless of the up axis of its model.
+    A body in a z-up capture is upright along z, regardless of the up axis of its model.
 
     Parameters
     ----------

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics

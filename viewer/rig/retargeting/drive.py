@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
+from viewer.data_classes import dataclass
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.joint_map import JointMap
@@ -14,7 +14,7 @@ __all__ = ["Drive"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with other joints, and the retargeting options.
+    """A motion that drives a figure with different joints, and the retargeting options.
 
     Attributes
     ----------

@@ -20,7 +20,7 @@ def ground_offset(
     """Return the offset that moves the target's feet to those of the scaled source.
 
     The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
-    have another ratio. Without this offset, a body with high ankles sinks into the ground.
+    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
 
     Parameters
     ----------
@@ -36,7 +36,7 @@ def ground_offset(
     Returns
     -------
     (3,)
-        Along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
+        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
         source does not stand in its rest pose.
     """
     place = {

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
@@ -191,7 +191,7 @@ def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str]
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[Diagnostic]:
-    """Return messages about matched joints and unmatched ones."""
+    """Return messages about matched and unmatched joints."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
         Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])

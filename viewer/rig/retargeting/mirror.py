@@ -161,7 +161,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     Raises
     ------
     RigError
-        If the skeleton is neither symmetric nor a stated humanoid.
+        If the skeleton is not symmetric and the file states no human bones.
     """
     partners = posing_partners(figure)
     skeleton = figure.require_skeleton()

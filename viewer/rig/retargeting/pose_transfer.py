@@ -18,10 +18,11 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.phrases import printable

@@ -7,16 +7,17 @@ of source and target::
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
 where B rotates the figure's rest pose to the source's at that joint, for instance from a T-pose
-to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg lengths.
+to an A-pose. Lengths are those of the figure; the path is scaled by the ratio of leg lengths.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -134,7 +135,7 @@ def retarget(
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters

@@ -54,7 +54,7 @@ def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
 def with_source_rest(
     motion: SkeletonMotion, choice: SourceRest
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
-    """Return a motion whose skeleton has the requested rest pose; the motion is the same.
+    """Return a motion whose skeleton has the requested rest pose; the motion itself is unchanged.
 
     Parameters
     ----------
@@ -121,7 +121,7 @@ def _estimated(
 
 
 def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other world rotations: (J, 3, 3)."""
+    """Return a motion whose skeleton has other world rotations at rest: (J, 3, 3)."""
     above = worlds[skeleton.parents]
     above[skeleton.parents < 0] = np.eye(3)
     local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
@@ -129,7 +129,7 @@ def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> Skele
 
 
 def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other local rotations: (J, 4)."""
+    """Return a motion whose skeleton has other local rotations at rest: (J, 4)."""
     rested = replace(skeleton, rest_rotations=local)
     return replace(motion, figure=replace(motion.figure, skeleton=rested))
 

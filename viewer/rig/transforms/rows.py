@@ -8,10 +8,10 @@ stored.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import (
     axis_rotations,

@@ -18,7 +18,7 @@ STEPS = 240  # steps of the quadrature, from pole to pole
 @pytest.fixture
 def generator(monkeypatch):
     """The modules of the script."""
-    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[2] / "assets"))
+    monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[3] / "assets"))
     import make_studio
 
     return make_studio
