@@ -7,13 +7,13 @@ function of the state. Both are imported on first use.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from types import ModuleType
 
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 
 __all__ = [
     "ACTIONS",
@@ -93,7 +93,7 @@ class Shortcut:
 
     @property
     def name(self) -> str:
-        """Name of the action in the preferences: it stays the same when keys and texts change."""
+        """Name of the action in the preferences: it stays the same when keys and labels change."""
         return " ".join([self.action, *map(str, self.arguments)])
 
     def run(self, state: AppState) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -13,11 +13,12 @@ from viewer.app.files.state import Files
 from viewer.app.palette.palette_window import Palette
 from viewer.app.preferences.key_map import chords_of
 from viewer.app.preferences.state import CAPTURED, Appearance, Preferences
+from viewer.data_classes import dataclass
 
 __all__ = ["Keyboard", "handle_keys"]
 
 _REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # these repeat while held
-_NAVIGATION = {  # these move in an open menu or list, and choose from it
+_NAVIGATION = {  # these navigate an open menu or list, and choose from it
     imgui.Key.left_arrow,
     imgui.Key.right_arrow,
     imgui.Key.up_arrow,
@@ -41,7 +42,7 @@ class Keyboard:
     modifiers : int
         Modifiers in the previous frame, as ImGui's bits.
     has_menu : bool
-        Whether a menu or list was open at the last keys. ImGui may have closed it since.
+        Whether a menu or list was open when keys were last handled. ImGui may have closed it since.
     chosen : dict
         The user's keys for which the table below was made, as in ``Preferences.keys``.
     bound : dict

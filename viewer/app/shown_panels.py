@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
 from viewer.app.features import PANELS
+from viewer.data_classes import dataclass
 
 __all__ = ["ShownPanels", "is_open", "reset_layout", "set_open", "show_panel"]
 
@@ -19,7 +20,7 @@ class ShownPanels:
     closed : set of str
         Panels open by default that were closed.
     opened : set of str
-        Panels on demand that were opened.
+        On-demand panels that were opened.
     wants_reset : bool
         Whether the default layout is to be restored.
     fronts : list of str

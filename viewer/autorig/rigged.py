@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from viewer.autorig.alignment.surface_alignment import Alignment
 from viewer.autorig.transfer.clip_transfer import transfer_clip
 from viewer.autorig.weights.result import WeightTransfer
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Bools, Floats, Ints

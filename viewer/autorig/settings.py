@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.autorig.weights.weight_transfer import WeightSettings
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 
 __all__ = ["JOINTS", "METHODS", "Report", "TransferSettings"]

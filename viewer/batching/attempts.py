@@ -8,11 +8,12 @@ import os
 import time
 import traceback
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.diagnostics import described
 from viewer.diagnostics.record import Record, recorded
 from viewer.errors import ViewerError

@@ -7,9 +7,9 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, SUFFIXES
 from viewer.phrases import counted, printable
@@ -178,9 +178,7 @@ class _Search:
             text = counted(self._n_skipped, "file")
             notes.append(f"{text} in folders skipped: the suffix belongs to no format")
         if self._n_outputs:
-            notes.append(
-                f"{counted(self._n_outputs, 'file')} in the folder of the outputs left out"
-            )
+            notes.append(f"{counted(self._n_outputs, 'file')} in the folder of the outputs omitted")
         paths = sorted(self._found.values(), key=natural_key)
         return Inputs(tuple(paths), _common(self.roots), frozenset(self._folders), tuple(notes))
 

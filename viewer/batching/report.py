@@ -12,12 +12,13 @@ import json
 import os
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.diagnostics.describing import plain
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import printable
@@ -100,7 +101,7 @@ class ReportFile:
             raise self._error(problem) from None
 
     def add(self, result: Result) -> None:
-        """Append a line; a killed process loses no earlier line."""
+        """Append a line; earlier lines survive if the process is killed."""
         line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
         try:
             with _locked(self._handle):
@@ -164,7 +165,8 @@ def _line(result: Result) -> str:
     found["seconds"] = round(result.seconds, 6)
     try:
         return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)
-    except (ValueError, TypeError):  # JSON has no infinite numbers, no NaN, and only texts as keys
+    # JSON has no infinite numbers, no NaN, and only strings as keys.
+    except (ValueError, TypeError):
         found["values"] = plain(result.values)
         return json.dumps(found, default=str, separators=(",", ":"))
 

@@ -7,7 +7,7 @@ import glob
 import os
 import time
 from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal, cast
 
@@ -15,6 +15,7 @@ from viewer.batching.engines import Job, Limits, load_engine
 from viewer.batching.items import Item, Result
 from viewer.batching.keys import item_key
 from viewer.batching.report import Report, ReportFile, read_results
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import postponed, watched
 from viewer.phrases import printable

@@ -9,10 +9,10 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from viewer.data_classes import dataclass
 from viewer.errors import RenderError
 from viewer.loading import bundled_body, bundled_files, load
 
@@ -144,7 +144,7 @@ def _drawn(
 
 
 def _crowd(scene: Scene) -> Scene:
-    """Return rows of ten of the first figure."""
+    """Return copies of the first figure, in rows of ten."""
     from viewer.rig.scene import Actor, Scene
 
     actors = [Actor(scene.actors[0].figure) for _ in range(_INSTANCES)]

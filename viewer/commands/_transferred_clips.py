@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.autorig.rigged import Rigged, clip_for
 from viewer.commands._scene import print_warnings
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError, ViewerError
 from viewer.export import MotionOptions, animation_for, export_animation

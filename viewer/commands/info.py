@@ -186,7 +186,7 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
 
 def _describe_parts(mesh: Mesh) -> list[dict[str, Any]]:
     """Return the parts that can be hidden, with their numbers of triangles."""
-    # Triangles of no part are counted first.
+    # Triangles without a part are counted first.
     counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
     return [
         {"name": name, "triangles": int(count)}

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from viewer.data_classes import dataclass
 from viewer.phrases import listed, printable
 
 if TYPE_CHECKING:

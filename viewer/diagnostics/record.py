@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics.describing import described
 from viewer.diagnostics.diagnostic import Diagnostic
 from viewer.phrases import printable

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.rig.skinning import Skinning
 
 ROTATION_ORDERS = ("zyx", "zxy", "xyz", "xzy", "yxz", "yzx")
@@ -34,11 +35,14 @@ class VrmMeta:
         At least one for figures from other files.
     licence : str
         Address of the licence.
+    upgrades : bool
+        Write characters from VRM 0.x files as VRM 1.0.
     """
 
     name: str = ""
     authors: tuple[str, ...] = ()
     licence: str = ""
+    upgrades: bool = False
 
 
 @dataclass(slots=True)

@@ -39,10 +39,10 @@ __all__ = ["read"]
 
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")
-_USUAL = 1  # default level of detail in MHR's own loader and in SAM 3D Body
+_USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
 _ROWS = 8  # correctives that are read together, 1.8 MB at the usual level of detail
 _N_IDENTITY = 45  # number of shapes of the identity; the others are expressions
-_SMALLEST = 1e-5  # MHR's skinning omits smaller weights
+_SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
     "joint_parents joint_names inverse_bind_pose"
@@ -114,7 +114,7 @@ def _files(source: Source) -> tuple[Source, Source]:
 
 
 def _names(folder: Path) -> list[str]:
-    """Return the names of the files in a folder; raises FormatError if it cannot be listed."""
+    """Return the names of the files in a folder; raise FormatError if it cannot be listed."""
     try:
         return [path.name for path in folder.iterdir()]
     except OSError as problem:

@@ -12,10 +12,10 @@ normals are optional.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._skin.blocks import find_block, read_count, to_whole
 from viewer.formats._skin.rows import read_rows

@@ -143,7 +143,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     vertices, indices = parts.corners[:, 0], parts.corners[:, 2]
     if not used.all():
         vertices, indices = vertices[used], indices[used]
-    # Most vertices have the same normal in all corners, so that few need to be compared.
+    # Most vertices have the same normal at all corners, so only few need to be compared.
     chosen = np.full(n_vertices, -1, dtype=indices.dtype)
     chosen[vertices] = indices
     others = np.flatnonzero(chosen[vertices] != indices)
@@ -195,7 +195,7 @@ def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], I
 
 
 def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints]:
-    """Return the distinct names of runs of faces, and the index of each face's, or -1."""
+    """Return the distinct names of runs of faces, and the index of the name of each face, or -1."""
     names = list(dict.fromkeys(name for _, name in runs))
     numbers = {name: index for index, name in enumerate(names)}
     of_run = np.array([-1, *(numbers[name] for _, name in runs)], dtype=np.int32)

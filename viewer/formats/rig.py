@@ -12,9 +12,9 @@ contain spaces.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.formats._references import referenced_path
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import SEVERITIES, Collector
 from viewer.diagnostics.merging import merged
 from viewer.errors import FormatError, ViewerError
@@ -225,7 +226,7 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
     """Return the file that an error is about, or the last file read if the error has none.
 
-    None if the file was not read here.
+    The result is None if the file was not read here.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
     found = problem.diagnostic
@@ -247,7 +248,7 @@ def with_files(
     findings: list[Finding],
     looked_at: tuple[Scene, Sequence[Owners]] | None = None,
 ) -> list[Finding]:
-    """Return all findings, those of the scene with their files, without duplicate messages.
+    """Return all findings without duplicate messages, and with files for those about the scene.
 
     Parameters
     ----------

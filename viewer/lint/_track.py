@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Indices", "Track"]
@@ -39,7 +38,7 @@ class Track:
     scale : float
         Scene units per figure unit.
     feet : (N,) int32
-        The joint of each foot nearest to the ground; empty without two feet by name.
+        The joint of each foot nearest to the ground; empty unless joint names identify two feet.
     soles : (F, N)
         Height of each foot's lowest point in the scene.
     """

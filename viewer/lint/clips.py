@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices, Track

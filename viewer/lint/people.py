@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices
 from viewer.rig.arrays import Bools, Floats
@@ -126,7 +125,7 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[F
 
 
 def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[Finding]:
-    """Report a person who appears where another one has just disappeared for good."""
+    """Report a person who appears where another one has just disappeared permanently."""
     first, last = int(np.flatnonzero(own.present)[0]), int(np.flatnonzero(path.present)[-1])
     pause = first - last
     if not 0 < pause <= _LATER * own.timing.frame_rate:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.carrying import carrying_drive
@@ -83,7 +84,7 @@ class Builder:
     hangs : bool
         Whether the axis along which people stand points down before placement.
     defers : bool
-        Whether ``finish`` is called with the final motions after everything has been read.
+        Whether the caller computes the final motions and passes them to ``finish``.
     """
 
     capture: Capture
@@ -257,7 +258,7 @@ class Builder:
     def _add_clip(
         self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
     ) -> None:
-        """Append a clip to that of a person, or add an actor; ``drive``: motion of its source."""
+        """Append a clip to a person's clip, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
@@ -329,7 +330,7 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def carry_to(self, target: Figure) -> list[Diagnostic]:
-        """Let the bodies, including later ones, move another figure; ``place`` comes first.
+        """Let the bodies, also later ones, move another figure; ``place`` must be called first.
 
         Returns messages about matched joints. Raises RigError if too few match; nothing changes
         then.
@@ -373,7 +374,7 @@ def _grown(first: Drive, second: Drive) -> Drive:
 
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
-    """Return one clip of the rows of two with the same timeline."""
+    """Return one clip with the rows of two clips on the same timeline."""
     return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
 
 
@@ -384,6 +385,6 @@ def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
 
 
 def joined_points(first: PointClip, second: PointClip) -> PointClip:
-    """Return one clip of the concatenated rows of two with the same timeline."""
+    """Return one clip with the concatenated rows of two clips on the same timeline."""
     timing = joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))

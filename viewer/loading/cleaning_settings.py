@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+from viewer.data_classes import dataclass
 
 if TYPE_CHECKING:
     from viewer.rig.cleanup.one_euro import OneEuro

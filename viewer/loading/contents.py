@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import MAX_SIZE, Source, claims, detect, read
@@ -41,7 +42,7 @@ class Contents:
     figures : list of (Path, Figure)
         All figures, including the figures of groups.
     groups : list of FigureGroup
-        Figures of one file, which keep their places relative to each other and to their cameras.
+        Figures of one file, which keep their positions relative to each other and to their cameras.
     called : dict
         Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic

@@ -64,7 +64,7 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
 def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
     """Let skeletons with animations, but without a mesh, move figures that have no motion.
 
-    A skeleton that moves another figure is not shown itself. Returns whether there is one.
+    A skeleton that moves another figure is not shown itself. Returns whether any skeleton does so.
 
     Parameters
     ----------

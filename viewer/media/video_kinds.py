@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import UnsupportedFormatError
 
 __all__ = ["MOST_GIF_RATE", "VIDEOS", "VideoKind", "video_kind"]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
@@ -39,7 +40,8 @@ __all__ = ["Passes", "Pick", "PickPass"]
 
 _REACH = 3  # search radius around the requested pixel, pixels
 _SIDE = 2 * _REACH + 1
-_PREFERENCE = 2.5  # pixels by which a keypoint may be farther from the pointer than a surface
+# Distance by which a keypoint may be farther from the pointer than a surface, pixels.
+_PREFERENCE = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

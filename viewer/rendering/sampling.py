@@ -1,12 +1,13 @@
-"""Passes of an image: small offsets that differ between the passes, whose images are averaged."""
+"""Passes of an image, whose results are averaged, and the small offsets between them."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats

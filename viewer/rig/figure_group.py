@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Ints
 
 __all__ = ["FileRecord", "StoredImage", "StoredTextures", "VrmRecord"]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+from viewer.data_classes import dataclass
 
 __all__ = ["HUMAN_BONES", "SPINE_BONES", "Humanoid"]
 

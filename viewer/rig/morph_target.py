@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
@@ -19,7 +20,7 @@ from viewer.rig.skin import Skin
 __all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
 
 MORPH_GROUP = "morph"
-"""Group of blend shapes for which weight 0 gives the unchanged mesh and weight 1 the target."""
+"""Group of blend shapes: weight 0 is the unchanged mesh, and weight 1 the target."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +58,7 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals follow by the same formula, before skinning. Joints do not move.
+    Normals are computed with the same formula, before skinning. Joints do not move.
 
     Parameters
     ----------

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import NamedTuple
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.evaluation import constrained_matrices
 from viewer.rig.geometry.axis_products import AxisProducts, axis_products
@@ -40,7 +41,7 @@ class Pose:
     dofs : (D,)
         Lengths or radians.
     translations : (J, 3)
-        Added to the skeleton's rest translations, which follow the figure's shape.
+        Offsets from the skeleton's rest translations, which follow the figure's shape.
     rotations, scales : (J, 4), (J, 3)
         Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
     shape_weights : (S,)

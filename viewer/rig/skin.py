@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 from viewer.rig.skeleton import Skeleton, shown_joint_of, shown_joints
@@ -43,7 +44,7 @@ class Skin:
     Attributes
     ----------
     starts : (V + 1,) int32
-        Vertex v has the influences from ``starts[v]`` up to, not including, ``starts[v + 1]``.
+        Vertex v has the influences from ``starts[v]`` up to, but not including, ``starts[v + 1]``.
     joints : (N,) int32
         Joint of each influence; if a vertex lists a joint twice, the weights are summed.
     weights : (N,)
@@ -266,7 +267,7 @@ def limit_influences(skin: Skin, count: int) -> Skin:
 
 
 def normalized(skin: Skin) -> Skin:
-    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are kept."""
+    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are unchanged."""
     sums = weight_sums(skin)
     factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
     return replace(skin, weights=skin.weights * factors[owners(skin)])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from viewer.data_classes import dataclass
 
 __all__ = ["FAMILY", "Member", "member_of", "members_by_numbers"]
 
@@ -54,7 +54,7 @@ FAMILY = {
     16: Member("MANO", ("wrist", *_hand("")), (-1, *_hand_parents(0, 1)), (("", 1),)),
     5: Member("FLAME", ("global", "neck", *_FACE), (-1, 0, 1, 1, 1), has_expressions=True),
 }
-"""Members by their number of joints."""
+"""Members of the family by their number of joints."""
 
 
 def member_of(parents: tuple[int, ...]) -> Member | None:

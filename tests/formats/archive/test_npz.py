@@ -1,4 +1,4 @@
-"""``.npz`` and ``.npy`` files: read lazily and exactly, and refused if inconsistent."""
+"""Lazy and exact reading of ``.npz`` and ``.npy`` files, and refusal of inconsistent files."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_changed_file_is_not_read(tmp_path: Path) -> None:
     )
 
 
-def test_headers_from_other_writers() -> None:
+def test_headers_from_other_writers_are_read() -> None:
     one = struct.pack("<d", 2.5)
     headers = [
         npy("{'descr':'<f8','fortran_order':False,'shape':(1,)}", one),
@@ -123,7 +123,7 @@ def test_headers_from_other_writers() -> None:
     ],
     ids=["object", "objects", "record", "sub-array", "void", "complex", "date"],
 )
-def test_unsupported_dtypes_are_not_evaluated(given: Any, what: Phrase) -> None:
+def test_unsupported_dtypes_are_refused_without_evaluation(given: Any, what: Phrase) -> None:
     archive = opened(npz(v=given, good=ROWS))
     assert archive.get("v") == Opaque(what)
     assert_array_equal(archive.array("good").values(), ROWS)
@@ -143,7 +143,7 @@ def test_pickles_inside_are_never_opened(tmp_path: Path) -> None:
     assert not marker.exists()
 
 
-def test_names_outside_the_folder_are_only_names() -> None:
+def test_names_with_parent_folders_are_treated_as_plain_names() -> None:
     data = zipped({"../../etc/x.npy": npy(header(), bytes(8)), "a\nb.npy": npy(header(), b"")})
     problem = Phrase("array-bytes", shape=(1,), dtype="float64", found=0)
     assert refusal(data) == ("F002.archive-value", None, {"item": r"a\nb", "problem": problem})

@@ -16,7 +16,7 @@ def head(low: float, high: float) -> Skeleton:
     return make_skeleton(("head",), [-1], [[0, 0, 0]], (low, high))
 
 
-def test_angles_are_in_degrees_and_lengths_unscaled() -> None:
+def test_angles_are_in_degrees_and_lengths_in_file_units() -> None:
     skeleton = head(-1.0, 1.0)
     assert dof_value_text(skeleton, 4, math.pi / 6) == "30.0°"
     assert dof_value_text(skeleton, 4, -0.0) == "0.0°"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from viewer.app.core.calibrated import follow_calibrated
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.motion.follow import followed_point

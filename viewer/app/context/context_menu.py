@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import partial
 
 from imgui_bundle import imgui
@@ -29,6 +28,7 @@ from viewer.app.view.state import Picking
 from viewer.app.view.view_menu import draw_bone_styles, draw_views
 from viewer.app.weights.actions import no_view, pin_vertex, show_scalar, unpin
 from viewer.app.weights.state import Weights
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.renderer import Renderer

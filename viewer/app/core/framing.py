@@ -1,10 +1,11 @@
-"""Camera fitting state: the points to which the camera is fitted, and whether it still is."""
+"""Camera fitting state: the points to fit, and whether the camera is still fitted to them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.motion_extent import MotionExtent
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 
 __all__ = ["KeyNames", "key_name", "with_key"]
 
@@ -31,7 +32,7 @@ def key_name(state: AppState, usual: str) -> str:
 
 
 def with_key(state: AppState, text: str, usual: str) -> str:
-    """Return a text for a button or tooltip, followed by the name of its key.
+    """Return the text of a button or tooltip, followed by the name of its key.
 
     Parameters
     ----------
@@ -40,6 +41,6 @@ def with_key(state: AppState, text: str, usual: str) -> str:
     text : str
         The text, which describes the key's effect.
     usual : str
-        Its label in the table of keys.
+        Label of the key in the table of keys.
     """
     return f"{text} ({key_name(state, usual)})"

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
 from viewer.app.core.clock import Clock
+from viewer.data_classes import dataclass
 from viewer.rendering.framing import frames_looked_at, outermost
 from viewer.rendering.recorder import copied
 from viewer.rig.arrays import Floats

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.pose import Pose, PoseKey, pose_key, pose_of
 from viewer.rig.retargeting.drive import Drive

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -16,6 +16,7 @@ from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
 from viewer.app.core.stats import Stats
 from viewer.app.core.undo_history import History
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.loading import MotionSettings
 from viewer.rendering.camera import Camera, front_azimuth, orbit
@@ -70,7 +71,7 @@ class AppState:
     error : str
         Error message shown above everything else; empty if there is none.
     messages : Messages
-        All messages, and those shown now.
+        All messages, and those currently shown.
     stats : Stats
         Statistics of the last frame.
     history : History
@@ -205,7 +206,7 @@ class AppState:
             camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *messages: str | Diagnostic) -> None:
-        """Show messages that time out; longer ones stay longer."""
+        """Show messages that time out; longer ones are shown longer."""
         for message in messages:
             self.messages.show(str(message))
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.legend import Legend
 
 __all__ = ["Stats"]

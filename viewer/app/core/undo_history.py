@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Protocol
 
 from viewer.app.core.snapshot import (
@@ -19,6 +19,7 @@ from viewer.app.core.snapshot import (
     restore_motion,
     restored_pose,
 )
+from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.retimed import with_rate

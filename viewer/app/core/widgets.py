@@ -6,13 +6,14 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
 from viewer.app.core.fields import begin_field, slider_float, slider_int
 from viewer.app.core.key_names import key_name
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rig.number_text import number_text
 
 __all__ = [
@@ -221,7 +222,7 @@ def offer_files(state: AppState, text: str) -> None:
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
-    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must follow then."""
+    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must then follow."""
     opened = imgui.begin_menu(text, enabled)
     if not opened:
         note_item(state, f"menu {text}")

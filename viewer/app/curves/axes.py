@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui, implot
@@ -13,6 +12,7 @@ from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.curves.data import Curve
 from viewer.app.curves.state import Curves
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 
 __all__ = [

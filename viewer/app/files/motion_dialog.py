@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.app.core.state import AppState
@@ -19,6 +18,7 @@ from viewer.app.files.motion_export import (
     unsuited_formats,
 )
 from viewer.app.files.state import Files
+from viewer.data_classes import dataclass
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.scene import Actor

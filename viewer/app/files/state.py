@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.loader import Loader
 from viewer.app.files.stream import Stream
+from viewer.data_classes import dataclass
 
 __all__ = ["Files"]
 

@@ -157,7 +157,7 @@ class Stream:
             builder.is_cut = True
 
     def wait(self) -> None:
-        """Wait until the thread has ended, or waits for parts to be added. For tests."""
+        """Wait until the thread has ended or waits for parts to be added; used by tests."""
         while self._thread.is_alive():
             self._thread.join(0.01)
             if self._parts.full() or self._is_waiting:

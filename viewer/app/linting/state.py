@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.jobs import CountedJob
+from viewer.data_classes import dataclass
 from viewer.lint import SEVERITIES, Finding, LintOptions
 from viewer.rendering.overlay.marks import Marks
 from viewer.rig.scene import Scene

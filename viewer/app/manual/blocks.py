@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import groupby
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Block", "blocks_of"]
 
@@ -50,7 +51,7 @@ def blocks_of(text: str) -> list[Block]:
 
 
 def _prose(text: str) -> list[Block]:
-    """Return the blocks of a text without code."""
+    """Return the blocks of text without code."""
     found: list[Block] = []
     lines = text.splitlines()
     for is_empty, group in groupby(lines, lambda line: not line.strip()):

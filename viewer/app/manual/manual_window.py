@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -11,6 +11,7 @@ from viewer.app.core.ink import ink
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import begin_menu, begin_window, menu_item, note_item
 from viewer.app.manual.blocks import Block, blocks_of
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.manual import PAGES, page_text
 

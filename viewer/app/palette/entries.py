@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 
 from viewer.app.core.key_names import key_name
@@ -14,6 +13,7 @@ from viewer.app.playback.animations import choose_animation
 from viewer.app.posing.joint_tree import select_joint
 from viewer.app.shown_panels import show_panel
 from viewer.app.view.display_actions import set_shading, show, show_bones
+from viewer.data_classes import dataclass
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import SHADING
 from viewer.rendering.options import BONES, SHOWN
@@ -29,7 +29,7 @@ _LONGEST = 60  # maximum length of a name in characters
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something that can be found and run.
+    """An entry that can be found and run.
 
     Attributes
     ----------

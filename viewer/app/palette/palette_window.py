@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from imgui_bundle import imgui
 
@@ -11,6 +11,7 @@ from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, overlay_rect
 from viewer.app.palette.entries import Entry, entries
 from viewer.app.palette.matching import ranked
+from viewer.data_classes import dataclass
 
 __all__ = ["Palette", "draw_palette", "toggle_palette"]
 

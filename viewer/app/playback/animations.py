@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.phrases import printable
 from viewer.rig.motion.animation_choice import (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui
@@ -12,6 +11,7 @@ from viewer.app.core.fields import drag_float, in_row
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import note_item, plain_zero, show_tooltip
 from viewer.app.posing.clip_pause import pause_for_edit
+from viewer.data_classes import dataclass
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import box_size
 from viewer.rig.motion.transform_clip import TransformClip
@@ -26,9 +26,9 @@ __all__ = [
     "unlocked_joints",
 ]
 
-_LABEL_WIDTH = 4.2  # in font sizes
+_LABEL_WIDTH = 4.2  # width of a label, in font sizes
 _LARGEST = 1e9
-_NOTICEABLE = 1e-4  # relative to the longest bone or a scale of 1; less is rounding
+_NOTICEABLE = 1e-4  # tolerance for rounding, relative to the longest bone or a scale of 1
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import joint_label
 

@@ -8,11 +8,11 @@ a twist, one of the joint's own axes is used instead.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.app.posing.posed_joint import PosedJoint
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.pose import Pose

@@ -7,13 +7,12 @@ translation DOFs, are translated.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
 from viewer.app.posing.state import Outcome
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.number_text import number_text
@@ -76,7 +75,7 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     joint : int
         Index of the dragged joint.
     asked : int
-        Maximum number; 0 means two, with a root, which would rotate the whole figure, only if
+        Maximum number; 0 means two, without the root, which would rotate the whole figure, unless
         nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)

@@ -8,13 +8,13 @@ of that DOF.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from viewer.app.core.view_frame import Place, ViewFrame
 from viewer.app.posing.posed_joint import PosedJoint
 from viewer.app.posing.state import Outcome
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.geometry.vectors import unit
@@ -254,7 +254,8 @@ class RotateHandle:
         """Return the angle of a ring seen edge-on, which is rolled like a wheel."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
-        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # movement of its front by 1 mrad
+        # Movement of the ring's front for 1 mrad.
+        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)
         ends = frame.project(np.stack([self.center, self.center + rim]))
         way = (ends[1] - ends[0]) * 1e3
         length = float(way @ way)

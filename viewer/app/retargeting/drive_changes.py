@@ -1,4 +1,4 @@
-"""Changes to how a motion drives a figure: the motion is retargeted, and undo reverts it."""
+"""Changes to the drive of a figure: its motion is retargeted, and each change can be undone."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["change_drive", "no_edit"]
 
-_SHORT = 1000  # frames of all people that are retargeted within a frame of the window
+_SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 
 
 def no_edit(state: AppState) -> str:
@@ -93,7 +93,7 @@ def _shown(report: Report, number: int, count: int, title: str) -> Receiver:
 
 
 def _is_together(actor: Actor, first: Actor) -> bool:
-    """Return whether an actor is the first one or another person of the same capture."""
+    """Return whether two actors are the same, or people of the same capture."""
     if actor is first:
         return True
     if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from viewer.app.core.state import AppState
 from viewer.autorig.alignment.similarity import Similarity
 from viewer.autorig.alignment.surface_alignment import Alignment, AlignmentSettings
 from viewer.autorig.rigged import Rigged
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.rendering.passes.ghost_pass import Ghost
 from viewer.rig.arrays import Floats
@@ -181,13 +182,13 @@ class RigChoices:
     method, joints : str
         As in ``TransferSettings``.
     max_distance : float
-        Largest distance of a match, relative to the target's size.
+        Maximum distance of a match, relative to the target's size.
     max_angle : float
-        Largest angle between the normals of a match, degrees.
+        Maximum angle between the normals of a match, degrees.
     smoothing : int
         Number of smoothing iterations.
     max_influences : int
-        Largest number of influences per vertex; 0 for all.
+        Maximum number of influences per vertex; 0 for all.
     correctives : bool
         Whether pose correctives are transferred.
     """

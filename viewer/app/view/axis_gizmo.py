@@ -5,7 +5,6 @@ It is drawn behind the panels over the scene's image, and does not appear in sav
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import Rect
 from viewer.app.view.camera_actions import fly_to
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import VIEWS, camera_axes, look_from, orbit
 
 __all__ = ["AxisGizmo", "draw_axis_gizmo", "gizmo_rect", "holds_gizmo", "is_over_gizmo"]
@@ -21,7 +21,7 @@ __all__ = ["AxisGizmo", "draw_axis_gizmo", "gizmo_rect", "holds_gizmo", "is_over
 _COLORS = ((0.93, 0.33, 0.31), (0.47, 0.80, 0.29), (0.30, 0.55, 0.96))
 _USUAL_FONT = 15.0
 _RADIUS, _ARM, _END = 40.0, 31.0, 8.5  # radii of the disc, of the arms and of their ends, points
-_GAP, _ABOVE = 8.0, 28.0  # points to the right, and below for the hints
+_GAP, _ABOVE = 8.0, 28.0  # points to the right edge, and to the lower edge with the hints
 _NARROWEST, _LOWEST = 240.0, 200.0  # points: smaller views have no room for the gizmo
 _DEGREES_PER_POINT = 0.9
 _LEFT = imgui.MouseButton_.left

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.app.core.fitting import fit_again
 from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera
 from viewer.rig.arrays import Floats
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
@@ -12,6 +10,7 @@ from viewer.app.posing.state import Posing
 from viewer.app.posing.tool_actions import no_tool
 from viewer.app.view.axis_gizmo import is_over_gizmo
 from viewer.app.weights.state import Weights, wants_vertex
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.shown import has_joint_marks, shows_skeleton

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import NamedTuple
 
 from imgui_bundle import imgui
@@ -17,6 +17,7 @@ from viewer.app.view.state import Picking
 from viewer.app.weights.actions import pin_vertex
 from viewer.app.weights.hover_text import shows_vertex_info
 from viewer.app.weights.state import Hover, Weights, wants_vertex
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rendering.options import DisplayOptions

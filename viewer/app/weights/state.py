@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

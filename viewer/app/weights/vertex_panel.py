@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from imgui_bundle import imgui
@@ -15,6 +14,7 @@ from viewer.app.posing.joint_tree import joint_tree
 from viewer.app.weights.actions import explained, toggle_picking, unpin
 from viewer.app.weights.explanation_lines import influence_colors
 from viewer.app.weights.state import Weights
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
@@ -90,7 +90,7 @@ def fitting(room: float, font_size: float) -> tuple[float, int]:
     scale = 0.0
     for digits in range(_DIGITS, _FEWEST - 1, -1):
         number = _NUMBER - _DIGIT * (_DIGITS - digits)
-        # Four numbers of a matrix, or a label and three of a point.
+        # Four numbers of a matrix row, or a label and the three numbers of a point.
         widest = (max(_LABEL, number) + 3.0 * number) * font_size
         scale = min((room - 8.0 * _PADDING - _SPARE) / widest, 1.0)
         if scale >= _SMALLEST:

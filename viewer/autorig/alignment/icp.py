@@ -8,13 +8,14 @@ missing from one of them biases the result. Near convergence, surfaces may slide
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
 
 from viewer.autorig.alignment.similarity import Similarity, fit_similarity
 from viewer.autorig.surface.samples import SurfaceSamples, sample_surface, triangle_normals
+from viewer.data_classes import dataclass
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import Surface
@@ -260,7 +261,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
     rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
-    grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these limits
+    grow = min(max(grow, 0.5), 2.0)  # The linearisation is invalid beyond these limits.
     # The step rotates and scales about the centre: p' = g R (p - c) + c + v.
     shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(
@@ -269,7 +270,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
 
 
 def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
-    """Match samples of both sides with the other side, and reject incompatible pairs."""
+    """Match samples of each mesh with the other mesh, and reject incompatible pairs."""
     ours, theirs = template.samples, target.samples
     found = template.find(similarity.undo(theirs.positions))
     towards = _kept(similarity, found.positions, found.normals, theirs.positions, theirs.normals)
@@ -293,7 +294,7 @@ def _kept(
 
 
 def _rotated(similarity: Similarity, normals: Floats) -> Floats:
-    # Normals transform by the inverse transpose.
+    # Normals are transformed by the inverse transpose.
     return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 
@@ -311,7 +312,7 @@ def capped_rms(distances: Floats, cap: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """Distances of samples from the other side's surface, in the target's unit.
+    """Distances of samples from the surface of the other mesh, in the target's unit.
 
     Attributes
     ----------
@@ -320,8 +321,8 @@ class Gaps:
     away : (M,)
         From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
-        The same without the median offset along the normals, so that a jacket at a constant
-        distance of two centimetres from the skin has a small error.
+        The same distances without the median offset along the normals, so that a jacket at a
+        constant distance of two centimetres from the skin has a small error.
     """
 
     towards: Floats
@@ -331,7 +332,7 @@ class Gaps:
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
-    """Return the distances of samples from the other side's surface.
+    """Return the distances of samples from the surface of the other mesh.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.geometry.vectors import unit
@@ -36,7 +35,7 @@ class SurfaceSamples:
 
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
-    """Return unit normals of triangles, 0 for one without area: (T, 3)."""
+    """Return unit normals of triangles, 0 for triangles without area: (T, 3)."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return unit(np.cross(b - a, c - a))
 

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from viewer.autorig.surface.samples import triangle_normals
 from viewer.autorig.surface.winding import winding_numbers
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.geometry.closest_point import Surface

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from typing import Any
 
 import numpy as np
@@ -23,6 +23,7 @@ from viewer.autorig.weights.result import (
 )
 from viewer.autorig.weights.smoothing import smooth, within
 from viewer.autorig.weights.sparse_weights import put_rows, skin_of, weight_matrix
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints

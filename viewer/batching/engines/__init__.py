@@ -9,16 +9,16 @@ the generator cancels the running items.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
 from importlib import import_module
 from typing import Protocol
 
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 
 __all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
 
 IN_FLIGHT = 4
-"""Items handed out per worker, including the one that runs."""
+"""Number of items assigned to each worker, including the one that runs."""
 
 
 class Job(Protocol):

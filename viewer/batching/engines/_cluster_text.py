@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable

@@ -13,7 +13,7 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING, Any
 from viewer.batching.engines import IN_FLIGHT, Job, Limits
 from viewer.batching.engines._process_limits import limit_memory, signals_blocked
 from viewer.batching.items import Item, Result
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
 from viewer.phrases import printable
@@ -159,7 +160,7 @@ class _Workers:
         return self._is_stopping.is_set()
 
     def schedule(self, attempt: _Attempt) -> None:
-        """Hand an item to the pool."""
+        """Submit an item to the pool."""
         try:
             future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
         except RuntimeError:  # the pool broke after its last result
@@ -190,7 +191,7 @@ class _Workers:
     def close(self) -> None:
         """Terminate the workers and their items."""
         self._pool.stop()  # type: ignore[no-untyped-call]
-        # Before the queue is closed, because workers that are starting would report errors.
+        # Done before the queue is closed, because workers that are starting would report errors.
         self._context.end_workers()
         self._pool.join()
         self._context.is_closing = False
@@ -273,7 +274,7 @@ class _Workers:
 
 
 def _end_of(code: int | None) -> str:
-    """Return how a process ended, for a message."""
+    """Return a description of how a process ended, for a message."""
     if code is not None and code < 0:
         name = signal.Signals(-code).name if -code in signal.valid_signals() else str(-code)
         often = ", probably because the system ran out of memory" if -code == signal.SIGKILL else ""
@@ -289,7 +290,7 @@ _is_terminated = False
 
 
 def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
-    """Begin a worker."""
+    """Initialise a worker process."""
     global _job, _stopping
     _job, _stopping = job, stopping
     # Between items, a worker may hold the lock of the queue, which would never be released: only

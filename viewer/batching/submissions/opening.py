@@ -6,11 +6,11 @@ import os
 import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
 from viewer.batching.submissions.choosing import Chosen, choose, is_junk, suffix_of
 from viewer.batching.submissions.unpacking import Archive, open_archive
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES
@@ -59,7 +59,7 @@ def opened(
     expected, alike : sequence of str
         Patterns of its files; see ``choose``.
     temporary : Path, optional
-        Folder for unpacked files; that of the system if omitted or missing.
+        Folder for unpacked files; the system's temporary folder if omitted or missing.
 
     Raises
     ------

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from viewer.batching.submissions.choosing import is_junk, suffix_of
+from viewer.data_classes import dataclass
 from viewer.formats import SUFFIXES
 
 __all__ = ["Found", "find_submissions", "is_archive"]
@@ -16,7 +16,7 @@ _ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Submissions, and files that are not.
+    """Submissions, and other files.
 
     Attributes
     ----------

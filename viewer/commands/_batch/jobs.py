@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
@@ -16,6 +16,7 @@ from viewer.batching.worker import worker_rank
 from viewer.commands._batch.options import add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
+from viewer.data_classes import dataclass
 from viewer.formats._kept import keeping_figures
 from viewer.loading import bundled_body, bundled_files
 from viewer.media.array_cache import without_cache
@@ -32,7 +33,7 @@ class JobKind:
     ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
     ``writes``: ``always``, ``maybe`` or ``never``.
     ``prints``: whether its text is the result and is therefore printed.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
     """
 

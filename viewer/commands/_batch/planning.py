@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -24,6 +24,7 @@ from viewer.batching.naming import (
 from viewer.batching.overview import overview_files
 from viewer.batching.running import Settings, shard_of
 from viewer.commands._batch.options import RETRIES, TIMEOUT
+from viewer.data_classes import dataclass
 from viewer.errors import OutputError, ViewerError
 from viewer.phrases import counted, listed, printable
 
@@ -39,7 +40,7 @@ class Request:
 
     ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
     ``notes``: messages about the paths.
     ``joint_map``: template for the joint map of each item.

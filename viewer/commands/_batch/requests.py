@@ -122,7 +122,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return a text that identifies job, options and version: equal texts give equal results."""
+    """Return a string that identifies job, options and version, on which results depend."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
@@ -130,7 +130,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS or name == "save_joint_map":  # an output
+        if name in _NOT_RESULTS or name == "save_joint_map":  # this file is an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

@@ -7,7 +7,7 @@ import os
 import shutil
 import tempfile
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -20,6 +20,7 @@ from viewer.batching.submissions import Submission, is_archive, opened
 from viewer.batching.submissions.choosing import patterns_of
 from viewer.batching.tables import comparisons
 from viewer.commands._diff.inputs import input_files
+from viewer.data_classes import dataclass
 from viewer.phrases import printable
 
 __all__ = ["SubmissionJob", "submission_job"]
@@ -97,7 +98,7 @@ def _temporary_folder() -> str:
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:
-    """Return JSON data with a substring replaced in all texts."""
+    """Return JSON data with a substring replaced in all strings."""
     if isinstance(value, str):
         return value.replace(old, new)
     if isinstance(value, dict):

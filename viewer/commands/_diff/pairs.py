@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.rig.motion.clip import Clip, suits
 from viewer.rig.scene import Actor, Motion, figure_pose
@@ -44,9 +45,9 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
 
     People of captures are paired by their number. Actors with the same name are paired first, of
     the same kind if there are several; then actors of the same kind, such as skinned figures; then
-    the rest, in order. Keyframed clips are assigned to any skeleton they fit when files are opened,
-    so a clip with the same name as the other actor's clip takes precedence, then the actor's own,
-    then one assigned to an unpaired actor.
+    the remaining ones, in order. Keyframed clips are assigned to any skeleton they fit when files
+    are opened, so a clip with the same name as the other actor's clip takes precedence, then the
+    actor's own, then one assigned to an unpaired actor.
 
     ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from viewer.commands._printing import table_lines
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, described
 from viewer.phrases import printable
 from viewer.rig.comparison import Difference, Measure

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.export._gltf.body import Body, Built, add_body, body_of
 from viewer.export._gltf.clip_losses import clip_losses, shape_rows, shown_weights
@@ -92,7 +93,7 @@ def place_figures(
     """Place several figures as in their scene; return the nodes that move them.
 
     ``actors``: the figures, each upright in its own space.
-    ``built``: their contents of the file.
+    ``built``: their contents in the file.
     ``to_file`` (4, 4): scene space to the space of the file.
     """
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()

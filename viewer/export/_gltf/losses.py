@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.reading import GltfFile, Keys, Placed, frame_keys, read_back
@@ -56,7 +57,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """Indices of the figure's vertices that the file's vertices are copies of."""
+        """Indices of the figure's vertices, one for each vertex of the file that copies it."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -134,7 +135,7 @@ def first_set_note(
 ) -> list[Diagnostic]:
     """Return a note about the error in programs that read only four influences per vertex.
 
-    Empty if no vertex has more. ``expected``, ``read``: from ``sides``.
+    The list is empty if no vertex has more. ``expected``, ``read``: from ``sides``.
     """
     if influences is None or influences.most <= PER_SET or expected.body is None:
         return []

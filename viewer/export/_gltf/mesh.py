@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._gltf.document import INDICES, Document, text_of
 from viewer.export._gltf.encoding import Encoding
 from viewer.export._gltf.materials import Materials

@@ -15,11 +15,11 @@ or converted.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.export._gltf.document import Document, text_of
 from viewer.rig.arrays import Floats

@@ -1,4 +1,4 @@
-"""Reader of glTF files written here: arrays, nodes in every frame, the mesh and its skin.
+"""Reader of glTF files written by this program: arrays, nodes in every frame, mesh and skin.
 
 Only the output of ``viewer.export.gltf`` is supported: one buffer without strides. Joints and
 vertices are returned in the figure's space, below the node that rotates and scales the whole
@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import json
 import struct
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._gltf.nodes import Tree
 from viewer.export._gltf.parts import Part
 from viewer.export._losses.skinned import Body, Poses, Rows, Side

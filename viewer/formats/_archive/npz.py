@@ -18,13 +18,13 @@ import re
 import struct
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 from functools import partial
 from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.element_types import array_dtype, item_count, shaped
@@ -74,7 +74,7 @@ class _Header:
 
 
 def open_npz(directory: ZipDirectory) -> Archive:
-    """Open an ``.npz`` file; raises as ``open_archive`` does."""
+    """Open an ``.npz`` file; errors as of ``open_archive``."""
     directory.check(_key)
     members = directory.members
     values = {_key(member): _open_member(directory, member) for member in members}

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._neutral import held_rows
@@ -152,7 +152,7 @@ def _held_frames(source: Source, start: int, width: int, declared: int | None) -
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
     rest = 0
-    if (sizes == width).sum() * 2 > len(sizes):  # one frame per line
+    if (sizes == width).sum() * 2 > len(sizes):  # the file has one frame per line
         begins, sizes, rest = _without_rest(words, begins, sizes, width)
         begins, sizes = begins[:declared], sizes[:declared]
     else:

@@ -7,12 +7,13 @@ face may have separate keys. A confidence of 0 means "not detected".
 from __future__ import annotations
 
 from array import array
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import chain
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.values import describe
 from viewer.formats._easymocap.bodies import RowFault, Rows
@@ -139,7 +140,7 @@ class PointRows(Rows):
                     self.buffer.fromlist(list(chain.from_iterable(certain)))
                     return
         except (TypeError, ValueError, OverflowError):
-            pass  # reported below
+            pass  # the error is reported below
         if not isinstance(rows, list):
             raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
         if len(rows) != count:
@@ -155,7 +156,7 @@ class PointRows(Rows):
             (int(row), "", RecordError(KEY, Phrase("record-unseen", n=int(is_odd[row].sum()))))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
-        points.flags.writeable = False  # so that it is not copied again
+        points.flags.writeable = False  # a read-only array is not copied again
         return points, faults
 
     def _rows(self) -> Floats:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._mesh.polygons import triangulate
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, Primitive
@@ -174,7 +174,7 @@ def _targets(offsets: list[Floats]) -> MorphTargets | None:
 
 
 def _normal_targets(rows: list[Floats], linear: Floats) -> MorphTargets | None:
-    """Return the offsets of normals; None if the file has none; they are then recomputed."""
+    """Return the offsets of normals; None if the file has none, so that they are recomputed."""
     if not any(each.any() for each in rows):
         return None
     return _targets([_turned(each, linear, unit=False) for each in rows])

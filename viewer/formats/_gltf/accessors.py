@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.buffers import Buffers, View
 from viewer.formats._gltf.elements import Element, Table
 from viewer.rig.arrays import Floats, Ints
@@ -195,8 +195,9 @@ class Accessors:
     def components(self, index: int) -> Floats | None:
         """Return the components of an accessor as stored, not normalised: (N, C).
 
-        None if the data is elsewhere: compressed with Draco, for instance. As the caller does not
-        store them, they are not counted as decoded data, although they must fit within the limit.
+        None if the data is stored elsewhere, for instance compressed with Draco. As the caller does
+        not store them, they are not counted as decoded data, although they must fit within the
+        limit.
 
         Raises
         ------

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import partial
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.channels import read_channels, sampler_of
 from viewer.formats._gltf.document import Document
@@ -33,7 +34,7 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     """Return the animations that are valid, except for keys that are read later.
 
     An invalid animation is omitted with a warning. The keys of the first one are read, because it
-    is played by default; if errors are kept, all keys are read.
+    is played by default; if errors are only recorded, all keys are read.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -96,7 +97,7 @@ def _plain_channels(
     """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
 
     Files may have tens of thousands of channels, nearly all in the form that is handled here.
-    Handling them takes less time than parsing the JSON.
+    This function takes less time than parsing the JSON.
     """
     try:
         moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}

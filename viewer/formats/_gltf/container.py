@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.json_text import parsed
 from viewer.formats._source import Source
 

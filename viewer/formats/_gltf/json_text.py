@@ -66,7 +66,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
         raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
     except RecursionError:
         raise source.fault("F002.json-nesting") from None
-    except ValueError:  # raised only for numbers with too many digits
+    except ValueError:  # the error is raised only for numbers with too many digits
         raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
     if type(root) is not dict:
         raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))

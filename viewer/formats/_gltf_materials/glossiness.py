@@ -14,12 +14,13 @@ specular colour for metals.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.images import DecodedImage
@@ -32,7 +33,7 @@ __all__ = ["Glossiness", "from_glossiness", "read_glossiness"]
 
 _DIELECTRIC = 0.04
 _BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
-_ROWS = 256  # rows of an image that are converted together
+_ROWS = 256  # number of rows of an image that are converted together
 
 Reals = NDArray[np.float32]
 

@@ -1,14 +1,14 @@
 """Images of a glTF document: PNG, JPEG and WebP, embedded or in files below its folder.
 
-Only images that textures use are read. They are decoded together, each once, in parallel.
+Only images that textures use are read. They are decoded in parallel, each only once.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from pathlib import Path
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.buffers import EncodedImage
 from viewer.formats._gltf.document import Document

@@ -10,10 +10,11 @@ a warning, because the shape can still be shown.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
@@ -106,7 +107,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
-    """Return the properties of a material; ``toon`` contains those of VRM, if any."""
+    """Return the properties of a material; ``toon`` contains VRM's properties, if any."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None

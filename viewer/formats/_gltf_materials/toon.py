@@ -15,13 +15,15 @@ between c = toony - 1 - shift and c = 1 - toony - shift.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
+from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.toon_ramp import modern_ramp
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["MTOON", "Toon", "read_toon"]
@@ -102,13 +104,12 @@ def _old_toon(document: Document, told: Any, element: Element) -> Toon:
     if color is not None:
         color = decode_srgb(color[:3].clip(0.0, 1.0))
     if toony is not None and shift is not None:
-        toony += (1.0 - toony) * (0.5 + 0.5 * shift)
-        shift = -shift - (1.0 - toony)
+        toony, shift = modern_ramp(toony, shift)
     return Toon(_values(color, toony, shift), shade)
 
 
 def _values(color: Any, toony: float | None, shift: float | None) -> dict[str, Any]:
-    """Return the fields of a material; invalid values are those of a material without shade."""
+    """Return the fields of a material; invalid values are replaced so that there is no shade."""
     toony = _TOONY if toony is None else min(max(toony, 0.0), 1.0)
     shift = 0.0 if shift is None else shift
     shade = (1.0, 1.0, 1.0) if color is None else tuple(min(max(c, 0.0), 1.0) for c in color)

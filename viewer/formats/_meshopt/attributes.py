@@ -16,12 +16,13 @@ KHR_meshopt_compression, appendix A.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_attributes"]
@@ -34,7 +35,7 @@ _ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
 _BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
 # The four group modes in a byte of header bits.
 _MODES = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
-_PADDING = (32, 24)  # minimum size of the tail, by version
+_PADDING = (32, 24)  # minimum size of the tail in bytes, by version
 
 
 @dataclass(slots=True)

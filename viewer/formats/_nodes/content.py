@@ -7,11 +7,12 @@ Readers guarantee that indices are valid, numbers are finite, and the parents fo
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Literal
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
@@ -97,7 +98,7 @@ class Primitive:
     colors : (V, 4) or None
         Linear vertex colours with opacity, which multiply the material's base colour.
     joints, weights : (V, K) int32, (V, K) or None
-        Influences of all sets side by side: indices into the skin's joints. Weights are as
+        Influences of all sets in one table: indices into the skin's joints. Weights are as
         stored, unused slots are 0.
     material : int
         Index into ``NodeFile.materials``, -1 for none.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeTree
 from viewer.rig.arrays import Floats
 from viewer.rig.constraints.constraint import Constraint
@@ -127,7 +128,7 @@ def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
     Returns
     -------
     left, scales, right : (3, 3), (3,), (3, 3)
-        U, the diagonal of S, and V^T.
+        The matrix U, the diagonal of S, and the matrix V^T.
     """
     left, scales, right = np.linalg.svd(linear)
     if np.linalg.det(left) < 0.0:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.motions import Reader
@@ -47,7 +47,7 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     count = 0
     for node in shaped:
         names = _mesh(file, node).target_names
-        # Targets without names need not correspond.
+        # Targets without names do not necessarily correspond.
         is_alone = counts[looks[node]] == 1 or not all(names)
         key = (node,) if is_alone else (*looks[node], _keys(file, node, readers))
         if key not in known:
@@ -174,7 +174,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name with that of its part, and default weight of a morph target."""
+    """Name, name prefixed by its part's name, and default weight of a morph target."""
 
     name: str
     full_name: str
@@ -193,7 +193,7 @@ def _offsets(
 ) -> Floats:
     """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
 
-    ``sums`` (E, S): weights of the expressions, which follow the S morph targets.
+    ``sums`` (E, S) are the weights of the expressions, which follow the S morph targets.
     """
     offsets = np.zeros((sums.shape[1], count, 3))
     first = 0

@@ -1,18 +1,18 @@
 """Lines of an ``.obj``, grouped by keyword, in pieces of a few hundred thousand bytes.
 
 All lines of a piece with the same keyword are parsed together. Pieces that fit into the processor's
-cache make this several times faster than parsing the whole file together.
+cache make this several times faster than parsing whole files.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.progress import report_bytes

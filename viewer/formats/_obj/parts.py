@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._obj.faces import FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
@@ -73,7 +74,7 @@ class _Gathered:
     # Vertices with colours; opacity is NaN if it is missing.
     colored: list[Places] = field(default_factory=list)
     colors: list[Floats] = field(default_factory=list)
-    # Ignored data: the number of vertices, and the offset of the first.
+    # Number of vertices with ignored data, and the offset of the first.
     unused: dict[str, list[int]] = field(default_factory=dict)
 
     def leave_out(self, what: str, count: int, offset: int) -> None:
@@ -195,7 +196,7 @@ def _normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 
 def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
-    """Record names of materials, groups and objects; warn of unknown keywords."""
+    """Record names of materials, groups and objects; warn about unknown keywords."""
     for line in lines.others.tolist():
         words = lines.text(line).split(None, 1)
         rest = words[1] if len(words) > 1 else b""

@@ -2,20 +2,20 @@
 
 A tensor is ``_rebuild_tensor_v2(storage, offset, size, stride, …)``: element (i, j, …) is at offset
 + i stride[0] + j stride[1] + … of the storage. Several tensors may share a storage, and expanded
-tensors have strides of 0. Everything is checked against the storage before it is read.
+tensors have strides of 0. All values are checked against the storage before it is read.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.element_types import item_count, shaped
 from viewer.formats._archive.zip_directory import MAX_RATIO, SMALL

@@ -1,14 +1,15 @@
-"""Arrays of a PIG model, read from a folder of text tables or an archive with the same checks."""
+"""Arrays of a PIG model, read from text tables or an archive with the same checks."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part as FaultPart
 from viewer.diagnostics import Phrase
 from viewer.formats._archive.checking import archive_of, finite
@@ -59,7 +60,7 @@ class Part:
     name : str
         File name or key, for messages.
     values : (N, columns)
-        Numbers; of a sparse matrix (joint, vertex, weight) rows.
+        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
     source : Source
         The file, which records errors.
     offset_of : callable or None
@@ -95,7 +96,7 @@ class Part:
 
 @dataclass(slots=True)
 class PigFiles:
-    """All arrays that were found."""
+    """All arrays of a model that are present."""
 
     parts: dict[str, Part] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()
@@ -137,7 +138,7 @@ def _from_folder(source: Source) -> PigFiles:
 def _text_part(source: Source, name: str, columns: int) -> Part:
     rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
     if name not in CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # an incomplete array cannot be used
+        rows = rows[:0]  # An incomplete array cannot be used.
     return Part(f"{name}.txt", rows, source, offset_of)
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
@@ -59,7 +60,7 @@ class Table:
 
 
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
-    """Read all elements, by name.
+    """Read all elements and return them by name.
 
     Raises
     ------
@@ -104,14 +105,14 @@ class _Text:
         if bad >= 0:
             self.values = parse_words(self.data, self.start, len(self.data))
         self.has_bad = bad >= 0
-        # The first word of every non-empty line, and its number of words.
+        # Find the first word and the number of words of every non-empty line.
         self.counts = line_sizes(self.data, self.start)
         self.firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
         self.line = 0
         self._begins: Places | None = None
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         last = self.line + element.count
         if self.has_bad or element.count == 0 or last > len(self.counts):
@@ -225,7 +226,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn about lines after those of the last element."""
+        """Warn about lines after the last element."""
         left = len(self.firsts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
@@ -266,7 +267,7 @@ class _Binary:
         self.data, self.position = source.data, header.end
 
     def begin(self, element: Element) -> Places:
-        """Return the offset of each row; rows of different sizes are followed by their counts."""
+        """Return the offset of each row; if row sizes differ, it is derived from the counts."""
         sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
         sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
         left = len(self.data) - self.position
@@ -281,7 +282,7 @@ class _Binary:
         return None
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         if element.count == 0:
             return False
@@ -319,7 +320,7 @@ class _Binary:
         return place - start, counts
 
     def _walked(self, element: Element) -> Places:
-        """Return the starts of rows, followed one by one because their lists differ in length.
+        """Return the starts of rows, found one after another because their lists differ in length.
 
         This takes one iteration per face; files that contain only triangles never need it.
         """
@@ -368,7 +369,7 @@ class _Binary:
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn about bytes after those of the last element."""
+        """Warn about bytes after the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)

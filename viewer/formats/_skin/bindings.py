@@ -9,7 +9,7 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.formats._skin.blocks import find_block, unclosed, words_of
 from viewer.formats._source import Source
-from viewer.formats._text.numbers import parse_numbers
+from viewer.formats._text.numbers import parse_few
 from viewer.rig.arrays import Floats
 
 __all__ = ["read_bindings"]
@@ -57,7 +57,7 @@ def read_bindings(source: Source, count: int, position: int) -> tuple[Floats, in
 
 def _read_matrix(source: Source, index: int, word: Word) -> tuple[Floats, int]:
     block = find_block(source, f"matrix {index} of bindings", word, word.end())
-    values, bad = parse_numbers(source.data, block.start, block.end)
+    values, bad = parse_few(source.data[block.start : block.end])
     words = words_of(source, block) if bad >= 0 else None
     if not block.closed:
         raise unclosed(source, block, source.end, None)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import to_number
@@ -112,8 +112,8 @@ def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> 
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the index of the first number that this changed, or -1."""
+    """Return numbers as int32, and the index of the first number that conversion changed, or -1."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
-    whole.flags.writeable = False  # a read-only array need not be copied
+    whole.flags.writeable = False  # A read-only array need not be copied.
     return whole, int(differs.argmax()) if differs.any() else -1

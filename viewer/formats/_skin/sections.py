@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._skin.bindings import read_bindings
 from viewer.formats._skin.blocks import KEYWORDS, Block, find_block, read_count
 from viewer.formats._skin.material import read_material

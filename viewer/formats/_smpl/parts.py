@@ -1,4 +1,4 @@
-"""The optional parts of a body model: shapes, hands, landmarks, texture coordinates, symmetry."""
+"""Optional parts of a body model: shapes, hands, landmarks, texture coordinates, symmetry."""
 
 from __future__ import annotations
 

@@ -7,12 +7,13 @@ of the previous number, so numbers are written from the last to the first.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.formats._text.swar import Indices, Words, eight_letters
 from viewer.rig.arrays import Bools
 
@@ -53,7 +54,7 @@ class Digits:
     odd: dict[int, bytes] = field(default_factory=dict)
 
     def put(self, other: Digits, places: Indices) -> None:
-        """Replace the digits of the numbers at some indices by those of other numbers."""
+        """Replace the digits of the numbers at some indices by the digits of other numbers."""
         for name in ("minus", "whole", "fraction", "decimals"):
             getattr(self, name)[places] = getattr(other, name)
         if other.tails is not None:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import is_infinite, is_too_large, parse_words, word_begins

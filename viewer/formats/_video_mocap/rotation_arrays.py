@@ -12,10 +12,10 @@ A single frame may lack the axis of frames.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._archive.values import Archive
 from viewer.formats._video_mocap.numbers import rows, shape_of, six, vectors_of
 from viewer.rig.arrays import Floats
@@ -40,7 +40,7 @@ class Form:
 
 
 def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
-    """Return the form of an array; None if it has none of these numbers of joints.
+    """Return the form of an array; None if it does not have one of these numbers of joints.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
 """Humanoid bones, expressions and permissions of a VRM file.
 
 Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
-names the joints of a thumb differently, gives the weights of expressions in percent, and binds
+names the joints of a thumb differently, states the weights of expressions in percent, and binds
 them to meshes instead of nodes.
 """
 
@@ -87,7 +87,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
 
 
 def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
-    """Return facts about parts that are drawn in one view only, and about constraints."""
+    """Return facts about parts that are drawn in only one view, and about constraints."""
     names = file.tree.names
     shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
     facts = [

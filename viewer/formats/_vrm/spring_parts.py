@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeTree
 from viewer.formats._vrm.json_parts import is_index, listed
 from viewer.rig.arrays import Floats

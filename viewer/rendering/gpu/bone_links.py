@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import world_matrices
@@ -19,7 +18,7 @@ _END = 0.4  # length of an end, relative to the previous bone
 _END_LIMITS = 0.01, 0.07  # minimum and maximum length of an end, relative to the figure's size
 _AXIS = 0.4  # length of axes, relative to the shortest bone at the joint
 _AXIS_LIMITS = 0.008, 0.06  # minimum and maximum length of axes, relative to the figure's size
-_REACH = 12.0  # maximum size of a figure relative to its long bones: roots may be far away
+_REACH = 12.0  # maximum size of a figure relative to its long bones, as roots may be far away
 _SAME = 1e-6  # distance below which joints coincide, relative to the figure's size
 
 

@@ -6,8 +6,9 @@ import ctypes
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
+
+from viewer.data_classes import dataclass
 
 __all__ = ["EglDevice", "device_of_worker", "egl_devices"]
 
@@ -86,9 +87,9 @@ def device_of_worker(
     rank : int
         Number of the worker on its machine.
     devices : sequence of EglDevice, optional
-        Devices; those of this machine if omitted.
+        Devices; this machine's devices if omitted.
     visible : str, optional
-        Value of ``CUDA_VISIBLE_DEVICES``; that of the environment if omitted.
+        Value of ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted.
 
     Returns
     -------

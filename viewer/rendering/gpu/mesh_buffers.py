@@ -194,7 +194,7 @@ class MeshBuffers:
 
     @property
     def colors(self) -> moderngl.Buffer | None:
-        """A colour for every split vertex by its body part; None if the figure has no parts."""
+        """A colour for every split vertex, by its body part; None if the figure has no parts."""
         parts = self.figure.body_parts
         if self._colors is None and parts is not None:
             from viewer.rendering.part_colors import part_colors

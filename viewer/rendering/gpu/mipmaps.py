@@ -22,6 +22,7 @@ __all__ = ["add_mipmaps", "halved_pictures"]
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
 _STEPS = 1 << 14  # number of steps of linear light; the sum of four values still fits into 16 bits
+_CHANNELS = np.uint64((_STEPS - 1) * 0x0001_0001_0001_0001)  # the bits of four values
 
 
 def add_mipmaps(texture: moderngl.Texture, pixels: Bytes, is_linear: bool = False) -> None:
@@ -64,18 +65,19 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
         No side is shorter than 1; an odd last row or column is dropped.
     """
     decode, encode = _tables(is_linear)
-    linear = decode.take(pixels)
+    # Adds the four channels of a pixel as one number: sums of four values fit into 16 bits.
+    linear = decode.take(pixels).view(np.uint64)[..., 0]
     pictures = []
-    while max(linear.shape[:2]) > 1:
-        for axis in (0, 1):
-            count = linear.shape[axis] // 2
-            if count:
-                pairs = np.moveaxis(linear, axis, 0)[: 2 * count]
-                linear = np.moveaxis(pairs[0::2] + pairs[1::2], 0, axis)
-            else:
-                linear = 2 * linear
-        linear = linear >> 2
-        pictures.append(encode.take(linear))
+    while max(linear.shape) > 1:
+        height, width = linear.shape[0] // 2, linear.shape[1] // 2
+        if height:
+            linear = linear[0 : 2 * height : 2] + linear[1 : 2 * height : 2]
+        if width:
+            linear = linear[:, 0 : 2 * width : 2] + linear[:, 1 : 2 * width : 2]
+        # A side of one pixel is averaged with itself.
+        linear = linear >> np.uint64(2 if height and width else 1) & _CHANNELS
+        channels = np.ascontiguousarray(linear).view(np.uint16)
+        pictures.append(encode.take(channels.reshape(*linear.shape, 4)))
     return pictures
 
 

@@ -6,10 +6,11 @@ import ctypes
 import os
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import glcontext
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Offer", "headless_offer", "offer_of", "offer_text"]
 
@@ -29,7 +30,7 @@ class Offer:
 
 
 def headless_offer(options: Mapping[str, Any]) -> Offer | None:
-    """Return the OpenGL version that the machine offers without a window; None if there is none.
+    """Return the OpenGL version that the machine offers without a window; None if it offers none.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Rest vertices of one actor: those of the figure, or a copy with shape and correctives applied.
+"""Rest vertices of one actor: the figure's, or a copy with shape and correctives applied.
 
 Pose correctives are summed in one of two ways. On a graphics card, the vertex shader sums them
 from a texture, and a frame uploads only the weights. Software drivers are several times faster

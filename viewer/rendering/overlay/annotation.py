@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.label_layout import lay_out
 from viewer.rendering.overlay.lettering import Lettering
 from viewer.rendering.overlay.segments import Segments, SegmentStyle
@@ -47,7 +47,7 @@ class Labels:
         Labelled points, scene space.
     ranks : (N,) int
         If there is no room for all labels, lower ranks take precedence, even across annotations;
-        among equal ranks, nearer points do.
+        among equal ranks, nearer points take precedence.
     colors : (N, 3)
         Colours of the text, sRGB, 0 to 1.
     """
@@ -60,7 +60,7 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Annotation:
-    """Segments, and labels over them.
+    """Segments, and labels drawn over them.
 
     Attributes
     ----------

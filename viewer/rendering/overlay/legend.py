@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.palettes import NOTHING
 from viewer.rendering.scalar_look import TYPICAL, ScalarLook
 from viewer.rig.arrays import Bytes, Floats

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.overlay.segments import Segments, SegmentStyle
 from viewer.rig.arrays import Floats

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
 from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs, set_uniforms
@@ -23,7 +23,7 @@ HIDDEN = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """Segments in drawing order; those of length 0 are dots.
+    """Segments in drawing order; segments of length 0 are dots.
 
     Attributes
     ----------

@@ -11,10 +11,11 @@ slide on an ellipsoid, and each part of the spine bends into an arc of constant 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, rotation_vector_to_matrix
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 
 __all__ = ["Animal", "animal_of", "upright_axis"]

@@ -8,10 +8,9 @@ Each joint has seven parameters: translation, rotation about x, y and z in this 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 from viewer.rig.pose import Pose

@@ -6,10 +6,9 @@ driven by the four numbers (x, y, z, w - 1) of its unit quaternion, which are 0 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 from viewer.rig.pose import Pose, joint_rotations

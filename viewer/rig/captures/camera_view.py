@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -65,7 +66,7 @@ class CameraView:
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     motion : CameraMotion or None
-        Its placement over time if it moves; the fields above are then those of the first frame.
+        Its placement over time if it moves; the fields above then apply to the first frame.
     """
 
     name: str
@@ -124,7 +125,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
     Parameters
     ----------
     view : CameraView
-        Fixed or moving camera; a fixed one has the time 0.
+        Fixed or moving camera; a fixed camera has only the time 0.
     most : int
         Maximum number of times, at least 2.
     """

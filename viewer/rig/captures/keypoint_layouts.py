@@ -185,7 +185,8 @@ def _part(name: str) -> PointLayout:
 def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
     """Return one layout of several sets of keypoints, concatenated.
 
-    A hand that follows a body is attached to the body's wrist: its own wrist is the same point.
+    A hand that follows a body is attached to the body's wrist: the wrist of the hand is the same
+    point.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_of, world_frames
@@ -23,7 +22,7 @@ class Displacement:
     Attributes
     ----------
     mean, largest : float
-        Over joints and frames, figure units.
+        Mean and maximum distance over all joints and frames, figure units.
     joint, frame : int
         Location of the largest distance; frames are numbered as in the first motion.
     n_frames : int

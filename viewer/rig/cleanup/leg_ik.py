@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 
 __all__ = ["Leg", "bend", "reach"]
 
 _STRAIGHT = 0.05  # sine of the knee's angle below which the plane of the leg is undefined
-_REACH = 0.9999  # maximum fraction of the leg's length, as a straight knee has no direction
+_REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,9 +43,9 @@ def bend(
 ) -> tuple[Floats, Floats]:
     """Return the rotations of thigh and shin that bring the ankle to a target.
 
-    The shin rotates about the normal of the leg's plane until the distance from hip to ankle is
-    that of the target (law of cosines). Then the whole leg rotates about the hip by the smallest
-    angle that points it at the target, so the knee keeps its direction.
+    The shin rotates about the normal of the leg's plane until the distance from hip to ankle equals
+    the target's (law of cosines). Then the whole leg rotates about the hip by the smallest angle
+    that points it at the target, so the knee keeps its direction.
 
     Parameters
     ----------

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 
 __all__ = ["SavitzkyGolay"]
 
-_SECONDS = 0.2  # default length of the window
+_SECONDS = 0.2  # default length of the window, seconds
 _PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal, TypeAlias
+
+from viewer.data_classes import dataclass
 
 __all__ = ["Constraint", "ConstraintKind"]
 

@@ -9,12 +9,12 @@ pieces of different sizes go into different trees, as one large r would slow eve
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import chain, pairwise
 from typing import Any
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
@@ -22,7 +22,7 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
-_LONG = 3.0  # pieces are split above this many times the median radius
+_LONG = 3.0  # multiple of the median radius above which pieces are split
 # Pieces in the first query; if more pieces may lie within the bound, a second query finds all of
 # them.
 _NEAREST = 8
@@ -30,8 +30,8 @@ _POINTS = 1 << 16  # points per batch
 _FLAT = 1e-20  # sin^2 of the angle below which a triangle is treated as a segment
 # Bounds are rounded up by this factor, so that rounding never excludes a triangle.
 _SLACK = 1.0 + 1e-9
-_ROUNDED = 1e-12  # rounding of a difference of squared distances, relative to the larger one
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_ROUNDED = 1e-12  # rounding error of a difference of squared distances, relative to the larger one
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)

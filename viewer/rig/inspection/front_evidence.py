@@ -1,6 +1,6 @@
 """Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
 
-Each kind gives a horizontal vector towards the front. Its length is the confidence: 1 for complete
+Each kind yields a horizontal vector towards the front. Its length is the confidence: 1 for complete
 and consistent evidence, 0 for none.
 """
 
@@ -21,7 +21,7 @@ _LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable
 _CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
 _SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and range of the ankles
-# Fraction of the vertices of a symmetric mesh whose mirror images are near other vertices.
+# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
 _MIRRORED = 0.98
 _LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
 
@@ -86,7 +86,7 @@ def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_travel(places: Floats, size: float, up: Floats) -> Floats:
-    """Return evidence from a motion: figures mostly move forwards.
+    """Return evidence from a motion: figures usually move forwards.
 
     Parameters
     ----------

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.inspection.ground_height import ground_of
 from viewer.rig.inspection.soles import extent, soles_of
 from viewer.rig.motion.evaluation import JointMotion, frame_rate, frames_of, world_frames

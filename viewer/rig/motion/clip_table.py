@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.memo import Memo
 from viewer.rig.motion.clip import EXTRAPOLATIONS, SHORTEST, Channel, Clip, slopes
@@ -86,7 +86,7 @@ def _table(channels: Sequence[Channel]) -> _Table:
             edges[row, :keys] = slopes(channel)
             last[row] = keys - 1
         else:
-            times[row, 0] = 0.0  # the curve is 0 everywhere
+            times[row, 0] = 0.0  # a curve without keys is 0 everywhere
         modes[row] = [_MODES[mode] for mode in channel.extrapolation]
     targets = np.array([channel.target for channel in channels], dtype=np.int32)
     return _Table(targets, times, values, edges, last, modes)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -83,7 +84,7 @@ def sample_animation(
     actor : Actor
         Actor with a clip.
     rate : float, optional
-        Frames per second; that of ``frame_rate`` if omitted, which reproduces captured frames
+        Frames per second; the result of ``frame_rate`` if omitted, which reproduces captured frames
         exactly.
     frames : (int, int), optional
         First frame and end frame, exclusive (None: the clip's end), counted from the clip's

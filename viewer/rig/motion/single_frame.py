@@ -31,7 +31,7 @@ def single_frame(
     Parameters
     ----------
     actor : Actor
-        Actor with joints; an absent actor gives a missing frame.
+        Actor with joints; the frame of an absent actor is missing.
     rate : float
         Nominal frames per second of the animation.
     number : int

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Phrase
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -26,7 +27,7 @@ class SkeletonMotion:
     unit_note : Phrase or None
         Explains how the figure's unit was estimated; None if it was not estimated.
     up_notes : tuple of Phrase
-        Explain how the up axis was estimated, and give any contrary evidence.
+        Explain how the up axis was estimated, and state any contrary evidence.
     expressions : mapping of str to (N,)
         Weights of facial expressions at each row of the clip, by their names in VRM 1.0.
     """

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -26,7 +26,8 @@ TRANSFORM_PATHS: tuple[TransformPath, ...] = get_args(TransformPath)
 
 Interpolation = Literal["step", "linear", "cubic"]
 INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
-"""Between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite spline."""
+"""Values between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite
+spline."""
 
 _COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 
@@ -50,7 +51,7 @@ class TransformChannel:
         Translation relative to the parent joint (rest translation included), quaternion
         (x, y, z, w) including the rest rotation, scale factors, or shape weights.
     interpolation : str
-        Entry of ``INTERPOLATIONS``. Linear rotations take the shorter arc; cubic ones are
+        Entry of ``INTERPOLATIONS``. Linear rotations follow the shorter arc; cubic ones are
         normalised after interpolation.
     tangents : (N, 2, C) or None
         Incoming and outgoing slopes, per second; only for ``"cubic"``.

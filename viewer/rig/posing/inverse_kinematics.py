@@ -11,10 +11,9 @@ that a step would move beyond a limit stop there, and the others compensate.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, quaternion_to_matrix
@@ -27,7 +26,7 @@ __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 _CLOSE = 1e-7  # fraction of the chain's length; smaller errors are treated as 0
 _STILL = 1e-10  # radians; smaller steps end the search
 _LARGEST_STEP = 0.5  # radians; the linearisation is poor for larger steps
-_BEND = 0.02  # radians; bends a straight chain out of a singular pose
+_BEND = 0.02  # radians by which a straight chain is bent out of a singular pose
 _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # limits of the damping, relative to the chain's length
 
 
@@ -51,7 +50,7 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may rotate to move a joint: its nearest ancestors with free rotations.
+    """Return the joints that may rotate to move a joint: the nearest ancestors with free rotations.
 
     Parameters
     ----------

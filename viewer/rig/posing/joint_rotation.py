@@ -12,10 +12,10 @@ factors around E_k and of the target rotation's transpose, the trace to maximise
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_euler, quaternion_to_matrix
 from viewer.rig.pose import Pose
@@ -195,7 +195,7 @@ class _Solver:
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
-            return now  # all angles are equally good
+            return now  # all angles are equally suitable
         # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
@@ -23,11 +23,11 @@ class Chains:
     Attributes
     ----------
     joints : (K,) int32
-        Their indices in the skeleton, parents before children.
+        Indices of the joints in the skeleton, parents before children.
     parents : (K,) int32
         Parents as indices into ``joints``; -1 for a root.
     place : (J,) int32
-        Index into ``joints`` of each joint of the skeleton, -1 for the others.
+        Index into ``joints`` of each joint of the skeleton, -1 if it is not included.
     """
 
     joints: Ints

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.retargeting.source_contacts import (
     Contact,
@@ -18,7 +18,7 @@ from viewer.rig.retargeting.source_contacts import (
 
 __all__ = ["FootPlan", "foot_plan"]
 
-_SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
+_SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,14 +57,14 @@ class FootPlan:
             yield contact, slice(contact.start, contact.stop), ground
 
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
-        """Return the horizontal displacements of a standing foot from row to row.
+        """Return the horizontal displacements of a planted foot from row to row.
 
         Parameters
         ----------
         points : ((N, 3), (N, 3))
             Paths of the ball and the heel.
         contact : Contact
-            The contact, which selects one of them in each row.
+            The contact, which selects one of the two paths in each row.
         """
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
@@ -88,9 +88,9 @@ class FootPlan:
         return result
 
     def gap(self, heights: Floats) -> float:
-        """Return the largest distance of a standing foot from the ground.
+        """Return the largest distance of a planted foot from the ground.
 
-        ``heights``: of the lowest point of each foot, (N, L).
+        ``heights`` are the heights of the lowest point of each foot, (N, L).
         """
         stands, largest = self.holds() >= 1.0, 0.0
         for foot in range(len(self.contacts)):
@@ -103,7 +103,7 @@ class FootPlan:
         """Return the height below which a foot with contacts must not sink: (N,).
 
         This is the ground of the previous or next contact, whichever is lower. If the source's foot
-        sinks below that, the limit follows it.
+        sinks below this ground, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))

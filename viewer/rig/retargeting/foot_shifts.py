@@ -1,11 +1,10 @@
-"""Translations of the feet and the body of a moving figure that keep standing feet in place."""
+"""Translations of the feet and the body of a moving figure that keep planted feet in place."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.cleanup.leg_solving import falling
 from viewer.rig.cleanup.smooth_curves import smooth_curves
@@ -15,9 +14,9 @@ __all__ = ["foot_shifts"]
 
 _EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
-_LIFTS, _LIFTED = 4, 20.0  # passes that lift sinking feet, and their weight
-_SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the default translation relative to that of a standing foot
+_LIFTS, _LIFTED = 4, 20.0  # number of passes that lift sinking feet, and their weight
+_SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
+_FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
 _STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 
 
@@ -26,7 +25,7 @@ class _Wanted:
     """Corrections of one foot during its contacts."""
 
     flat: Floats  # (N, 3), horizontal
-    is_flat: Bools  # (N,), rows with horizontal corrections
+    is_flat: Bools  # (N,), whether a row has a horizontal correction
     rise: Floats  # (N,)
     holds: Floats  # (N,), degree to which the foot is held in place, 0 to 1
     above: Floats  # (N,), height of the sole above the floor
@@ -41,7 +40,7 @@ def foot_shifts(
     """Return the translations of all feet and of the body.
 
     A foot is corrected while it is on the ground. The body smoothly follows planted feet on
-    straight legs, so that these need not bend; other feet follow the body.
+    straight legs, so that these legs need not bend; other feet follow the body.
 
     Parameters
     ----------
@@ -52,7 +51,7 @@ def foot_shifts(
     heights : (N, L)
         Heights of the soles.
     straight : (N, L)
-        Length of each leg from hip to ankle, as a fraction of its longest.
+        Length of each leg from hip to ankle, as a fraction of its maximum length.
 
     Returns
     -------
@@ -75,7 +74,7 @@ def foot_shifts(
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
     """Return the corrections of a foot.
 
-    Where a contact begins and ends, the foot follows that of the source.
+    At the beginning and end of a contact, the foot follows the source's foot.
     """
     path = plan.feet[foot]
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
@@ -126,7 +125,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
 
 
 def _strength(holds: Floats) -> Floats:
-    """Return the weights of held rows, between that of free rows, 1, and exact ones."""
+    """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
@@ -140,10 +139,10 @@ def _smoothed(plan: FootPlan, targets: Floats, weights: Floats) -> Floats:
 
 
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
-    """Return the mean translation of the standing feet, (N, 3), smooth over time.
+    """Return the mean translation of the planted feet, (N, 3), smooth over time.
 
-    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without standing feet,
-    (N, 3).
+    ``weights`` are the weights of the feet, (N, L); ``usual`` is the translation without planted
+    feet, (N, 3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):

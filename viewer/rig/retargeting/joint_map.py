@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.near_names import name_hint
@@ -71,7 +71,7 @@ def mapped_partners(
 ) -> Ints:
     """Return the source joint of each target joint: (J,) int32.
 
-    -1 for joints that the map keeps at rest, -2 for joints that it does not list.
+    It is -1 for joints that the map keeps at rest, -2 for joints that it does not list.
 
     Parameters
     ----------

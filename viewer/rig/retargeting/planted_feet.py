@@ -1,6 +1,6 @@
 """Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
 
-Retargeting keeps the directions of limbs, so that feet slide and sink if proportions differ.
+Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
 sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
 the ankles reach their targets, and the body is lowered if a leg is too short.
@@ -8,11 +8,12 @@ the ankles reach their targets, and the body is lowered if a leg is too short.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.progress import report
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
@@ -35,9 +36,9 @@ from viewer.rig.retargeting.retarget import Retargeted
 
 __all__ = ["PlantedFeet", "plant_feet"]
 
-_EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
+_EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
-_STEPS = 5  # reported as progress, from retargeting to the comparison
+_STEPS = 5  # number of steps reported as progress, from retargeting to the comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +53,13 @@ class PlantedFeet:
         Total distance that feet slide while they are on the ground, in figure units: in the source,
         scaled to the figure, and in the figure before and after planting.
     gap_before, gap_after : float
-        Largest height of a standing sole above or below the ground.
+        Largest distance of a planted sole above or below the ground.
     lowered : float
         Largest distance by which the body was lowered.
     size : float
         Approximate height of the body.
     ground_speed : float
-        Speed of the ground on which the feet stand, per second; 0 if it rests.
+        Speed of the ground on which the feet stand, per second; 0 if it does not move.
     """
 
     n_contacts: int = 0
@@ -116,7 +117,7 @@ def plant_feet(
     feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
     how = spans_of(timing), timing.frame_rate
     moves = ground_velocity(feet, *how, body.size, up)
-    if moves is not None:  # contacts and corrections are found in the axes of the ground
+    if moves is not None:  # Contacts and corrections are found in the axes of the ground.
         seconds = np.flatnonzero(timing.present) / timing.frame_rate
         travel = -seconds[:, None] * moves
         body = replace(body, travel=travel)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
@@ -34,7 +35,7 @@ class Postures:
     joints : dict of str to int
         Joints by their names in SMPL.
     up : (3,)
-        The up axis of the file; the body's own up axis if it is upside down.
+        The up axis of the file; the up axis of the body if it is upside down.
     """
 
     rows: Ints

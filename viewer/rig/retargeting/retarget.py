@@ -13,10 +13,11 @@ to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg l
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
@@ -108,7 +109,7 @@ class Retargeted:
     source : SkeletonMotion
         The motion, with the rest pose that was used.
     matches : Matches
-        Joints of the source for those of the figure.
+        Joints of the source for joints of the figure.
     to_target : (3, 3)
         Rotation from the source's axes to the figure's.
     scale : float
@@ -134,7 +135,7 @@ def retarget(
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters

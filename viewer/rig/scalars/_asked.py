@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import shown_joint_of
@@ -50,5 +51,5 @@ class Asked:
 
 
 def influences_kept(skinning: Skinning) -> int:
-    """Return the number of influences to compare with: the chosen limit, or four."""
+    """Return the number of influences for the comparison: the chosen limit, or four."""
     return skinning.max_influences or _FOUR

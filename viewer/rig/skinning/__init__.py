@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats, Ints
@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matri
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import rest_positions, shaped
+from viewer.rig.shape import rest_positions, shaped, shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rig.skin import Skin
@@ -86,14 +86,14 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 
 @dataclass(slots=True)
 class Skinning:
-    """Skinning options; the defaults follow the file.
+    """Skinning options; by default, weights are used as stored.
 
     Attributes
     ----------
     method : str
         A key of ``METHODS``.
     blend_factor : float
-        For methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
+        Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
     max_influences : int
         Keep only this many of the strongest influences, scaled to a sum of 1; 0 keeps all as
         stored.
@@ -184,7 +184,7 @@ def skinned(
     skinning : Skinning
         Method and influences.
     vertices : (N,), optional
-        Indices of these vertices; all if omitted.
+        Indices of the vertices to transform; all if omitted.
 
     Returns
     -------
@@ -258,8 +258,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     (J, 4, 4)
         Joint space to figure space.
     """
-    skeleton = shaped(figure, pose.shape_weights).skeleton
-    assert skeleton is not None  # shaping preserves it
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 

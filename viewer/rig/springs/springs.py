@@ -1,11 +1,12 @@
-"""Spring joints of a skeleton and the shapes that they collide with, as in VRM."""
+"""Spring joints of a skeleton and the shapes with which they collide, as in VRM."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
@@ -49,7 +50,7 @@ def _no_colliders() -> Colliders:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Springs:
-    """Joints whose rotation follows from the inertia of a point below them.
+    """Joints whose rotation is determined by the inertia of a point below them.
 
     Attributes
     ----------

@@ -8,10 +8,10 @@ interpolated.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.quaternion import slerp
 from viewer.rig.skeleton import Skeleton
@@ -56,7 +56,7 @@ class SpringTrack:
     skeleton : Skeleton
         Skeleton with springs.
     start, end : float
-        Range of the motion in seconds; the rotations are constant outside.
+        Range of the motion in seconds; the rotations are constant outside this range.
     """
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:

@@ -8,10 +8,10 @@ stored.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import (
     axis_rotations,
@@ -45,7 +45,7 @@ class TransformRow:
     channel : int
         Index of the channel; -1 for a rotation without keys.
     shape : int
-        Blend shape of a weight, else -1.
+        Index of the blend shape of a weight; -1 for other curves.
     """
 
     path: TransformPath
