@@ -8,8 +8,8 @@ from itertools import count
 import pytest
 from batching.batch_jobs import items_called, misbehave
 
-from viewer.batching.attempts import FunctionJob
 from viewer.batching.engines import ENGINES, IN_FLIGHT, Limits, load_engine
+from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item
 from viewer.errors import ViewerError
 

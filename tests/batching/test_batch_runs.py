@@ -14,7 +14,7 @@ from batching.batch_jobs import add_numbers, items_called, misbehave, write_numb
 
 import viewer
 from viewer import interrupts
-from viewer.batching.attempts import FunctionJob, attempt
+from viewer.batching.execution import FunctionJob, attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.report import read_results
 from viewer.batching.running import Settings, run_batch, shard_of

@@ -12,7 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.carrying import carrying_drive
+from viewer.loading.body_driving import body_drive
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -221,7 +221,7 @@ class Builder:
     def _drive(self, clip: SampledClip) -> Drive:
         # Feet are planted at the end, because contacts and the ground need the whole motion.
         up = f"-{self.up}" if self.hangs else self.up
-        return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+        return body_drive(self.model, clip, up, self.joint_map, plants_feet=False)
 
     def _finished(self) -> list[Diagnostic]:
         """At the end, compute the whole motions of driven figures and plant their feet, once."""

@@ -250,7 +250,7 @@ def test_all_findings_are_copied_as_text_and_json(lint, monkeypatch):
         "column: warning W001: weights of 1 vertex do not sum to 1 (worst: 0.9 at "
         "vertex 5, an error of 0.1)"
     )
-    assert lines[1] == f"    {CODES['W001'].title}: {CODES['W001'].hint}"
+    assert lines[1] == f"    {CODES['W001'].title}; remedy: {CODES['W001'].hint}"
     assert lines[-1] == "0 errors, 1 warning, 0 notes"
     hand.click("Copy JSON")
     scene = scene_of(LIGHT)

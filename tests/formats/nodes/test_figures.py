@@ -200,3 +200,6 @@ def test_files_with_only_points_or_lines_are_refused_as_such():
     with pytest.raises(FormatError) as caught:
         figures_of(file_of(tree_of({"name": "cloud", "mesh": 0}), meshes=(NodeMesh("", ()),)))
     assert caught.value.diagnostic.key == "F002.no-triangles"
+    with pytest.raises(FormatError) as caught:
+        figures_of(file_of(tree_of({"name": "a"}), meshes=(mesh(triangle(0)),)))
+    assert caught.value.diagnostic.key == "F002.no-figure"

@@ -179,3 +179,12 @@ def test_ambient_maps_replace_missing_diffuse_maps(read):
 def test_statements_that_are_not_drawn_are_reported(read):
     text = "newmtl a\nmap_Tr cut.png\nrefl -type sphere sky.png\nPs 0.1\naniso 0.5\nmap_Ns a.png\n"
     assert read(text)[1] == ["F007.mtl-statements"]
+
+
+def test_a_missing_library_with_spaces_in_its_name_is_reported_once(tmp_path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text(f"mtllib Part Studio 1.mtl\nusemtl a\n{FACE}f 1 2 3\n")
+    source = Source.open(path)
+    obj.read(source)
+    (warning,) = [found for found in source.diagnostics.warnings if found.key == "F005.library"]
+    assert "Part Studio 1.mtl" in warning.message

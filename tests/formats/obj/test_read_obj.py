@@ -295,7 +295,7 @@ def test_file_with_only_points_is_read_with_a_warning() -> None:
          'found': 2})),
         (SQUARE + "vt\n", ('F002.width', 5, {'item': Phrase('obj-vt', index=0), 'expected': 1,
          'found': 0})),
-        (SQUARE + "f 1 2\n", ('F002.obj-face', 5, {'least': 3, 'found': 2})),
+        (SQUARE + "f\n", ('F002.obj-face', 5, {'least': 3, 'found': 0})),
         (SQUARE + "f 1 2 0\n", ('F002.obj-zero', 5, {})),
         (SQUARE + "vt 0 0\n\nf 1/1 2/0 3/1\n", ('F002.obj-zero', 7, {})),
         (SQUARE + "f 1 2 3\nf 1 2 5\n", ('F002.obj-v-range', 6, {'limit': 4, 'found': 5})),

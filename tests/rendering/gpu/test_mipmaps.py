@@ -59,6 +59,17 @@ def test_every_pixel_is_the_average_of_four_pixels():
     assert np.abs(halved_pictures(pixels)[0] - 255.0 * wanted).max() <= 1.0
 
 
+def test_linear_pixels_are_rounded_averages():
+    pixels = noise(8, 6)
+    sums = pixels.astype(int).reshape(4, 2, 3, 2, 4).sum(axis=(1, 3))
+    first, second, third = halved_pictures(pixels, is_linear=True)
+    np.testing.assert_array_equal(first, (sums + 2) // 4)
+    # The second level averages the exact means, not the rounded ones, and drops the third column.
+    exact = sums[:, :2].reshape(2, 2, 1, 2, 4).sum(axis=(1, 3))
+    np.testing.assert_array_equal(second, (exact + 8) // 16)
+    assert third.shape == (1, 1, 4)
+
+
 SHOW_LEVEL = """#version 330
 uniform sampler2D u_texture;
 uniform float u_level;
