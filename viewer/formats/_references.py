@@ -5,9 +5,9 @@ downloaded model must not show or copy images from elsewhere on the disk. Refuse
 reported: the figure is drawn without the texture, and a ``.rig`` that references such a file is
 rejected.
 
-The folder is that of the path that was opened. If the path is a link, names are looked up next to
-the link, as other programs do, not next to its target. Files that the user specifies on the command
-line or in a dialog may be anywhere, as may the files of a folder that the user opens.
+The folder is the one that contains the opened path. If the path is a link, names are looked up next
+to the link, as other programs do, not next to its target. Files that the user specifies on the
+command line or in a dialog may be anywhere, as may the files of a folder that the user opens.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ class Source:
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
         self._is_stored = data is None  # whether the data can be read again
-        self._counted = (0, 1)  # an offset with a known line, and that line
+        self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
         self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 
@@ -215,7 +215,8 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, or a JSON pointer, if known; that of the first of several errors.
+            Position in the file, or a JSON pointer, if known; of several errors, the first
+            position.
         count : int
             Number of errors.
         part, places : str, (N,)

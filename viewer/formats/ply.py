@@ -255,7 +255,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 def _uvs(
     source: Source, vertices: Table, wedges: Floats | None, picks: Indices
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates: the distinct coordinates of corners, or those of vertices."""
+    """Return texture coordinates: distinct ones of corners, or the coordinates of vertices."""
     if wedges is not None and len(wedges):
         # Each pair is viewed as one complex number, so that sorting finds equal pairs.
         pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()

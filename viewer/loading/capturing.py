@@ -84,7 +84,7 @@ class Builder:
     hangs : bool
         Whether the axis along which people stand points down before placement.
     defers : bool
-        Whether ``finish`` is called with the final motions after everything has been read.
+        Whether the caller computes the final motions and passes them to ``finish``.
     """
 
     capture: Capture

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, TypeVar
 
 import numpy as np
@@ -32,6 +32,9 @@ class Deferred:
         Element type declared by the file.
     load : callable
         Reads the array; called once; may raise a ``FormatError``.
+    blocks : callable, optional
+        Yields the array in blocks of a given number of rows, each valid until the next one, without
+        reading it as a whole; may raise a ``FormatError``.
 
     Attributes
     ----------
@@ -39,12 +42,17 @@ class Deferred:
         Whether the values are in memory.
     """
 
-    __slots__ = ("_load", "_values", "dtype", "shape")
+    __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
 
     def __init__(
-        self, shape: tuple[int, ...], dtype: DTypeLike, load: Callable[[], NDArray[Any]]
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike,
+        load: Callable[[], NDArray[Any]],
+        blocks: Callable[[int], Iterator[NDArray[Any]]] | None = None,
     ) -> None:
         self.shape, self.dtype, self._load = shape, np.dtype(dtype), load
+        self._by_blocks = blocks
         self._values: NDArray[Any] | None = None
 
     @property
@@ -65,6 +73,15 @@ class Deferred:
             values.flags.writeable = False
             self._values = values
         return self._values
+
+    def blocks(self, count: int) -> Iterator[NDArray[Any]]:
+        """Yield blocks of at most ``count`` rows, each valid until the next; see ``values``."""
+        if self._by_blocks is not None and self._values is None:
+            yield from self._by_blocks(count)
+            return
+        values = self.values()
+        for start in range(0, len(values), count):
+            yield values[start : start + count]
 
 
 def frozen(
@@ -111,7 +128,7 @@ def frozen(
 def freeze(array: NDArray[Item]) -> NDArray[Item]:
     """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
 
-    For new arrays that nobody else changes; a copy takes as much memory again.
+    For new arrays that no other code changes; a copy would double the memory.
 
     >>> array = np.zeros(3)
     >>> frozen("offset", freeze(array), (3,)) is array

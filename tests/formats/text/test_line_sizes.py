@@ -5,7 +5,7 @@ from viewer.formats._text.line_sizes import line_sizes
 
 
 @pytest.mark.parametrize("piece", [1, 3, 8, 1 << 18])
-def test_sizes_are_those_of_the_lines_with_words(monkeypatch, piece):
+def test_line_sizes_are_the_word_counts_of_lines_with_words(monkeypatch, piece):
     monkeypatch.setattr(module, "_PIECE", piece)
     text = b"head 9\n 1 2\r\n\r\n\t\n3\r4 5 6 \v7\f8\n\n-1.5e3\n  9  9"
     lines = text.replace(b"\r", b"\n").split(b"\n")

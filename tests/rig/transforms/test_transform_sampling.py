@@ -11,7 +11,7 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.transforms.rate import key_rate
 from viewer.rig.transforms.sampling import sample_transforms
 
-EXACT = 1e-14  # a few roundings of numbers near 1
+EXACT = 1e-14  # a few rounding errors of numbers near 1
 
 
 def test_linear_rotations_have_constant_speed_along_the_shorter_arc():
@@ -67,7 +67,7 @@ def test_cubic_rotations_are_normalised_after_interpolation():
     assert_array_equal(sample_transforms(clip, [0.5]).rotations[0, 0], [0, 0, 0, 1])
 
 
-def test_each_channel_holds_its_end_values_outside_its_range():
+def test_each_channel_keeps_its_end_values_outside_its_range():
     clip = clip_of(
         channel(0, "translation", [1.0], [[7.0, 8, 9]]),
         channel(1, "translation", [2.0, 3.0], [[0.0, 0, 0], [4, 0, 0]]),

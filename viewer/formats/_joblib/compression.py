@@ -16,7 +16,7 @@ from viewer.phrases import printable
 
 __all__ = ["is_compressed", "unpacked"]
 
-_SHORTEST = 12  # bytes; minimum size of a compressed pickle
+_SHORTEST = 12  # minimum size of a compressed pickle, bytes
 _PIECE = 1 << 20  # number of bytes unpacked at a time
 _PICKLE = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
 # The header of zlib may consist of letters, but in a text no control characters follow them.
@@ -43,7 +43,7 @@ class _Unpacker(Protocol):
 
 
 class _Zlib:
-    """The decompressor of zlib with the interface of those of bz2 and lzma."""
+    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
 
     def __init__(self, window: int) -> None:
         self._inner = zlib.decompressobj(window)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.formats._obj.faces import CornerFault, FaceRows, read_faces
+from viewer.formats._obj.faces import FEWEST, CornerFault, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
 from viewer.formats._obj.growing import GrowingTable
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
@@ -22,8 +22,9 @@ __all__ = ["ObjParts", "read_parts"]
 # Smoothing groups, and keywords that a viewer does not need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
 _SHAPES = {b"l": "line", b"p": "point"}
-_WIDTHS = {"v": 3, "vt": 2, "vn": 3}  # numbers of an element
+_WIDTHS = {"v": 3, "vt": 2, "vn": 3}  # number of values of an element
 _RUNS = (b"usemtl", b"g", b"o")
+_NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -149,11 +150,25 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
         if len(lines.of[keyword]):
             gathered.tables[keyword].add(read(source, lines, gathered))
     if len(lines.of["f"]):
-        faces = read_faces(lines, gathered.before) or faulty_faces(source, lines, gathered.before)
-        _add_faces(gathered, faces)
+        faces = read_faces(lines, gathered.before)
+        if faces is None:
+            lines = _without_edges(lines, gathered)
+            faces = read_faces(lines, gathered.before) if len(lines.of["f"]) else _NO_FACES
+        _add_faces(gathered, faces or faulty_faces(source, lines, gathered.before))
     _read_others(source, lines, gathered)
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
+
+
+def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
+    """Return lines without faces of one or two corners, once Blender's form of loose edges."""
+    counts = np.array([len(lines.text(line).split()) - 1 for line in lines.of["f"].tolist()])
+    is_edge = (counts > 0) & (counts < FEWEST)
+    if not is_edge.any():
+        return lines
+    first = lines.base + int(lines.starts[lines.of["f"][is_edge.argmax()]])
+    gathered.leave_out("edges", int(is_edge.sum()), first)
+    return replace(lines, of={**lines.of, "f": lines.of["f"][~is_edge]})
 
 
 def _add_faces(gathered: _Gathered, faces: FaceRows) -> None:

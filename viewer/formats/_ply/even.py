@@ -18,7 +18,8 @@ __all__ = ["Columns", "even_binary", "even_text"]
 
 Numbers = NDArray[Any]
 Columns = tuple[dict[str, Numbers], dict[str, tuple[NDArray[np.int64], Numbers]]]
-"""Properties by name, and lists by name: the number of values of each row, and all values."""
+"""Properties by name, and lists by name. A list consists of the number of values of each row, and
+all values."""
 
 
 def even_text(element: Element, block: NDArray[np.float64]) -> Columns | None:

@@ -68,7 +68,7 @@ class _Text:
         self._begins: Places | None = None
         self._firsts: Places | None = None
         self._values: Numbers | None = None
-        self.has_bad = False  # known when all values have been parsed
+        self.has_bad = False  # correct once all values have been parsed
 
     @property
     def data(self) -> bytes:
@@ -77,7 +77,7 @@ class _Text:
 
     @property
     def values(self) -> Numbers:
-        """All values; only irregular files need them at once."""
+        """All values; only irregular files need them together."""
         if self._values is None:
             self._values, bad = parse_numbers(self.data, self.start, len(self.data))
             if bad >= 0:
@@ -212,7 +212,7 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn about lines after those of the last element, and release the text."""
+        """Warn about lines after the last element, and release the text."""
         left = len(self.counts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)

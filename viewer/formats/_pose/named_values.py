@@ -82,7 +82,7 @@ class NamedValues:
         Raises
         ------
         FormatError
-            If a value is of a different kind; the error has the line of the first.
+            If a value is of a different kind; the error has the line of the first such value.
         """
         value = self.values.get(key)
         try:
@@ -118,7 +118,7 @@ def parse_json(source: Source) -> NamedValues:
         line.
     """
     text = source.data.decode("utf-8", "surrogateescape")
-    odd: set[str] = set()  # words that Python accepts but JSON does not
+    odd: set[str] = set()  # Python accepts these words, but JSON does not
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
