@@ -23,6 +23,7 @@ from viewer.errors import ViewerError
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_two_thousand_files_of_which_one_in_twenty_is_broken(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 2000)

@@ -131,6 +131,7 @@ def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
     assert sums[5] == pytest.approx(0.5) and np.delete(sums, [4, 5]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_a_reader_continues_only_after_recoverable_errors(seed: int) -> None:
     """Files that the strict reader refuses have an error; files that it accepts have none."""

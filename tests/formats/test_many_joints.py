@@ -86,6 +86,7 @@ def read_it(name, text, takes_faults):
         return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("takes_faults", [False, True], ids=["reading", "lint"])
 @pytest.mark.parametrize("name", FILES)
 def test_readers_are_linear_in_the_joints(name, takes_faults):

@@ -36,6 +36,7 @@ def test_iterate_then_slide_find_the_alignment_exactly():
     assert_allclose(found.shift, [0.02, -0.03, 0.05], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_iterate_alone_converges_monotonically():
     template, target = sides()
     errors = [
@@ -54,6 +55,7 @@ def test_kept_scale_is_kept():
     assert_allclose(found.rotation, ROTATION, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_holes_do_not_attract_points():
     positions, triangles = tube()
     heights = positions[triangles][:, :, 1].mean(axis=1)

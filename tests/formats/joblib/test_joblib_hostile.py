@@ -115,6 +115,7 @@ def test_data_beyond_the_limit_of_the_file(data: bytes) -> None:
     assert cost(look) < 3 * BOUND  # xz itself needs 8 MiB
 
 
+@pytest.mark.slow
 def test_bombs() -> None:
     data = zlib.compress(bomb(70 << 20), 9)
     assert refusal(data)[0] == "F002.packed-size"

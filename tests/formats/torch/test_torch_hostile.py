@@ -191,6 +191,7 @@ def test_streams_nested_without_end() -> None:
         assert problem_of(finished(mapping(v=bytes_of(stream)))) == "pickle-arguments"
 
 
+@pytest.mark.slow
 def test_same_bytes_loaded_often_share_one_budget() -> None:
     stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
     once = named("torch.storage", "_load_from_bytes") + b"(h\1tR0"
