@@ -385,7 +385,6 @@ def test_plain_names_are_unique_and_ascii() -> None:
     assert plain_names(names) == expected
 
 
-@pytest.mark.slow
 @given(st.lists(st.text(max_size=6) | st.sampled_from(["a", "a_2", "a_3", "joint1"]), max_size=12))
 def test_plain_names_of_anything(names: list[str]) -> None:
     found = plain_names(names)
