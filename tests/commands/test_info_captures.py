@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 from app.tiny import write_rig
-from formats.capture_files import body, write_frames
+from formats.capture_files import body, standing, write_frames
 from formats.synthetic_smpl import model
-from test_convert_captures import standing
 
 from viewer.cli import run
 
