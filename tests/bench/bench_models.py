@@ -114,7 +114,7 @@ def _correctives(folder: Path) -> None:
 
 
 class _AnyWeights:
-    """Feature with a given number of weights, which are set by the benchmark."""
+    """A feature with a given number of weights, which are set by the benchmark."""
 
     def __init__(self, count: int) -> None:
         self.n_weights = count

@@ -5,7 +5,7 @@ from __future__ import annotations
 from formats.vrm.swinging import swinging
 
 
-def test_expression_slider_changes_materials_in_the_picture(drive, tmp_path):
+def test_expression_slider_changes_materials_in_the_image(drive, tmp_path):
     path = tmp_path / "ada.vrm"
     path.write_bytes(swinging(turn=False).glb())
     hand = drive(path, size=(1000, 700), samples=1)
@@ -20,7 +20,7 @@ def test_expression_slider_changes_materials_in_the_picture(drive, tmp_path):
     assert red_pixels() == 0
     hand.enter_value(f"coefficient {row}", "1")
     assert hand.state.actor.pose.shape_weights[row] == 1.0
-    shown = red_pixels()  # the hat, which was blue
+    shown = red_pixels()  # the hat, which was blue before
     assert shown > 20
     hand.enter_value(f"coefficient {row}", "0")
     assert red_pixels() == 0

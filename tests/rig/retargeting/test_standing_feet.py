@@ -153,6 +153,7 @@ def test_feet_follow_a_sudden_jump_of_the_recording_instead_of_bending_the_knees
     calm, wild = (places(OTHER, clip) for clip in clips)
     moved = wild["LeftToeBase_"] - calm["LeftToeBase_"]
     assert moved[30, 0] > 0.75
-    # The knee bends less than if the foot stayed, and the sole stays near the ground: 0.1 % of 174.
+    # The knee bends less than if the foot remained in place, and the sole remains near the ground:
+    # 0.1 % of 174.
     assert np.abs(moved[30, 1]) < 0.174
     assert np.abs(np.delete(moved, range(25, 36), axis=0)).max() < 0.1
