@@ -1,6 +1,6 @@
 #version 330
 // Two-sided shading of a surface in camera space, with linear colours. The result of a chunk is
-// shown as it is: lit chunks apply the tone curve, chunks that show data do not.
+// displayed unchanged: lit chunks apply the tone curve, chunks that show data do not.
 
 #pragma include tone
 #ifdef SHADOWS

@@ -66,7 +66,7 @@ def test_reset_layout_closes_the_lint_panel(lint):
     assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
 
 
-def test_worst_finding_comes_first_with_its_full_message(lint, texts):
+def test_worst_finding_is_first_with_its_full_message(lint, texts):
     hand = lint(several())
     findings = hand.state.of(Linting).checked.findings
     assert findings[0].severity == "error" and findings[0].code == "B006"
@@ -189,7 +189,7 @@ def test_finding_in_a_clip_jumps_to_its_time(lint):
     assert not hand.state.clock.playing
     assert hand.state.clock.time == pytest.approx(finding.times[0])
     assert finding.times[0] == pytest.approx(30 / RATE)
-    # The camera is where the figure is at that time, not where it was.
+    # The camera is aimed at the position of the figure at that time.
     assert hand.state.camera.target[0] == pytest.approx(40.0)
     assert not hand.state.history.can_undo
 

@@ -26,7 +26,7 @@ SHADERS = ["VRM/MToon", "VRM/UnlitTexture", "VRM_USE_GLTFSHADER", 5]
         ({"extensions": {"VRM": {"materialProperties": {}}}}, [False, True, False]),
     ],
 )
-def test_toon_materials_ignore_the_studio_with_a_note(
+def test_toon_materials_ignore_the_studio_light_with_a_note(
     tmp_path: Path, members: dict[str, Any], unlit: list[bool]
 ) -> None:
     color = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]}
@@ -61,7 +61,7 @@ def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) ->
     assert plain.shade_range == pytest.approx((-0.1, 0.1), abs=1e-12)
 
 
-def test_old_toon_materials_have_srgb_colours_and_other_thresholds(tmp_path: Path) -> None:
+def test_old_toon_materials_have_srgb_colours_and_different_thresholds(tmp_path: Path) -> None:
     told = {
         "shader": "VRM/MToon",
         "vectorProperties": {"_ShadeColor": [1.0, 0.5, 0.0, 1.0]},
@@ -70,11 +70,11 @@ def test_old_toon_materials_have_srgb_colours_and_other_thresholds(tmp_path: Pat
     material = _read(tmp_path, extensions={"VRM": {"materialProperties": [told]}})
     # 0.5 in sRGB: ((0.5 + 0.055) / 1.055) ^ 2.4.
     assert material.shade_color == pytest.approx((1.0, 0.2140411, 0.0), abs=1e-7)
-    # toony = lerp(0.5, 1, 0.5) = 0.75, shift = -0 - 0.25: lit from 0 to 0.5.
+    # toony = lerp(0.5, 1, 0.5) = 0.75, shift = -0 - 0.25, so the lit side is from 0 to 0.5.
     assert material.shade_range == pytest.approx((0.0, 0.5), abs=1e-12)
 
 
-def test_invalid_toon_values_are_those_without_shade(tmp_path: Path) -> None:
+def test_invalid_toon_values_disable_the_shade(tmp_path: Path) -> None:
     toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
     assert material.unlit and material.shade_color == (1.0, 1.0, 1.0)

@@ -1,10 +1,10 @@
-"""Skeletons of a hundred thousand joints are drawn in seconds, also with all boxes in one place."""
+"""Skeletons of a hundred thousand joints, drawn in seconds even with all boxes in one place."""
 
 import subprocess
 import sys
 
 
-def test_a_hundred_thousand_coincident_boxes_are_drawn(tmp_path):
+def test_hundred_thousand_coincident_boxes_are_drawn(tmp_path):
     deep = tmp_path / "deep.skel"
     deep.write_text("balljoint a { " * 100_000 + "} " * 100_000)
     out = tmp_path / "deep.png"

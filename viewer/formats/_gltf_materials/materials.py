@@ -107,7 +107,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
-    """Return the properties of a material; ``toon`` contains those of VRM, if any."""
+    """Return the properties of a material; ``toon`` contains VRM's properties, if any."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None

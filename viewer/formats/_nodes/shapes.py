@@ -19,7 +19,8 @@ from viewer.formats._nodes.surfaces import (
     used_materials,
 )
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes, SummedOffsets
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.bodies.deferred_offsets import DeferredOffsets
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
 from viewer.rig.materials.material_binds import MaterialBinds
 
@@ -126,8 +127,8 @@ def blend_shapes_of(
     mixed, sums = _expressions(file, columns, len(targets), slots)
     shape = len(targets) + len(mixed), count, 3
 
-    def offsets(of_normals: bool) -> SummedOffsets:
-        return SummedOffsets(
+    def offsets(of_normals: bool) -> DeferredOffsets:
+        return DeferredOffsets(
             shape,
             lambda: _offsets(columns, pieces, count, of_normals, sums),
             lambda weights: _sum(columns, pieces, count, of_normals, sums, weights),
@@ -208,7 +209,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name with that of its part, and default weight of a morph target."""
+    """Name, name prefixed by its part's name, and default weight of a morph target."""
 
     name: str
     full_name: str

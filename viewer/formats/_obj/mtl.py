@@ -117,7 +117,9 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     """Return the libraries of one ``mtllib``: a file whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     folder = source.path.parent
-    names = whole.split() if " " in whole and name_here(folder, whole) is None else [whole]
+    # A single suffix means a single name, even if the file is missing.
+    is_one = whole.lower().count(".mtl") == 1 or name_here(folder, whole) is not None
+    names = [whole] if is_one else whole.split()
     found = []
     for written in names:
         name = name_here(folder, written) or written

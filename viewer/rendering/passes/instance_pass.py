@@ -26,9 +26,9 @@ FEWEST = 8
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
-    Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, actors with hidden parts, outlines or changed materials, and meshes that are
-    drawn several times per frame, in the bind pose or coloured by a scalar. If back faces are
+    Posed buffers are used instead for small groups, so that camera moves need no re-skinning, and
+    for translucent actors, actors with hidden parts, outlines or changed materials, and meshes that
+    are drawn several times per frame, in the bind pose or coloured by a scalar. If back faces are
     culled, either all or none of the actors of a group are mirrored, and actors with mirrored
     joints are drawn individually.
 

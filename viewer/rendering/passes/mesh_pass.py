@@ -47,7 +47,7 @@ _COLORMAP_UNIT = 6
 
 
 class MeshPass:
-    """Draws posed meshes with any shading.
+    """Pass that draws posed meshes with any shading.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ class MeshPass:
     def draw_normals(
         self, mesh: PosedMesh, placement: Floats, view: View, size: float, opacity: float = 1.0
     ) -> None:
-        """Draw a line along every vertex normal; ``size`` is that of the figure."""
+        """Draw a line along every vertex normal; ``size`` is the figure's size."""
         program = self.programs.drawing("line")
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)
