@@ -23,16 +23,18 @@ PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
 $(PICTURES): ; @:
 endif
 
-.PHONY: run test quick lint style types compiled bench golden manual gallery figure system clean
+.PHONY: run test suite quick lint style types compiled bench golden manual gallery figure system clean
 
 # A window may open even where pictures cannot be drawn without one: go on either way.
 run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
 	@$(BIN)/viewer $(FILES)
 
-# Installing what is missing waits for the network, checking types for the processor.
+# Types are checked while the tests run: mypy uses one core only.
 test: $(READY)
-	@$(MAKE) --no-print-directory --jobs=4 style types system compiled
+	@$(MAKE) --no-print-directory --jobs=4 style types suite
+
+suite: system compiled
 	@VIEWER_TEST_BUDGET=300 $(TESTING) -n $(WORKERS) --dist worksteal $(TESTS)
 
 # A test that draws all the same fails: it finds no OpenGL.

@@ -24,7 +24,7 @@ from studio_generator.studio import radiance
 
 SIZE, LAYERS, SAMPLES, TABLE = 128, 9, 1024, 64
 MATCAP_SIZE = 256
-# Bits of the mantissa that are kept: steps of 0.4 %, and the file compresses to a third.
+# Number of preserved bits of the mantissa: steps of 0.4 %, and the file compresses to a third.
 _KEPT_BITS = 8
 
 

@@ -55,7 +55,8 @@ def test_wheel_draws_the_bundled_figure_in_an_empty_environment(
 ) -> None:
     venv.create(tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
-    # Our own pip installs into it, and compiles nothing: both take longer than the rest.
+    # The pip of this environment installs into it without compilation, which saves most of the
+    # time.
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", python)
     call(*pip, "install", "--quiet", "--no-compile", wheel, cwd=tmp_path)
     picture = tmp_path / "fox.png"

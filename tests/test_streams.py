@@ -42,7 +42,7 @@ def shell(line: str, *words: str, folder: Path | None = None) -> subprocess.Comp
 
 
 def refused(done: subprocess.CompletedProcess, *words: str) -> None:
-    """Assert that one line says that the output cannot be written."""
+    """Assert that one line reports that the output cannot be written."""
     lines = done.stderr.decode().splitlines()
     assert done.returncode == 5 and len(lines) == 1, lines
     assert all(word in lines[0] for word in words), lines
@@ -135,7 +135,7 @@ def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
     done = shell(line, *rig, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert log.read_bytes().startswith(b"precious\n" + begin)
-    # The message about the output goes to the stream that does not hold the image.
+    # The message about the output is written to the stream without the image.
     assert done.stderr.startswith(os.fsencode(name)) and done.stderr.count(b"\n") == 1
     assert os.fsencode(name) not in log.read_bytes()
 

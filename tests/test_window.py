@@ -36,7 +36,7 @@ DRAFT, FINAL = ("--quality", "draft"), ("--quality", "final")
 
 @pytest.fixture(scope="module")
 def display():
-    """The name of an Xvfb display of this module's own."""
+    """The name of an Xvfb display that only this module uses."""
     missing = [tool for tool in ("Xvfb", "xdotool") if shutil.which(tool) is None]
     if missing:
         text = f"{' and '.join(missing)} not installed"
@@ -314,7 +314,7 @@ def test_idle_window_uses_no_cpu(window):
     _wait_for(lambda: app.is_asleep(1.5), "an idle processor")
 
 
-def test_bad_file_opens_no_window(display, tmp_path):
+def test_invalid_file_opens_no_window(display, tmp_path):
     bad = tmp_path / "bad.skel"
     bad.write_text("balljoint root {\n offset 1 2\n}\n")
     environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}

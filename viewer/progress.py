@@ -33,7 +33,7 @@ def receiving(receive: Receiver) -> Iterator[None]:
 
 @contextmanager
 def silent() -> Iterator[None]:
-    """Ignore progress reported in the block, the parts of whose work are reported as a whole."""
+    """Ignore progress reported in the block, whose caller reports the progress of the whole."""
     with receiving(lambda done, total, unit, what: None):
         yield
 

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 from .joints import CENTRES, NAMES, PARTNERS
 
 EXACT = 1e3  # weight of the error of a centre relative to the unevenness of weights
-FOLLOW = 30.0  # the same weight for the error of a centre under a shape direction
+FOLLOW = 30.0  # relative weight of the error of a centre under a shape direction
 SMALLEST = 1e-4  # weights below this are dropped
 MOST = 64  # maximum number of vertices in a ring
 
@@ -48,7 +48,7 @@ def _chosen(vertices: Floats, j: int) -> np.ndarray:
     offset = vertices - CENTRES[j]
     unit = np.asarray(ring.normal) / np.linalg.norm(ring.normal)
     near = np.linalg.norm(offset, axis=1) < ring.radius
-    if side:  # rings of paired joints stay on the side of the joint
+    if side:  # Rings of paired joints stay on the side of the joint.
         near &= vertices[:, 0] >= 0
     away = np.abs(offset @ unit)
     chosen = np.nonzero(near & (away < ring.band))[0]

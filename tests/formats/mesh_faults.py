@@ -1,4 +1,4 @@
-"""Meshes with one error each, and the error reported for it."""
+"""Mesh files with one error each, and the reported error."""
 
 from __future__ import annotations
 

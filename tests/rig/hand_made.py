@@ -31,7 +31,7 @@ def skeleton(parents, dofs=(), names=None, offsets=None, boxes=None) -> Skeleton
 
 
 def mesh(positions, normals=None, triangles=((0, 0, 0),)) -> Mesh:
-    """Build a mesh whose normals all point along +z if none are given."""
+    """Build a mesh; normals default to +z."""
     positions = np.array(positions, dtype=float).reshape(-1, 3)
     normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if normals is None else normals
     return Mesh(positions, normals, np.array(triangles, dtype=np.int32).reshape(-1, 3))

@@ -1,4 +1,4 @@
-"""Cycles among parents, compared with a walk from every joint."""
+"""Cycles among parents, compared with a traversal from every joint."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.rig.hierarchy import cycle_members
 
 
 def walks_back(parents: list[int], joint: int) -> bool:
-    """Return whether a walk up the hierarchy from a joint returns to it."""
+    """Return whether the chain of parents of a joint returns to the joint."""
     at = joint
     for _ in parents:
         at = parents[at] if 0 <= at < len(parents) else -1

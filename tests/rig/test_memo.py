@@ -42,8 +42,8 @@ def test_results_are_freed_with_their_owner() -> None:
     assert gone() is None
 
 
-def test_threads_that_evict_results_of_each_other_get_correct_results() -> None:
-    """The memo holds one result; a second thread requests another while the first is computed."""
+def test_threads_that_evict_results_of_other_threads_get_correct_results() -> None:
+    """The memo stores one result; a second thread requests another while the first is computed."""
     memo: Memo[Owner, str] = Memo(kept=1)
     owner, inside, go = Owner(), threading.Event(), threading.Event()
     found: list[str] = []

@@ -39,7 +39,7 @@ def test_targets_are_absolute_and_reached_at_weight_1():
     assert changed.mesh.normals.tolist() == [[0, 0, 1], [0, 0, 2], [0, 1, 0]]
 
 
-def test_several_weights_add_up_from_the_base():
+def test_several_weighted_morphs_are_added_to_the_base():
     changed = shaped(with_morphs(figure(), [LIFTED, WIDE]), np.array([0.5, 2.0]))
     # Vertex 2: (0,1,0) + 0.5 (0,0,4) + 2 (0,2,0); vertex 1: (1,0,0) + 2 (4,0,0).
     assert changed.mesh.positions.tolist() == [[0, 0, 0], [9, 0, 0], [0, 5, 2]]

@@ -29,7 +29,7 @@ def actor():
 
 @pytest.fixture
 def runs(monkeypatch):
-    """Counts the runs of forward kinematics."""
+    """A counter of the runs of forward kinematics."""
     counted, run = [], kinematics.forward_kinematics
 
     def count(*args):

@@ -59,7 +59,7 @@ def test_shape_moves_vertices_joints_and_bindings():
 
 def test_shaped_normals_are_those_of_the_new_surface():
     directions = np.zeros((1, 4, 3))
-    directions[0, [2, 3], 2] = 4.0  # the square leans: z = x
+    directions[0, [2, 3], 2] = 4.0  # the square is tilted: z = x
     figure = arm(blend_shapes=BlendShapes(("lean",), directions))
     normals = shaped(figure, np.array([1.0])).mesh.normals
     assert_allclose(normals, np.tile([-np.sqrt(0.5), 0, np.sqrt(0.5)], (4, 1)), atol=1e-15)

@@ -94,7 +94,9 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") 
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
-    group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
+    group.add_argument(
+        "--unit", choices=METRES, help="length unit of BVH files (default: estimated)"
+    )
     _add_video_arguments(group)
     group.add_argument(
         "--layout",

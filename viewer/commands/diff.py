@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
-    files.add_argument("--unit", choices=METRES, help="length unit of BVH")
+    files.add_argument("--unit", choices=METRES, help="length unit of BVH files")
     add_animation_argument(files)
     _add_poses(parser)
     _add_results(parser)

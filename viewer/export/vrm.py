@@ -90,7 +90,7 @@ def export(
     if record is not None:
         extend = partial(_add_kept, record, given)
         return gltf.export(still, path, skinning, optimizes, extend) + notes
-    told = checked_meta(given, figure.name)
+    added_meta = checked_meta(given, figure.name)
     pose = figure_pose(figure)
     pose.shape_weights = actor.require_pose().shape_weights.copy()
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
@@ -98,7 +98,7 @@ def export(
     if angle > _STRAIGHT:
         notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
     notes += _unit_notes(actor.figure)
-    extend = partial(_add_made, bones, told)
+    extend = partial(_add_made, bones, added_meta)
     return gltf.export(still, path, skinning, optimizes, extend) + notes
 
 
@@ -142,10 +142,10 @@ def _add_kept(
     else:
         extensions = kept_modern(maps)
     _keep_shading(record, document, maps)
-    told = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
-    told["meta"] = changed_meta(told["meta"], meta, record.version)
+    data = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
+    data["meta"] = changed_meta(data["meta"], meta, record.version)
     _add(document, body, built, extensions)
-    return [_written(told, extensions, record.version), *_lost(maps.lost)]
+    return [_written(data, extensions, record.version), *_lost(maps.lost)]
 
 
 def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
@@ -204,17 +204,17 @@ def _declare(document: Document, *names: str) -> None:
     used += [name for name in names if name not in used]
 
 
-def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
+def _written(data: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
     """Return a note that counts the contents of the extensions."""
-    bones = told["humanoid"]["humanBones"]
+    bones = data["humanoid"]["humanBones"]
     if version == 0:
-        n_expressions = _size(part(told, "blendShapeMaster", "blendShapeGroups"))
-        groups = part(told, "secondaryAnimation", "boneGroups")
+        n_expressions = _size(part(data, "blendShapeMaster", "blendShapeGroups"))
+        groups = part(data, "secondaryAnimation", "boneGroups")
         chains = groups if isinstance(groups, list) else []
         n_chains = sum(_size(part(each, "bones")) for each in chains)
     else:
         kinds = ("preset", "custom")
-        n_expressions = sum(_size(part(told, "expressions", kind)) for kind in kinds)
+        n_expressions = sum(_size(part(data, "expressions", kind)) for kind in kinds)
         n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
     parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
     parts.append(Phrase("vrm-springs", n=n_chains))
@@ -222,9 +222,9 @@ def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: in
     return Diagnostic("X001.vrm", values=values)
 
 
-def _size(told: Any) -> int:
+def _size(data: Any) -> int:
     """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
-    return len(told) if isinstance(told, list | dict) else 0
+    return len(data) if isinstance(data, list | dict) else 0
 
 
 def _lost(lost: Counter[str]) -> list[Diagnostic]:

@@ -97,7 +97,7 @@ FORMATS = {
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
     "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
-    # This row follows that of the skin, whose sections have the same names: a .morph is identified
+    # This row follows the row of .skin, whose sections have the same names: a .morph is identified
     # by its suffix.
     "morph": Format(
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False

@@ -19,7 +19,7 @@ MAX_SIZE = 2 << 30
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
 
-# Maximum number of names in a folder that are compared with that of a missing file.
+# Maximum number of names in a folder that are compared with the name of a missing file.
 _MOST_FILES = 2000
 _ALIKE = 0.8  # minimum similarity; high, because file names share suffixes and often more
 _KINDS = {

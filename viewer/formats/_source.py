@@ -82,7 +82,8 @@ class Source:
         self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
-        self._counted = (0, 1)  # an offset with a known line, and that line
+        self._is_stored = data is None  # whether the data can be read again
+        self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
         self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 
@@ -107,6 +108,11 @@ class Source:
             self._data = _without_marks(read_bytes(self.path, self.max_size))
             report_bytes(0, len(self._data), name)
         return self._data
+
+    def release(self) -> None:
+        """Release the memory of the data, which is read again when an error needs its line."""
+        if self._is_stored:
+            self._data = None
 
     def option(self, name: str) -> str:
         """Return an option that selects among the contents of the file; empty for the default."""
@@ -209,7 +215,8 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, or a JSON pointer, if known; that of the first of several errors.
+            Position in the file, or a JSON pointer, if known; of several errors, the first
+            position.
         count : int
             Number of errors.
         part, places : str, (N,)

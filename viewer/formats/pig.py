@@ -101,7 +101,7 @@ def read(source: Source) -> Figure:
 
 
 def _count_fault(part: Part, wanted: int, other: Part) -> FormatError:
-    """Return the error for a part whose number of rows differs from that of another part."""
+    """Return the error for a part whose number of rows differs from another part's."""
     return part.source.fault(
         "F002.pig-rows-as",
         part.odd_offset(wanted),
@@ -120,7 +120,7 @@ def _layout(n_joints: int) -> PoseLayout:
 
 
 def _neutral_mesh(parts: dict[str, Part]) -> Floats:
-    """Return the vertices; those of invalid rows are moved between their neighbours."""
+    """Return the vertices; vertices of invalid rows are moved between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
         return positions

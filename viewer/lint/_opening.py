@@ -147,7 +147,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         figure = replace(figure, animations=valid)
     try:
         if figure.correctives is not None:
-            figure.correctives.values()
+            figure.correctives.check_values()
     except FormatError as problem:
         refusals.append(of_error(problem))
         figure = replace(figure, correctives=None)

@@ -12,7 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.carrying import carrying_drive
+from viewer.loading.body_driving import body_drive
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -84,7 +84,7 @@ class Builder:
     hangs : bool
         Whether the axis along which people stand points down before placement.
     defers : bool
-        Whether ``finish`` is called with the final motions after everything has been read.
+        Whether the caller computes the final motions and passes them to ``finish``.
     """
 
     capture: Capture
@@ -221,7 +221,7 @@ class Builder:
     def _drive(self, clip: SampledClip) -> Drive:
         # Feet are planted at the end, because contacts and the ground need the whole motion.
         up = f"-{self.up}" if self.hangs else self.up
-        return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+        return body_drive(self.model, clip, up, self.joint_map, plants_feet=False)
 
     def _finished(self) -> list[Diagnostic]:
         """At the end, compute the whole motions of driven figures and plant their feet, once."""

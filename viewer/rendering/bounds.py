@@ -62,7 +62,7 @@ def _of_joints(actor: Actor) -> Floats:
     world = posed_skeleton(skeleton, pose).world
     places = world[:, :3, 3]
     size, mesh = box_size(bounding_box(places)), actor.figure.mesh
-    if size == 0.0 and mesh is not None:  # if all joints coincide
+    if size == 0.0 and mesh is not None:  # used if all joints coincide
         size = box_size(bounding_box(mesh.positions))
     thick = np.full(len(places), _BONE * (size or 1.0))
     bones = np.column_stack([places, thick])

@@ -140,7 +140,8 @@ def update_skeletons(
 
         poses = [pose for _, pose in group]
         skeleton = shaped_skeleton(group[0][0].figure, poses[0].shape_weights)
-        posed_worlds(skeleton, poses)  # computed in one batch; each pose caches its result
+        # Matrices are computed in one batch, and each pose caches its result.
+        posed_worlds(skeleton, poses)
         for actor, pose in group:
             buffers.skeleton(actor).update(pose, options)
 

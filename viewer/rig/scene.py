@@ -330,9 +330,9 @@ def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
 
 
 def scene_unit(scene: Scene) -> str:
-    """Return the unit of length of the scene: that of its first figure with a known unit.
+    """Return the unit of length of the scene: the unit of its first figure with a known one.
 
-    A scale that converts the figure's unit into another one, such as that of a placement, is taken
+    A scale that converts the figure's unit into another one, such as a placement's scale, is taken
     into account; any other scale of a pose is assumed to be the user's choice.
 
     Parameters

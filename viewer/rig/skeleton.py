@@ -251,7 +251,7 @@ def joint_label(skeleton: Skeleton, joint: int) -> str:
 
 
 def shown_joints(skeleton: Skeleton) -> Ints:
-    """Return the joints that are shown: those of the file, without auxiliary ones: (N,) int32."""
+    """Return the joints that are shown, without auxiliary ones: (N,) int32."""
     joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
     return joints if skeleton.auxiliary is None else joints[~skeleton.auxiliary]
 

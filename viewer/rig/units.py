@@ -34,7 +34,7 @@ def is_metres(size: float) -> bool:
 
 
 def unit_of_scaled(unit: str, scale: float) -> str:
-    """Return the unit of a figure from that of a similar figure and the ratio of their sizes.
+    """Return the unit of a figure from the unit of a similar figure and the ratio of their sizes.
 
     Parameters
     ----------

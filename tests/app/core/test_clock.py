@@ -92,7 +92,7 @@ def test_slow_frames_lose_no_time():
     assert fine.time == pytest.approx(coarse.time, abs=1e-9)
 
 
-def test_last_captured_frame_lasts_as_long_as_the_others():
+def test_last_captured_frame_lasts_as_long_as_other_frames():
     playback = clock(captured())  # frames at 0, 0.25 ... 2.0
     playback.advance(2.2)
     assert (playback.time, playback.frame) == (2.0, 8)

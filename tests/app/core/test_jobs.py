@@ -55,7 +55,7 @@ def test_cancelled_job_is_done_immediately_and_ends_before_its_next_step() -> No
     assert not after and job.lines == [] and job.error == "" and job.title == "first"
 
 
-def test_errors_are_kept_as_messages() -> None:
+def test_errors_are_stored_as_messages() -> None:
     def refuse(report: Report) -> list[str]:
         raise RigError("figure box has no mesh")
 

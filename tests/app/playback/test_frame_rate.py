@@ -138,7 +138,7 @@ def test_other_captures_keep_their_rate(drive, rig):
     assert rates(hand) == [40.0, 10.0]
 
 
-def test_points_are_retimed_as_well(drive):
+def test_rate_applies_to_captured_points(drive):
     hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=SIZE, samples=1)
     hand.enter_value("Frame rate", "50")
     assert rates(hand) == [50.0] and hand.state.clock.whole == (0.0, 0.04)

@@ -117,7 +117,7 @@ def _type_seed(hand, text):
     hand.step(2)
 
 
-def test_same_seed_gives_the_same_shape(shape):
+def test_equal_seeds_result_in_equal_shapes(shape):
     for _ in range(3):
         shape.click("Random")
     _type_seed(shape, "1")

@@ -1,4 +1,4 @@
-"""Conversion of long BVH files part by part, against conversion of the whole file."""
+"""Conversion of long BVH files part by part, compared with conversion of the whole file."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ PLACES = "Xposition Yposition Zposition"
 
 @pytest.fixture
 def converted(tmp_path, monkeypatch, capsys):
-    """Return a function that converts a text, streamed or not: text, output, errors, exit code."""
+    """Return a function that converts a text, and returns text, output, errors and exit code."""
     monkeypatch.setattr(streaming, "_PART", PART)
 
     def convert(data, options=(), streams=True):
@@ -95,7 +95,7 @@ OPTIONS = (
 
 
 @pytest.mark.parametrize("options", OPTIONS)
-def test_options_give_the_same_file_and_notes(streamed, options):
+def test_options_produce_the_same_file_and_notes(streamed, options):
     written, _, _, code = streamed(motion(), options.split())
     assert code == 0
     frames = {"--frames 95:207": 112, "--rest-frame --digits 2": 301}.get(options)
@@ -107,7 +107,7 @@ def test_options_give_the_same_file_and_notes(streamed, options):
 @pytest.mark.parametrize(
     "kind", ({"moves_inner": True}, {"roots": 3}, {"size": 100.0}, {"frames": 3})
 )
-def test_skeletons_give_the_same_file_and_notes(streamed, kind, options):
+def test_skeletons_produce_the_same_file_and_notes(streamed, kind, options):
     if kind.get("frames") != 3 or "299" not in options:
         assert streamed(motion(**kind), options.split())[-1] == 0
 
@@ -126,12 +126,12 @@ def test_skeletons_give_the_same_file_and_notes(streamed, kind, options):
         lambda text: text.replace("0.0166667", "0"),
     ),
 )
-def test_spellings_that_need_not_be_read_as_a_whole(streamed, change):
+def test_unusual_spellings_are_read_part_by_part(streamed, change):
     assert streamed(change(motion()))[-1] == 0
 
 
 def broken(line: int, new: str):
-    """Return a change of one line, counted from the end."""
+    """Return a function that replaces one line, counted from the end."""
 
     def change(text):
         lines = text.splitlines()
@@ -159,7 +159,7 @@ def broken(line: int, new: str):
     ),
 )
 def test_irregular_files_are_read_as_a_whole(streamed, change, code):
-    # Frames beyond the requested ones are checked too.
+    # Frames after the requested ones are also checked.
     for options in ((), ("--frames", "10:20")):
         assert streamed(change(motion()), options, False)[-1] == code
 
@@ -167,7 +167,7 @@ def test_irregular_files_are_read_as_a_whole(streamed, change, code):
 @pytest.mark.parametrize(
     "options", ("--trim 10:20", "--resample 30", "--smooth", "--frame 3", "--time 0", "--mirror")
 )
-def test_options_that_need_the_whole_motion(streamed, options):
+def test_options_that_need_the_whole_motion_read_it_as_a_whole(streamed, options):
     streamed(motion(frames=40), options.split(), False)
 
 
@@ -192,7 +192,7 @@ def test_files_that_change_between_the_passes_are_read_as_a_whole(tmp_path):
         list(stream.clips(0, 300))
 
 
-def test_standard_output_gets_the_same_file(tmp_path, monkeypatch, capfdbinary):
+def test_standard_output_receives_the_same_file(tmp_path, monkeypatch, capfdbinary):
     path = tmp_path / "a.bvh"
     path.write_text(motion(frames=5))
     outputs = []
@@ -206,7 +206,7 @@ def test_standard_output_gets_the_same_file(tmp_path, monkeypatch, capfdbinary):
     assert outputs[0].startswith(b"HIERARCHY")
 
 
-def test_memory_does_not_grow_with_the_frames(tmp_path, monkeypatch, capsys):
+def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
     monkeypatch.setattr(streaming, "_PART", 20_000)
     peaks = []
@@ -217,6 +217,6 @@ def test_memory_does_not_grow_with_the_frames(tmp_path, monkeypatch, capsys):
         assert run(["convert", str(path), "-o", str(tmp_path / "b.bvh"), "--force"]) == 0
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
-    # A frame has 17 numbers and 5 joints: its rotations alone take 160 bytes. The numbers of lines
-    # and rows, at most 16 bytes per frame, are all that is kept.
+    # A frame has 17 numbers and 5 joints: its rotations need 160 bytes. Only the numbers of lines
+    # and rows are kept, at most 16 bytes per frame.
     assert (peaks[2] - peaks[1]) / 4500 < 40

@@ -1,4 +1,4 @@
-"""VRM 0.x characters written as VRM 1.0: values worked out from both specifications."""
+"""VRM 0.x characters written as VRM 1.0, compared with values computed from both specifications."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.pose import local_matrices, rest_pose
 
 TURN = np.array([-1.0, 1.0, -1.0])  # 180 degrees about y
-SINGLE = 1e-6  # of lengths below 2
+SINGLE = 1e-6  # for lengths below 2
 
 
 def upgrade(file: File, folder: Path, **meta: Any) -> tuple[Written, dict[str, Any]]:
@@ -35,7 +35,7 @@ def old_vrm(file: File) -> dict[str, Any]:
     return file.root["extensions"]["VRM"]
 
 
-def test_the_character_faces_the_other_way(tmp_path: Path) -> None:
+def test_character_faces_the_opposite_direction(tmp_path: Path) -> None:
     _, notes = upgrade(swinging(0), tmp_path)
     assert not [key for key in notes if key.startswith("X002")]
     before, after = (load(tmp_path / name).actors[0].figure for name in ("ada.vrm", "out.vrm"))
@@ -55,7 +55,7 @@ def test_the_character_faces_the_other_way(tmp_path: Path) -> None:
     assert_allclose(weights[1], weights[0] * TURN, rtol=0, atol=SINGLE)
 
 
-def test_bones_views_gaze_and_expressions_are_translated(tmp_path: Path) -> None:
+def test_bones_views_gaze_and_expressions_are_converted(tmp_path: Path) -> None:
     file = swinging(0)
     vrm = old_vrm(file)
     vrm["humanoid"]["humanBones"].append({"bone": "leftThumbProximal", "node": 99})
@@ -86,7 +86,7 @@ def test_bones_views_gaze_and_expressions_are_translated(tmp_path: Path) -> None
     assert (color["type"], color["targetValue"]) == ("color", [1.0, 0.0, 0.0, 1.0])
 
 
-def test_meta_grants_no_more_than_the_file(tmp_path: Path) -> None:
+def test_meta_permits_no_more_than_the_file(tmp_path: Path) -> None:
     file = swinging(0)
     old_vrm(file)["meta"] |= {
         "licenseName": "CC_BY_NC_ND",
@@ -116,7 +116,7 @@ def test_meta_grants_no_more_than_the_file(tmp_path: Path) -> None:
     }
 
 
-def test_an_author_is_required(tmp_path: Path) -> None:
+def test_author_is_required(tmp_path: Path) -> None:
     file = swinging(0)
     del old_vrm(file)["meta"]["author"]
     with pytest.raises(RigError, match="--vrm-author"):
@@ -126,7 +126,7 @@ def test_an_author_is_required(tmp_path: Path) -> None:
     assert written.root["extensions"]["VRMC_vrm"]["meta"]["authors"] == ["B"]
 
 
-def test_chains_end_seven_centimetres_further(tmp_path: Path) -> None:
+def test_chains_are_extended_by_seven_centimetres(tmp_path: Path) -> None:
     written, _ = upgrade(swinging(0), tmp_path)
     springs = written.root["extensions"]["VRMC_springBone"]
     (chain,) = springs["springs"]
@@ -157,7 +157,7 @@ def test_branches_become_chains(tmp_path: Path) -> None:
     index = next(n for n, node in enumerate(file.root["nodes"]) if node["name"] == "hair2")
     twig = file.add("nodes", {"name": "twig", "translation": [0.1, 0, 0]})
     file.root["nodes"][index]["children"].append(twig)
-    # Nodes that no vertex follows are joints only if the extension names them.
+    # Nodes that move no vertex are joints only if the extension lists them.
     old_vrm(file)["secondaryAnimation"]["boneGroups"][0]["center"] = twig
     written, _ = upgrade(file, tmp_path)
     chains = [
@@ -167,7 +167,7 @@ def test_branches_become_chains(tmp_path: Path) -> None:
     assert chains == [[*HAIR, "hairEnd_end"], ["twig", "twig_end"]]
 
 
-def test_toon_shading_is_translated(tmp_path: Path) -> None:
+def test_toon_shading_is_converted(tmp_path: Path) -> None:
     file = swinging(0)
     skin = old_vrm(file)["materialProperties"][0]
     skin["floatProperties"] = {
@@ -187,7 +187,7 @@ def test_toon_shading_is_translated(tmp_path: Path) -> None:
     skin["textureProperties"]["_SphereAdd"] = 1
     written, notes = upgrade(file, tmp_path)
     toon = written.root["materials"][0]["extensions"]["VRMC_materials_mtoon"]
-    # Version 0.x rises from 0.2 to 0.2 + (1 - 0.2) (1 - 0.5) = 0.6.
+    # In version 0.x, the ramp is from 0.2 to 0.2 + (1 - 0.2) (1 - 0.5) = 0.6.
     assert toon["shadingToonyFactor"] == pytest.approx(1 - 0.4 / 2, abs=1e-12)
     assert toon["shadingShiftFactor"] == pytest.approx(-(0.2 + 0.6) / 2, abs=1e-12)
     assert toon["outlineWidthMode"] == "screenCoordinates"
@@ -208,7 +208,7 @@ def test_toon_shading_is_translated(tmp_path: Path) -> None:
     assert notes["X003.vrm-upgrade"].values["names"] == ["skin _ShadingGradeRate"]
 
 
-def test_texture_movements_of_expressions_are_translated(tmp_path: Path) -> None:
+def test_texture_movements_of_expressions_are_converted(tmp_path: Path) -> None:
     file = swinging(0)
     vrm = old_vrm(file)
     vrm["blendShapeMaster"]["blendShapeGroups"][1]["materialValues"] = [
@@ -265,7 +265,7 @@ def test_data_of_another_structure_does_not_prevent_writing(
     assert written.root["extensions"]["VRMC_vrm"]["specVersion"] == "1.0"
 
 
-def test_convert_writes_version_1_if_asked(
+def test_convert_writes_version_1_if_requested(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"

@@ -21,7 +21,7 @@ def test_uniform_rotation_is_interpolated_exactly():
     assert_allclose(found.figure_translations[inner, 2], -2.0 * np.arange(1, 8), atol=1e-12)
 
 
-def test_gaps_above_the_length_limit_stay():
+def test_gaps_above_the_length_limit_are_not_interpolated():
     clip = turning(np.arange(3.0), rows=[0, -1, -1, -1, 1, -1, 2])
     found, gaps = interpolate_gaps(clip, longest=2)
     assert gaps == Gaps(((5, 6),), ((1, 4),))
@@ -29,7 +29,7 @@ def test_gaps_above_the_length_limit_stay():
     assert inner_gaps(interpolate_gaps(clip, longest=3)[0]) == []
 
 
-def test_points_detected_on_both_sides_are_interpolated_and_others_stay_undetected():
+def test_only_points_detected_on_both_sides_are_interpolated():
     points = np.zeros((2, 2, 4))
     points[0, :, 0], points[1, :, 0] = 1.0, 4.0
     points[:, 0, 3] = 0.8

@@ -30,7 +30,7 @@ def test_different_shapes_are_stored_per_frame_and_equal_ones_as_one_row():
     assert_allclose(found.shape_weights[rows, 0], [1, 1, 1, 0, 0])
 
 
-def test_points_are_joined_too():
+def test_points_are_joined():
     points = np.ones((3, 1, 4))
     clips = [PointClip("p", c.timing, k * points) for k, c in ((1, EARLY), (2, LATE))]
     found = joined_tracks(*clips)

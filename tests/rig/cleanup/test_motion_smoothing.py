@@ -34,7 +34,7 @@ def test_savgol_keeps_uniform_rotation_about_any_axis_through_many_revolutions(c
     assert_allclose(same, 1.0, atol=EXACT)
 
 
-def test_savgol_keeps_a_parabola_of_positions_at_the_ends_too():
+def test_savgol_keeps_a_parabola_of_positions_also_at_the_ends():
     t = np.arange(25.0)
     places = np.stack([t**2, 3.0 - t, 0.1 * t**2 - t], axis=1)
     found = smoothed(turning(0.0 * t, places=places), SavitzkyGolay(window=7, order=2))

@@ -28,7 +28,7 @@ def test_straight_lines_are_unchanged() -> None:
     assert_allclose(smooth_curves(line, weights, 10.0), line, atol=1e-9)
 
 
-def test_a_held_row_fades_over_the_span_without_a_kink() -> None:
+def test_effect_of_a_fixed_row_decays_smoothly_over_the_span() -> None:
     targets, weights = np.zeros((1, 401, 1)), np.ones((1, 401))
     targets[0, 200], weights[0, 200] = 1.0, 1e9
     curve = smooth_curves(targets, weights, 20.0)[0, :, 0]

@@ -61,7 +61,7 @@ def test_moved_joint_is_reported_with_its_distance() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
     places = measures(found)["joint positions"]
     assert_allclose(places.maximum, 0.05)
-    assert_allclose(places.mean, 0.025)  # two joints, one in place
+    assert_allclose(places.mean, 0.025)  # two joints, one of which is unchanged
     assert (places.item, places.step) == ("tip", "own pose")
     assert_allclose(places.item_maxima, [0.0, 0.05])
     assert found.exceeds(0.03) and not found.exceeds(0.05 / np.sqrt(2) + 1e-9)
@@ -76,7 +76,7 @@ def test_moved_vertex_is_reported_by_index() -> None:
     assert vertices.item == "vertex 3"
 
 
-def test_weights_differ_by_the_l1_distance_of_rows_in_any_listing() -> None:
+def test_weights_differ_by_the_l1_distance_of_rows_in_any_order() -> None:
     # Vertex 0: the same weight split into two entries. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
     other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
@@ -208,7 +208,7 @@ def test_range_without_frames_is_refused() -> None:
         compare(*actors, frames=(9, 12))
 
 
-def test_rotation_distance_is_exact_for_small_and_half_turns() -> None:
+def test_rotation_distance_is_exact_for_small_angles_and_180_degrees() -> None:
     angles = np.array([1e-9, 1e-4, 1.0, np.pi])
     found = rotation_distance(axis_rotations(1, angles), np.eye(3))
     assert_allclose(found, angles, rtol=1e-6)
@@ -220,7 +220,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
     assert replace(found, measures=(broken,)).exceeds(1e9)
 
 
-def test_actors_keep_the_worst_pose_even_if_it_is_their_own() -> None:
+def test_actors_report_the_worst_pose_even_if_it_is_their_own() -> None:
     # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]

@@ -191,7 +191,7 @@ TRIANGLES = np.array([[0, 1, 2], [2, 1, 3]])
 
 def test_interpolate_blends_corner_values_by_barycentric_weights():
     values = np.array([[0.0, 1.0], [2.0, 0.0], [4.0, 0.0], [8.0, 4.0]])
-    # 4/2 + 2/4 + 8/4 = 4.5 and 4/4 = 1; then vertex 1 alone.
+    # 4/2 + 2/4 + 8/4 = 4.5 and 4/4 = 1; then only vertex 1.
     assert interpolate(TWO, TRIANGLES, values).tolist() == [[4.5, 1.0], [2.0, 0.0]]
     assert interpolate(TWO, TRIANGLES, values[:, 0]).tolist() == [4.5, 2.0]
     nested = values.reshape(4, 1, 2)

@@ -40,13 +40,13 @@ def test_distance_is_in_units_of_the_direction_vector():
 @pytest.mark.parametrize(
     ("origin", "direction"),
     [
-        ((2.0, 0.5, 3.0), (0.0, 0.0, -1.0)),  # beside
+        ((2.0, 0.5, 3.0), (0.0, 0.0, -1.0)),  # next to the squares
         ((0.5, 0.5, 3.0), (0.0, 0.0, 1.0)),  # behind the eye
         ((-1.0, 0.5, 0.5), (1.0, 0.0, 0.0)),  # between both squares
         ((-1.0, 0.5, 0.0), (1.0, 0.0, 0.0)),  # in the plane of one square
     ],
 )
-def test_rays_beside_behind_and_between_triangles_hit_nothing(origin, direction):
+def test_rays_next_to_behind_and_between_triangles_have_no_hit(origin, direction):
     assert first_hit(POSITIONS, TRIANGLES, np.array(origin), np.array(direction)) is None
     assert first_hit(POSITIONS, TRIANGLES[:0], np.array(origin), np.array(direction)) is None
 

@@ -78,12 +78,12 @@ def test_tiny_rotation_keeps_its_precision():
     # sin t / t is 1 to the last digit, and t^2 / 2 is smaller than that, so R = I + [r]x.
     found = rotation_vector_to_matrix(np.array([1e-9, -2e-9, 3e-9]))
     assert_allclose(found[[2, 0, 1], [1, 2, 0]], [1e-9, -2e-9, 3e-9], rtol=1e-8)
-    # Near 0 the diagonal holds -t^2 / 2, which (1 - cos t) / t^2 would lose.
+    # Near 0 the diagonal contains -t^2 / 2, which (1 - cos t) / t^2 would lose.
     found = rotation_vector_to_matrix(np.array([0.0, 0.0, 1e-6]))
     assert_allclose(found[0, 0] - 1.0, -0.5e-12, atol=1.2e-16)
 
 
-def test_half_turn_is_twice_the_projection_minus_the_identity():
+def test_rotation_by_180_degrees_is_twice_the_projection_minus_the_identity():
     for axis in AXES:
         unit = unit_axis(axis)
         found = rotation_vector_to_matrix(np.pi * unit)
@@ -92,14 +92,14 @@ def test_half_turn_is_twice_the_projection_minus_the_identity():
 
 @pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-4, 0.3, 3.0, np.pi - 1e-6, np.pi - 1e-9])
 @pytest.mark.parametrize("axis", AXES)
-def test_rotation_vector_up_to_a_half_turn_round_trips(axis, angle):
+def test_rotation_vector_up_to_180_degrees_round_trips(axis, angle):
     vector = angle * unit_axis(axis)
     found = matrix_to_rotation_vector(rotation_vector_to_matrix(vector))
     assert_allclose(found, vector, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_half_turn_round_trips_up_to_its_sign(axis):
+def test_rotation_by_180_degrees_round_trips_up_to_its_sign(axis):
     vector = np.pi * unit_axis(axis)
     found = matrix_to_rotation_vector(rotation_vector_to_matrix(vector))
     sign = 1.0 if found @ vector > 0.0 else -1.0
@@ -107,7 +107,7 @@ def test_half_turn_round_trips_up_to_its_sign(axis):
 
 
 @pytest.mark.parametrize("axis", AXES)
-def test_more_than_a_half_turn_returns_the_shorter_rotation(axis):
+def test_rotation_over_180_degrees_returns_the_shorter_rotation(axis):
     vector = matrix_to_rotation_vector(rotation_vector_to_matrix(4.2 * unit_axis(axis)))
     assert_allclose(vector, (4.2 - 2.0 * np.pi) * unit_axis(axis), atol=ROUNDING)
     whole = matrix_to_rotation_vector(rotation_vector_to_matrix(2.0 * np.pi * unit_axis(axis)))
@@ -131,7 +131,7 @@ def test_matrices_round_trip_through_quaternions():
 
 @pytest.mark.parametrize("w", [0.0, 1e-17, 1e-9, 1e-5])
 @pytest.mark.parametrize("axis", AXES)
-def test_quaternions_at_and_near_a_half_turn_round_trip(axis, w):
+def test_quaternions_at_and_near_180_degrees_round_trip(axis, w):
     quaternion = np.array([*unit_axis(axis), w])
     quaternion /= np.linalg.norm(quaternion)
     found = matrix_to_quaternion(quaternion_to_matrix(quaternion))
@@ -218,7 +218,7 @@ def test_shear_rotates_by_the_angle_of_its_polar_decomposition(shear):
     assert_allclose(rotation @ stretch, matrix, atol=ROUNDING * (1 + shear))
 
 
-def test_reflection_gives_a_proper_rotation_and_a_reflecting_stretch():
+def test_reflection_is_split_into_a_proper_rotation_and_a_reflecting_stretch():
     # The shortest of the three axes is flipped, which gives the nearest proper rotation.
     rotation, stretch = nearest_rotations(np.diag([-1.0, 2.0, 3.0]))
     assert_allclose(rotation, np.eye(3), atol=ROUNDING)
@@ -242,13 +242,13 @@ def test_nearest_rotation_is_nearer_than_any_other(mirror):
         assert nearest <= np.linalg.norm(others - matrix, axis=(1, 2)).min()
 
 
-def test_singular_matrices_still_give_a_rotation():
+def test_singular_matrices_have_a_nearest_rotation():
     for matrix in (np.zeros((3, 3)), np.diag([1.0, 1.0, 0.0]), np.diag([0.0, 2.0, 0.0])):
         rotation, stretch = nearest_rotations(matrix)
         assert np.linalg.det(rotation) == pytest.approx(1.0)
         assert_allclose(rotation @ stretch, matrix, atol=ROUNDING)
 
 
-def test_sampled_random_rotations_include_half_turns():
+def test_sampled_random_rotations_include_180_degrees():
     angles = angle_between(random_rotations(5_000, seed=1), np.eye(3))
     assert angles.max() > 3.1

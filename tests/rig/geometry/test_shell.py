@@ -1,4 +1,4 @@
-"""Closed surfaces: recognition of closed meshes, and the borders of openings."""
+"""Detection of closed meshes, and borders of openings."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_a_cube_is_closed() -> None:
     ],
     ids=["inwards", "inconsistent", "three at an edge", "open", "empty"],
 )
-def test_meshes_with_other_faults_are_not_closed(triangles) -> None:
+def test_meshes_with_other_errors_are_not_closed(triangles) -> None:
     assert shell_of(cube(triangles), None) is None
 
 
@@ -62,7 +62,7 @@ def test_mesh_with_an_inward_facing_part_is_not_closed() -> None:
     assert shell_of(cube(both, np.concatenate([CORNERS, CORNERS + 3.0])), None) is not None
 
 
-def test_small_opening_has_its_corners_as_border() -> None:
+def test_border_of_a_small_opening_consists_of_its_corners() -> None:
     mesh = fine_cube()
     opened = cube(mesh.triangles[1:], mesh.positions)
     shell = shell_of(opened, None)
@@ -73,7 +73,7 @@ def test_small_opening_has_its_corners_as_border() -> None:
 
 def test_seams_are_closed_if_their_vertices_move_together() -> None:
     mesh = fine_cube(2)
-    # 8 corners with 3 vertices each and 12 middles with 2 have 28 copies.
+    # 8 corners with 3 vertices each and 12 midpoints with 2 have 28 copies.
     shell = shell_of(mesh, None)
     assert shell is not None and len(shell.copies) == 28
     assert shell.is_closed(2.0 * mesh.positions)

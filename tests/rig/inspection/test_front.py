@@ -78,7 +78,7 @@ def test_real_figures_have_a_front_also_when_rotated(shared_data, names, front):
     assert fronts(found) == cycle(found.up, front)
 
 
-def test_people_facing_each_other_give_the_default_front(shared_data):
+def test_people_facing_each_other_have_the_default_front(shared_data):
     found = viewer.load(shared_data / "smpl_synthetic" / "easymocap")
     assert guess_front(found) == "-y"
 

@@ -117,7 +117,7 @@ def test_extrapolation_before_and_after_is_independent(before: str, after: str) 
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("keys", [[(2.0, 5.0)], [(2.0, 4.0), (2.0, 5.0)]])
-def test_keys_at_a_single_time_give_a_constant(mode: str, keys: list[tuple[float, float]]) -> None:
+def test_keys_at_a_single_time_are_constant(mode: str, keys: list[tuple[float, float]]) -> None:
     curve = channel([(t, v, "smooth", "linear") for t, v in keys], mode, mode)
     np.testing.assert_array_equal(evaluate(curve, np.array([-9.0, 2.0, 9.0])), 5.0)
 
@@ -219,7 +219,7 @@ def test_clip_refuses_an_invalid_range(start, end) -> None:
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_walk_has_the_published_values() -> None:
+def test_real_walk_has_the_published_values() -> None:
     """Section 10 of the format's specification."""
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     clip = scene.actors[0].clip

@@ -85,7 +85,7 @@ def test_key_added_with_a_value_is_smooth_and_keeps_other_tangent_rules() -> Non
 
 
 @pytest.mark.parametrize(("time", "index", "value"), [(-1.0, 0, -2.0), (3.5, 3, -4.0)])
-def test_key_added_outside_lies_on_the_extrapolation(time, index, value) -> None:
+def test_key_added_outside_is_on_the_extrapolation(time, index, value) -> None:
     # Linear extrapolation with the slopes at the ends: -2 and -4 per second.
     longer, found = add_key(channel((0, 1, 2), (0, 2, -2), "linear", ("linear",) * 2), time)
     assert found == index
@@ -151,7 +151,7 @@ def test_moved_keys_stop_at_unselected_keys(keys, dt, times) -> None:
     assert move_keys(channel(), keys, dt, 0.0).times.tolist() == times
 
 
-def test_moved_keys_leave_a_gap_where_there_is_room() -> None:
+def test_moved_keys_keep_a_minimum_gap_if_possible() -> None:
     assert move_keys(channel(), [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 2.75, 3]
     close = channel((0.0, 1.0, 1.1))
     assert move_keys(close, [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 1, 1.1]
@@ -179,7 +179,7 @@ def test_deleted_keys_lose_their_tangents() -> None:
     assert len(curve.times) == 3
 
 
-# Tangents, extrapolation, range
+# Tangents, extrapolation and range
 
 
 def test_tangents_change_on_one_side() -> None:
@@ -206,7 +206,7 @@ def test_range_is_ordered_and_channels_are_unchanged() -> None:
     assert (changed.start, changed.end) == (2.0, 5.0) and changed.channels is clip.channels
 
 
-def test_replacing_one_channel_keeps_the_other_objects() -> None:
+def test_replacing_one_channel_keeps_other_channel_objects() -> None:
     other = Channel(1, np.zeros(1), np.ones(1), (("flat", "flat"),))
     clip = Clip("c", (other, channel()), 0.0, 1.0)
     changed = with_channel(clip, 4, lambda old: delete_keys(old, [0]))
@@ -217,7 +217,7 @@ def test_replacing_one_channel_keeps_the_other_objects() -> None:
     assert more.channels[1].values.tolist() == [1.5]
 
 
-# Whole poses
+# Keys of whole poses
 
 
 def test_clip_of_a_pose_is_constant() -> None:
@@ -276,7 +276,7 @@ def test_keying_again_at_the_same_time_replaces_keys() -> None:
 # Frames
 
 
-def test_frames_become_keys_and_constant_dofs_one_key() -> None:
+def test_frames_are_converted_to_keys_and_constant_dofs_to_one_key() -> None:
     times = np.array([0.5, 0.75, 1.0])
     dofs = np.array([[1.0, 7.0], [2.0, 7.0], [4.0, 7.0]])
     clip = clip_from_frames("walk", dofs, times)
@@ -292,7 +292,7 @@ def test_frames_become_keys_and_constant_dofs_one_key() -> None:
     assert evaluate(smooth.channels[0], middle) == pytest.approx(1.5 + 0.25 * (4 - 6) / 8)
 
 
-def test_missing_frames_get_no_keys_and_the_range_stays() -> None:
+def test_missing_frames_get_no_keys_and_the_range_is_unchanged() -> None:
     times, dofs = np.arange(4.0), np.array([[0.0], [1.0], [9.0], [3.0]])
     clip = clip_from_frames("gap", dofs, times, present=np.array([False, True, False, True]))
     assert clip.channels[0].times.tolist() == [1.0, 3.0]

@@ -204,7 +204,7 @@ def test_keys_closer_than_a_nanosecond_are_at_one_time(mode, gap) -> None:
     np.testing.assert_array_equal(evaluate(curve, np.array([-1e30, 0.0, 1e38])), 3e38)
 
 
-def test_largest_numbers_in_files_stay_finite() -> None:
+def test_largest_numbers_in_files_have_finite_results() -> None:
     big = 3.4e38
     for mode in EXTRAPOLATIONS:
         curve = Channel(

@@ -62,7 +62,7 @@ def test_batched_matrices_match_each_pose():
     assert np.array_equal(worlds(joints, poses, rotations), found)
 
 
-def test_palettes_follow_the_shape():
+def test_palettes_depend_on_the_shape():
     figure = viewer.load(bundled_body()).actors[0].figure
     poses = []
     rng = np.random.default_rng(1)
@@ -107,7 +107,7 @@ def keyed(joints: Skeleton) -> Clip:
 
 
 @pytest.mark.parametrize("time", [-0.5, 0.0, 0.4, 2.0])
-def test_curves_pose_actors_together(time):
+def test_actors_with_keyed_curves_are_posed_together(time):
     joints = moving_skeleton()
     figure, clip = Figure("f", skeleton=joints), keyed(joints)
     actors = both_ways(
@@ -129,7 +129,7 @@ def captured(n_joints: int, rows=(0, 1, -1, 2), **parts) -> SampledClip:
 @pytest.mark.parametrize("interpolate", [False, True])
 @pytest.mark.parametrize("time", [-1.0, 0.0, 0.3, 0.5, 1.2, 1.5, 3.0])
 @pytest.mark.parametrize("kind", ["balls", "others"])
-def test_frames_pose_actors_together(kind, time, interpolate):
+def test_actors_with_frames_are_posed_together(kind, time, interpolate):
     rng = np.random.default_rng(3)
     if kind == "balls":
         dofs = [(joint, axis, 0.0) for joint in range(3) for axis in "xyz"]
@@ -149,11 +149,11 @@ def test_frames_pose_actors_together(kind, time, interpolate):
         time,
         interpolate,
     )
-    if time == 1.2 and not interpolate:  # some actors are in the gap, others are not
+    if time == 1.2 and not interpolate:  # some actors are in the gap
         assert {actor.is_present for actor in actors} == {True, False}
 
 
-def test_mixed_actors_are_all_posed():
+def test_actors_with_different_motions_are_all_posed():
     joints = moving_skeleton()
     first, second = Figure("a", skeleton=joints), Figure("b", skeleton=joints)
     layout = PointLayout("one", ("p",), np.zeros((0, 2)), [0])

@@ -1,4 +1,4 @@
-"""Joint positions without orientations, against world matrices."""
+"""Joint positions computed without orientations, compared with world matrices."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def test_positions_are_those_of_the_world_matrices(figure, frames, is_scaled):
     if is_scaled:
         frames = replace(frames, scales=np.random.default_rng(1).uniform(1, 2, (7, 6, 3)))
     expected = world_frames(figure, frames)[..., :3, 3]
-    # Rounding of products of up to three matrices with entries below 100.
+    # The tolerance covers rounding of products of up to three matrices with entries below 100.
     assert_allclose(joint_positions(figure, frames), expected, atol=1e-12)
 
 
-def test_quarter_turn_moves_the_child_to_the_side(figure, frames):
+def test_rotation_by_90_degrees_moves_the_child_to_the_side(figure, frames):
     half = np.sqrt(0.5)
     still = replace(
         frames,

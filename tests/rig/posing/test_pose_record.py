@@ -145,7 +145,7 @@ def test_joints_missing_in_the_vector_are_set_to_rest(family):
     assert not pose.dofs.any()
 
 
-def test_mano_accepts_a_hand_of_either_side(family):
+def test_mano_accepts_a_left_or_right_hand(family):
     wanted = np.random.default_rng(7).uniform(-0.5, 0.5, 45)
     found, notes = applied(family("mano"), parts={"left_hand_pose": wanted})
     assert_allclose(found[1:].ravel(), wanted, atol=1e-13)
@@ -293,7 +293,7 @@ def test_hand_of_another_length_is_refused(family):
     assert refusal(figure, **words) == "left_hand_pose: expected 45 numbers, found 12"
 
 
-def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
+def test_fingers_without_components_accept_only_rotation_vectors(tmp_path):
     none = {f"hands_{what}{side}": None for what in ("components", "mean") for side in "lr"}
     figure = family_figure("smplh", tmp_path, **none)
     wanted = np.random.default_rng(5).uniform(-0.5, 0.5, 45)
@@ -306,7 +306,7 @@ def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
     assert not found.any()
 
 
-def test_shape_and_expression_are_set_in_their_own_rows(family):
+def test_shape_and_expression_are_set_separately(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.shape_weights[:] = 9.0
@@ -380,7 +380,7 @@ def test_pose_record_round_trips(family, kind):
     assert pose_key(again) == pose_key(pose)
 
 
-def test_record_holds_labels_and_raw_pose_values(family):
+def test_record_contains_labels_and_raw_pose_values(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[3 * 4] = 0.5  # left knee about x

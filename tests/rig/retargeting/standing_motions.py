@@ -26,9 +26,8 @@ def smooth(x: np.ndarray) -> np.ndarray:
 def legs_to(
     path: np.ndarray, goals: dict[str, np.ndarray], pitches: dict[str, np.ndarray]
 ) -> np.ndarray:
-    """Return rotations relative to the T-pose, (N, J, 3, 3), whose ankles are at goals.
-
-    ``path``: of the hips, (N, 3). ``goals``: paths of the ankles, (N, 2), z and y.
+    """Return rotations relative to the T-pose, (N, J, 3, 3), that place the ankles at goals.
+    ``path``: positions of the hips, (N, 3). ``goals``: positions of the ankles, (N, 2), z and y.
     ``pitches``: rotations of the feet about x, radians.
     """
     vectors = np.zeros((len(path), len(NAMES), 3))
@@ -44,13 +43,14 @@ def legs_to(
 
 
 def jump() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return rotations, the path of the hips, and the height of the ankles above their rest."""
+    """Return rotations, the path of the hips, and the height of the ankles above rest."""
     flight = 2.0 * SPEED / GRAVITY
     times = np.arange(150) / RATE
     start = 1.1  # seconds: take-off
     crouch, low, push = -7.0, -30.0, 0.25
     after = times - start
-    # A quintic from the crouch at rest to the take-off with the speed and gravity of the flight.
+    # This quintic leads from the static crouch to the take-off with the speed and gravity of the
+    # flight.
     ends = np.array([low, 0.0, 0.0, -4.0, SPEED, -GRAVITY])
     powers = np.array([[0.0**k for k in range(6)], *(
         [k * 0.0 ** max(k - 1, 0) for k in range(6)],
@@ -79,9 +79,8 @@ def jump() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def kneel() -> tuple[np.ndarray, np.ndarray]:
-    """Return rotations and the path of the hips of somebody who kneels down on the right knee.
-
-    In the frames ``KNEELING``, the right foot points straight down and stands on its ball.
+    """Return rotations and the path of the hips of a person who kneels down on the right knee. In
+    the frames ``KNEELING``, the right foot points straight down and stands on its ball.
     """
     frames = np.arange(150)
     names = [NAMES.index(f"Right{part}") for part in ("UpLeg", "Leg", "Foot", "ToeBase")]
@@ -93,7 +92,8 @@ def kneel() -> tuple[np.ndarray, np.ndarray]:
     path = np.zeros((len(frames), 3))
     path[:, 1] = down * (5.0 + thigh - hip[1]) - 7.0 * (1.0 - down) * 0.2 - 1.0
     path[:, 2] = 0.0
-    # The knee is 5 cm above the ground below the hip; the foot hangs from the ankle to the ground.
+    # The knee is below the hip and 5 cm above the ground; the foot points from the ankle to the
+    # ground.
     high = ball[1] + foot
     back = hip[0] - np.sqrt(shin**2 - (high - 4.0) ** 2)
     goal = ankle + down[:, None] * (np.array([back, high]) - ankle)
@@ -105,7 +105,7 @@ def kneel() -> tuple[np.ndarray, np.ndarray]:
 
 
 def treadmill() -> tuple[np.ndarray, np.ndarray]:
-    """Return the walk of ``walking`` without its travel: standing feet move backwards."""
+    """Return the walk of ``walking`` without forward movement: standing feet move backwards."""
     rotations, path = walk()
     path = path.copy()
     path[:, 2] -= STRIDE * np.arange(len(path)) / 100.0

@@ -75,7 +75,7 @@ def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floa
 TOES = ("LeftToeBase_", "RightToeBase_")
 
 
-def test_standing_feet_stay_in_place_on_the_ground() -> None:
+def test_standing_feet_are_fixed_on_the_ground() -> None:
     found, clip, changes = planted()
     before, after = slid(OTHER, found.clip, TOES), slid(OTHER, clip, TOES)
     assert len(after) == 3 and np.max(before) > 1.0
@@ -134,7 +134,7 @@ def test_planting_does_not_depend_on_the_rest_pose_of_the_file() -> None:
         assert_allclose(first[name], second[name], atol=0.5)
 
 
-def test_figure_with_z_up_stands_on_the_ground_of_its_up_axis() -> None:
+def test_feet_of_a_figure_with_z_up_are_planted_on_its_ground() -> None:
     over = axis_rotations(0, np.asarray(np.pi / 2))
     joints = zip(parents(OTHER), rest_joints(OTHER), strict=True)
     table = dict(zip(OTHER.skeleton.names, joints, strict=True))

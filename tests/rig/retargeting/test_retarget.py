@@ -230,7 +230,7 @@ def test_source_with_a_different_front_at_rest_rotates_the_figure() -> None:
     np.testing.assert_allclose(bones(where, ("right_hip", "left_hip"))[0], [0, 0, -1], atol=EXACT)
 
 
-def test_humanoid_with_arbitrary_names_that_faces_backwards_walks_forwards() -> None:
+def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards() -> None:
     half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x
     bones = {VRM_BONES[name]: joint for joint, name in enumerate(BODY)}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body", half)
@@ -243,7 +243,7 @@ def test_humanoid_with_arbitrary_names_that_faces_backwards_walks_forwards() -> 
 
 def test_source_with_a_lying_rest_pose_stands_up_in_its_frames() -> None:
     down = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-    source = moving(figure_of(HIK, "mocap", down))  # y is up, yet the body lies along z
+    source = moving(figure_of(HIK, "mocap", down))  # y is up, but the body is along z
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     assert_same_limbs(source, figure, clip)

@@ -1,4 +1,4 @@
-"""Feet of driven figures in jumps, while kneeling, on treadmills, and on tilted soles."""
+"""Feet of driven figures during jumps, while kneeling, on treadmills, and with tilted soles."""
 
 from __future__ import annotations
 
@@ -47,7 +47,9 @@ def knee_angles(where: dict[str, Floats], side: str, tail: str) -> Floats:
 
 @pytest.mark.parametrize("figure", [OTHER, SHORT], ids=["long", "short"])
 @pytest.mark.parametrize("motion", ["jump", "kneel", "walk"])
-def test_no_joint_rotates_much_faster_and_no_knee_pops(figure: Figure, motion: str) -> None:
+def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(
+    figure: Figure, motion: str
+) -> None:
     rotations, path = {"jump": lambda: jump()[:2], "kneel": kneel, "walk": walk}[motion]()
     source = written(t_pose(), rotations, path, rate=RATE)
     clip, changes = plant_feet(retargeted(source, figure), figure)
@@ -56,7 +58,7 @@ def test_no_joint_rotates_much_faster_and_no_knee_pops(figure: Figure, motion: s
     for side in ("Left", "Right"):
         mine = largest_angles(own[:, [figure.skeleton.names.index(f"{side}{p}_") for p in JOINTS]])
         theirs = largest_angles(old[:, [NAMES.index(f"{side}{part}") for part in JOINTS]])
-        # An exactly still joint of the source has no angle to compare with.
+        # If a joint of the source is exactly static, there is no angle to compare with.
         assert (mine <= 1.5 * np.maximum(theirs, np.radians(1.0))).all()
         knees = [
             np.abs(np.diff(knee_angles(places(*moving), side, tail), 2)).max()
@@ -65,7 +67,7 @@ def test_no_joint_rotates_much_faster_and_no_knee_pops(figure: Figure, motion: s
         assert knees[0] <= 1.2 * knees[1]
 
 
-def test_a_jump_leaves_the_ground_and_lands_on_it() -> None:
+def test_jump_leaves_the_ground_and_lands_on_it() -> None:
     rotations, path, rise = jump()
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
@@ -74,11 +76,11 @@ def test_a_jump_leaves_the_ground_and_lands_on_it() -> None:
     for name in TOES:
         height = where[name][:, 1]
         assert_allclose(height[rise < 0.02], 0.0, atol=0.1)  # cm
-        # Flights are scaled by the ratio of the legs, as the path of the hips is.
+        # Flights are scaled by the ratio of the leg lengths, like the path of the hips.
         assert_allclose(height.max(), found.scale * rise.max(), rtol=0.15)
 
 
-def test_the_ball_of_a_foot_that_points_down_stands_on_the_ground() -> None:
+def test_ball_of_a_foot_that_points_down_is_on_the_ground() -> None:
     found = retargeted(written(t_pose(), *kneel(), rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert changes.gap_before > 1.0  # cm
@@ -87,7 +89,7 @@ def test_the_ball_of_a_foot_that_points_down_stands_on_the_ground() -> None:
     assert_allclose(np.ptp(ball[10:-10], axis=0), 0.0, atol=EXACT)
 
 
-def test_feet_on_a_treadmill_stand_as_on_the_ground() -> None:
+def test_feet_on_a_treadmill_are_held_as_on_the_ground() -> None:
     motions = [written(t_pose(), *parts, rate=RATE) for parts in (walk(), treadmill())]
     found = [retargeted(motion, OTHER) for motion in motions]
     (walked, first), (ran, second) = (plant_feet(each, OTHER) for each in found)
@@ -97,14 +99,14 @@ def test_feet_on_a_treadmill_stand_as_on_the_ground() -> None:
     assert (first.n_contacts, second.n_contacts) == (6, 6)
 
 
-def test_somebody_who_slides_along_has_no_moving_ground() -> None:
+def test_sliding_person_is_not_on_a_treadmill() -> None:
     rotations, path = treadmill()
     path[:, 2] -= 1.0 * np.arange(len(path))  # the body moves with the feet
     _, changes = plant_feet(retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER), OTHER)
     assert changes.n_contacts == 0 and changes.ground_speed == 0.0
 
 
-def test_soles_are_level_while_those_of_a_tilted_source_rest_on_the_ground() -> None:
+def test_soles_are_level_while_those_of_a_tilted_source_are_on_the_ground() -> None:
     rotations, path = walk()
     tilt = matrices(np.array([-0.12 * X + 0.05 * Y]))[0]  # the file's rest pose is inexact
     for side in ("Left", "Right"):
@@ -121,7 +123,7 @@ def test_soles_are_level_while_those_of_a_tilted_source_rest_on_the_ground() -> 
         assert_allclose(after[..., 1, 1], 1.0, atol=1e-9)
 
 
-def test_noise_of_standing_feet_is_not_passed_on_to_the_knees() -> None:
+def test_noise_of_standing_feet_does_not_affect_the_knees() -> None:
     rotations, path = walk()
     noise = matrices(np.random.default_rng(3).normal(scale=0.02, size=(len(path), 3)))
     for side in ("Left", "Right"):

@@ -107,7 +107,7 @@ def test_mirrored_normals_point_outward(method):
     found = sphere_on([mirror, np.eye(4)], [(0, 1.0)], method)
     outward = unit(DIRECTIONS @ np.linalg.inv(mirror[:3, :3]))
     assert_allclose(found, outward, atol=1e-13)
-    # The surface is convex around the origin, so its points lie in the direction of the normals.
+    # The surface is convex around the origin, so its points are in the direction of the normals.
     assert (np.einsum("va,va->v", found, DIRECTIONS @ mirror[:3, :3].T) > 0.0).all()
 
 

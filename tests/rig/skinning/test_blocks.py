@@ -14,7 +14,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, _blocks, deform, deform_frames, joint_matrices, lbs
 from viewer.rig.skinning._blocks import blocks_of
 
-ROUNDING = 2e-14  # sums of some ten terms of size 10
+ROUNDING = 2e-14  # for sums of about ten terms of size 10
 
 
 def random_skin(seed, n_vertices, n_joints, most=6):

@@ -96,7 +96,7 @@ def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
         assert np.hypot(*linear[1:]) == pytest.approx(np.cos(angle / 2))
 
 
-def test_half_turn_keeps_the_radius():
+def test_twist_of_180_degrees_keeps_the_radius():
     palette = [np.eye(4), matrix(np.diag([1.0, -1.0, -1.0]))]
     for point in ((0.3, 1.0, 0.0), (0.0, 0.6, 0.8)):
         moved, _ = move(point, [(0, 0.5), (1, 0.5)], palette)
@@ -155,7 +155,7 @@ def test_rotations_take_the_shorter_arc(angle):
         assert_allclose(moved, turn_y(angle + 0.2) @ [1, 2, 3], atol=ROUNDING)
 
 
-def test_chain_rotated_by_more_than_a_half_turn_blends_across_its_last_joint():
+def test_chain_rotated_by_more_than_180_degrees_blends_across_its_last_joint():
     # Ten joints of 50 degrees each: 450 and 500 degrees meet at 475.
     bones = skeleton([-1, *range(9)], [(joint, "z", np.radians(50)) for joint in range(10)])
     skin = bound([[(8, 0.5), (9, 0.5)]], 10)

@@ -66,7 +66,7 @@ def test_two_influences_result_in_the_weighted_mean():
     assert skinned([(0, 0.75), (1, 0.25)], palette)[0].tolist() == [[2.25, 2, 3]]
 
 
-def test_half_turn_collapses_to_the_axis():
+def test_twist_of_180_degrees_collapses_to_the_axis():
     palette = np.array([np.eye(4), matrix(np.diag([-1.0, -1.0, 1.0])), np.eye(4)])
     assert skinned([(0, 0.5), (1, 0.5)], palette)[0].tolist() == [[0, 0, 3]]
 

@@ -28,7 +28,7 @@ def skin(*influences) -> Skin:
     return skin_from_lists(influences, BIND)
 
 
-def test_strongest_come_first_and_ties_keep_their_order():
+def test_strongest_influences_are_first_and_ties_keep_their_order():
     mixed = skin([(0, 0.25), (3, 0.5), (1, 0.25), (2, 0.5)], [], [(5, -1.0), (4, 0.0)])
     assert rows(strongest_first(mixed)) == [
         [(3, 0.5), (2, 0.5), (0, 0.25), (1, 0.25)],
@@ -98,12 +98,12 @@ def test_limit_matches_a_plain_loop(count):
         assert [weight for _, weight in found] == sorted((w for _, w in found), reverse=True)
 
 
-def test_unsorted_entries_become_rows_in_the_order_of_entries():
+def test_unsorted_entries_are_converted_to_rows_in_the_order_of_entries():
     built = skin_from_entries(4, [2, 0, 2, 3, 0], [5, 1, 0, 2, 4], [0.1, 0.2, 0.3, 0.4, 0.5], BIND)
     assert rows(built) == [[(1, 0.2), (4, 0.5)], [], [(5, 0.1), (0, 0.3)], [(2, 0.4)]]
 
 
-def test_skin_that_needs_no_change_is_returned_itself():
+def test_skin_that_needs_no_change_is_returned_unchanged():
     stored = skin([(0, 0.5)])
     assert skin_used(stored, Skinning()) is stored
 

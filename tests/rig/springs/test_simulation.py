@@ -117,7 +117,7 @@ def test_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
         colliders=shape,
         obstacles=((0,),),
     )
-    # Joint 1 is a second root at the same place, which does not swing.
+    # Joint 1 is a second root at the same position, which does not swing.
     skeleton = skeleton_of(springs, (-1, -1), ((0, 1, 0), (0, 1, 0)))
     tails, _ = run(skeleton, 600)
     # The constant length pulls the point back into the sphere by less than gravity moves it in a

@@ -67,7 +67,7 @@ def test_cubic_rotations_are_normalised_after_interpolation():
     assert_array_equal(sample_transforms(clip, [0.5]).rotations[0, 0], [0, 0, 0, 1])
 
 
-def test_each_channel_holds_its_end_values_outside_its_range():
+def test_each_channel_keeps_its_end_values_outside_its_range():
     clip = clip_of(
         channel(0, "translation", [1.0], [[7.0, 8, 9]]),
         channel(1, "translation", [2.0, 3.0], [[0.0, 0, 0], [4, 0, 0]]),

@@ -115,7 +115,7 @@ class CountedJob:
     act : callable
         Gets a ``Report`` and returns messages about the result; may raise ViewerError.
     finish : callable, optional
-        Called in the frame loop if the job succeeded, to apply its result.
+        Applies the result of a successful job; called in the frame loop.
     """
 
     def __init__(

@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor
 
 __all__ = ["change_drive", "no_edit"]
 
-_SHORT = 1000  # frames of all people that are retargeted within a frame of the window
+_SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 
 
 def no_edit(state: AppState) -> str:

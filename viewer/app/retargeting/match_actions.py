@@ -1,4 +1,4 @@
-"""Edits of the joint match: the motion is retargeted immediately, and edits can be undone."""
+"""Edits of the joint match: each retargets the motion, and can be undone."""
 
 from __future__ import annotations
 

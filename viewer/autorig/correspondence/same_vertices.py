@@ -2,9 +2,9 @@
 
 If a vertex was moved along the surface, its closest point has interpolated weights, whereas the
 original vertex has the exact ones. A target's vertex is identified with a vertex of the template if
-each is the other's nearest, it moved along the surface by less than half the length of its edges,
-and nearly all of its edges correspond to edges of the template. A different tessellation of the
-same surface has very few such vertices.
+each is the nearest vertex to the other, it moved along the surface by less than half the length of
+its edges, and nearly all of its edges correspond to edges of the template. A different tessellation
+of the same surface has very few such vertices.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def at_vertices(
     used, first = np.unique(corners, return_index=True)
     place = np.full(len(places), -1)
     place[used] = first
-    rows = rows[place[same[rows]] >= 0]  # a vertex without triangles is not on the surface
+    rows = rows[place[same[rows]] >= 0]  # A vertex without triangles is not on the surface.
     at = place[same[rows]]
     triangles, barycentric = points.triangles.copy(), points.barycentric.copy()
     found, distances = points.positions.copy(), points.distances.copy()

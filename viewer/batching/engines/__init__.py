@@ -24,7 +24,7 @@ IN_FLIGHT = 4
 class Job(Protocol):
     """The job that is applied to each item: a callable that can be pickled.
 
-    It returns a result for any item, even for invalid input; see ``attempts.attempt``.
+    It returns a result for any item, even for invalid input; see ``execution.attempt``.
     """
 
     def __call__(self, item: Item) -> Result:

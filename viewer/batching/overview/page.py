@@ -223,8 +223,8 @@ def _texts(job: str, result: Result) -> list[str]:
         return texts + [f"{one['code']} {one['message']}" for one in findings]
     if job == "diff":
         return texts + mismatches_of(result)
-    told = [one["message"] for one in result.diagnostics if one.get("message") not in texts]
-    return texts + told
+    others = [one["message"] for one in result.diagnostics if one.get("message") not in texts]
+    return texts + others
 
 
 def _message(job: str, result: Result) -> str:

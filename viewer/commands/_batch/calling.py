@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from viewer.batching.attempts import FunctionJob
+from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
 from viewer.commands._batch.functions import identity_of

@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 
-from viewer.batching.attempts import attempt
+from viewer.batching.execution import attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.naming import filled
 from viewer.batching.worker import worker_rank

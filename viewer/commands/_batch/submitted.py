@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from viewer.batching.attempts import attempt
 from viewer.batching.engines import Job
+from viewer.batching.execution import attempt
 from viewer.batching.inputs import is_recording
 from viewer.batching.items import Item, Result
 from viewer.batching.submissions import Submission, is_archive, opened

@@ -1,4 +1,4 @@
-"""Conversion of a long ``.bvh`` to another, part by part, in memory that does not grow with it."""
+"""Conversion of a long ``.bvh`` file to another one, part by part, in constant memory."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ _SINGLE = ("hands", "pose", "shape", "expression", "dof", "mirror")
 def convert_streamed(
     arguments: argparse.Namespace, output: Path, skinning: Skinning
 ) -> list[Diagnostic] | None:
-    """Convert a long and regular file part by part; return the notes, and print warnings.
+    """Convert a long, regular file part by part; print warnings and return the notes.
 
     ``arguments``: arguments of ``convert``.
     ``output``: the requested file, which may be replaced.
-    ``skinning``: as requested.
-    Returns None, without output, if the files or options need another way. The file is then
-    unchanged.
+    ``skinning``: the requested method.
+    Returns None, and leaves the file unchanged, if the files or options need the whole motion in
+    memory.
     """
     if not _is_streamable(arguments, output):
         return None
@@ -88,9 +88,9 @@ def convert_streamed(
 
 
 def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
-    """Return whether the options can be applied to parts, and the names are of ``.bvh`` files."""
+    """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
     given = [name for name in (*_OTHERS, *_SINGLE) if getattr(arguments, name)]
-    # Frame 0 and time 0 are given too.
+    # Frame 0 and time 0 are values, too.
     given += [
         name for name in ("frame", "time", "model_path") if getattr(arguments, name) is not None
     ]
@@ -104,7 +104,7 @@ def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Request:
-    """A file that can be streamed, in the scene that it makes."""
+    """A file that can be streamed, and a scene with its figure."""
 
     stream: BvhStream
     settings: MotionSettings

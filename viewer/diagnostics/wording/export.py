@@ -228,6 +228,8 @@ PHRASES = {
     # Parts of a figure
     "part-blend-shapes": "{n:#blend shape}",
     "part-expressions": "{n:#expression} (combinations of morph targets, as in VRM)",
+    "part-toon": "toon shading of {n:#material} (unlit in the file)",
+    "part-material-binds": "changes of materials by {n:#expression}",
     "part-humanoid": "the humanoid bone map",
     "part-vrm-meta": "authors and licence of the VRM character",
     "part-springs": "{n:#spring chain}",

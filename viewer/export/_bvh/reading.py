@@ -52,7 +52,7 @@ class BvhFile:
     reference : int
         Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index of the animation's first frame in this motion; negative if that begins later.
+        Index of the animation's first frame in this motion; negative if the motion begins later.
     """
 
     motion: SkeletonMotion

@@ -117,7 +117,7 @@ class _Stream:
         self.losses = JointLosses(options.skinning, animation.n_frames)
 
     def _measure(self, n_first: int) -> None:
-        """Convert the frames that show which joints move."""
+        """Convert the frames that determine which joints are translated."""
         done = 0
         for part in self._animation.parts():
             report(done, self._animation.n_frames, "frames", "finding joints that move")

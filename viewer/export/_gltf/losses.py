@@ -202,6 +202,7 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
         lost.append(Phrase("part-blend-shapes", n=unused))
     if mixed and shape.baked is None and not is_vrm:
         lost.append(Phrase("part-expressions", n=mixed))
+    lost += [] if is_vrm else _lost_looks(figure)
     if skeleton is not None and skeleton.humanoid is not None and not is_vrm:
         lost.append(Phrase("part-humanoid"))
     if skeleton is not None and skeleton.springs is not None and not is_vrm:
@@ -216,6 +217,19 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))
     return not_held_note("glTF", lost)
+
+
+def _lost_looks(figure: Figure) -> list[Phrase]:
+    """Return toon shading, and changes of materials by expressions."""
+    shapes, found = figure.blend_shapes, list[Phrase]()
+    materials = () if figure.mesh is None else figure.mesh.materials
+    n_toon = sum(material.shade_color is not None for material in materials)
+    if n_toon:
+        found.append(Phrase("part-toon", n=n_toon))
+    if shapes is not None and shapes.material_binds is not None:
+        count = len(shapes.material_binds.n_materials)
+        found.append(Phrase("part-material-binds", n=count))
+    return found
 
 
 def _is_limited(skeleton: Skeleton) -> bool:

@@ -37,7 +37,7 @@ def add_record(document: Document, record: FileRecord, joints: list[int], name: 
 
 
 def merged_extras(given: list[tuple[str, Any]]) -> Any:
-    """Return the application data of a file: that of its figures, or a list of all if they differ.
+    """Return the application data of a file: that of all figures, or a list if these differ.
 
     ``given``: name and application data of each figure that has some.
 

@@ -126,8 +126,8 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
         joints = _farther(joints, np.sqrt(np.einsum("fja,fja->fj", off, off)), part)
         if search is not None:
             search.look(one, other, part)
-    worst = None if search is None else _told(search.worst)
-    return Apart(_told(joints), worst, len(rows), len(rows))
+    worst = None if search is None else _if_found(search.worst)
+    return Apart(_if_found(joints), worst, len(rows), len(rows))
 
 
 def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthest:
@@ -138,7 +138,7 @@ def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthe
     return Farthest(float(off[row, index]), int(index), int(frames[row]))
 
 
-def _told(found: Farthest) -> Farthest | None:
+def _if_found(found: Farthest) -> Farthest | None:
     return found if found.index >= 0 else None
 
 
@@ -208,7 +208,7 @@ def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least
     for row, other in zip(rows[chosen].tolist(), others[chosen].tolist(), strict=True):
         off = np.linalg.norm(_vertices(first, row) - _vertices(second, other), axis=1)
         worst = _farther(worst, off[None], np.array([row]))
-    return Apart(joints, _told(worst), count, len(rows))
+    return Apart(joints, _if_found(worst), count, len(rows))
 
 
 def _vertices(side: Side, row: int) -> Floats:

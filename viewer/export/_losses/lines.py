@@ -58,7 +58,7 @@ def driven_losses(
 
 
 class JointLosses:
-    """Largest error of a file without a mesh, of a figure without a mesh, part by part.
+    """Largest error of a file, found part by part; neither the figure nor the file has a mesh.
 
     The result is that of ``driven_losses``.
 
@@ -72,7 +72,7 @@ class JointLosses:
         self._worst: Farthest | None = None
 
     def look(self, part: SampledAnimation, written: Side, shape: Floats) -> None:
-        """Compare the next frames: all of one part, with those in the file."""
+        """Compare all frames of the next part with those in the file."""
         figure, frames = part.figure, part.frames
         rows = np.arange(frames.n_frames)
         expected = figure_side(figure, frames, self._how, shape)

@@ -81,7 +81,7 @@ def _transformed(
 
     ``shapes``: blend shapes that are kept.
     ``pose``, ``local``: its rest pose, and the local matrices of the joints.
-    ``matrix`` (4, 4), ``scale``: the whole transform, and the scale in it.
+    ``matrix`` (4, 4), ``scale``: the whole transform, and the scale that it contains.
     """
     skeleton, turn = figure.require_skeleton(), matrix[:3, :3] / scale
     roots = skeleton.parents < 0

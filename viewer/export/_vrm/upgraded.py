@@ -39,61 +39,61 @@ _SAME = 1e-6
 def upgraded(
     figure: Figure, record: VrmRecord, bones: Mapping[str, int]
 ) -> tuple[Figure, VrmRecord, list[str]]:
-    """Return a figure that faces +z, with an end joint for each spring chain, and its record.
+    """Return a figure that faces +z and has an end joint for each spring chain, and its record.
 
     ``record``: of a VRM 0.x file.
     ``bones``: joint of each human bone.
-    Returns also the members that VRM 1.0 has no counterpart for.
+    Also returns the members without a counterpart in VRM 1.0.
     """
-    told, lost = part(record.extensions, "VRM"), list[str]()
+    data, lost = part(record.extensions, "VRM"), list[str]()
     swinging = figure.require_skeleton().springs
     front, record = with_ends(facing_front(figure, bones), record, swinging)
     character = {
         "specVersion": "1.0",
-        "meta": upgraded_meta(part(told, "meta"), record, figure.name, lost),
-        "humanoid": _humanoid(told, lost),
+        "meta": upgraded_meta(part(data, "meta"), record, figure.name, lost),
+        "humanoid": _humanoid(data, lost),
     }
-    views = _views(told, record)
+    views = _views(data, record)
     character |= {"firstPerson": {"meshAnnotations": views}} if views else {}
-    character |= _gaze(told, lost)
-    expressions = upgraded_expressions(told, record, lost)
+    character |= _gaze(data, lost)
+    expressions = upgraded_expressions(data, record, lost)
     character |= {"expressions": expressions} if expressions else {}
     extensions: dict[str, Any] = {"VRMC_vrm": character}
-    springs = upgraded_springs(part(told, "secondaryAnimation"), front, record, lost)
+    springs = upgraded_springs(part(data, "secondaryAnimation"), front, record, lost)
     extensions |= {"VRMC_springBone": springs} if springs else {}
-    toon = upgraded_toon(listed(told, "materialProperties"), record.toon, lost)
+    toon = upgraded_toon(listed(data, "materialProperties"), record.toon, lost)
     return front, replace(record, version=1, extensions=extensions, toon=toon), lost
 
 
-def _humanoid(told: Any, lost: list[str]) -> dict[str, Any]:
+def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
     """Return the human bones; Unity's settings of muscles have no counterpart."""
     bones: dict[str, Any] = {}
-    for each in listed(told, "humanoid", "humanBones"):
+    for each in listed(data, "humanoid", "humanBones"):
         bone = part(each, "bone")
         if isinstance(bone, str):
             bones.setdefault(modern_bone(bone), {"node": part(each, "node")})
             if part(each, "useDefaultValues") is False:
                 lost.append(f"humanoid.{bone}")
     for name, default in _MUSCLES.items():
-        value = part(told, "humanoid", name)
+        value = part(data, "humanoid", name)
         if isinstance(value, int | float) and abs(value - default) > _SAME:
             lost.append(f"humanoid.{name}")
     return {"humanBones": bones}
 
 
-def _views(told: Any, record: VrmRecord) -> list[Any]:
-    """Return the annotations of nodes from those of meshes."""
+def _views(data: Any, record: VrmRecord) -> list[Any]:
+    """Return annotations of nodes, made from those of meshes."""
     found = []
-    for each in listed(told, "firstPerson", "meshAnnotations"):
+    for each in listed(data, "firstPerson", "meshAnnotations"):
         view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
         nodes = [node for node, mesh in record.meshes.items() if mesh == part(each, "mesh")]
         found += [{"node": node, "type": view} for node in nodes]
     return found
 
 
-def _gaze(told: Any, lost: list[str]) -> dict[str, Any]:
+def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
     """Return the gaze; its ranges are linear in version 1.0."""
-    first = part(told, "firstPerson")
+    first = part(data, "firstPerson")
     if not isinstance(first, dict):
         return {}
     is_bone = str(first.get("lookAtTypeName", "Bone")).lower() == "bone"
@@ -110,7 +110,7 @@ def _gaze(told: Any, lost: list[str]) -> dict[str, Any]:
         gaze[f"rangeMap{name}"] = {key: value for key, value in scale.items() if value is not None}
         if given.get("curve") not in (None, _STRAIGHT):
             lost.append(f"firstPerson.lookAt{name}.curve")
-    bones = listed(told, "humanoid", "humanBones")
+    bones = listed(data, "humanoid", "humanBones")
     heads = [part(each, "node") for each in bones if part(each, "bone") == "head"]
     if first.get("firstPersonBone", -1) not in (-1, *heads):
         lost.append("firstPerson.firstPersonBone")

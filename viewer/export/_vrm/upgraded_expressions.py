@@ -3,22 +3,17 @@
 ::
 
     blendShapeGroups  name, presetName, isBinary, binds (mesh, index, weight in percent),
-                      materialValues (materialName, propertyName, targetValue of 4 numbers)
-
-Colours are sRGB, except those of emission. ``_MainTex_ST`` has the scale and the offset of texture
-coordinates whose origin is at the bottom; ``_MainTex_ST_S`` and ``_MainTex_ST_T`` change only one
-axis.
+                      materialValues, see ``viewer.formats._vrm.material_values``
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-from viewer.export._vrm.upgraded_toon import main_transform
 from viewer.formats._vrm.json_parts import listed, part
-from viewer.formats._vrm.material_values import COLORS, linear_color
-from viewer.formats._vrm.numbers import rows_of
+from viewer.formats._vrm.material_values import old_binds
 from viewer.rig.file_record import VrmRecord
+from viewer.rig.materials.material_binds import TRANSFORM
 
 __all__ = ["upgraded_expressions"]
 
@@ -29,7 +24,6 @@ _PRESETS = {
     **{"blink": "blink", "blink_l": "blinkLeft", "blink_r": "blinkRight"},
     **{f"look{way.lower()}": f"look{way}" for way in ("Up", "Down", "Left", "Right")},
 }
-_AXES = {"_MainTex_ST": (0, 1), "_MainTex_ST_S": (0,), "_MainTex_ST_T": (1,)}
 
 
 def upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict[str, Any]:
@@ -77,26 +71,17 @@ def _binds(told: dict[str, Any], record: VrmRecord) -> list[Any]:
 
 def _material_binds(told: dict[str, Any], materials: list[Any], lost: list[str]) -> dict[str, Any]:
     """Return the binds of colours and of texture transforms."""
-    colors, moves = list[Any](), dict[int, Any]()
-    for each in listed(told, "materialValues"):
-        name, value = part(each, "propertyName"), rows_of(part(each, "targetValue"), (0.0,) * 4)
-        named = part(each, "materialName")
-        owners = [n for n, material in enumerate(materials) if part(material, "name") == named]
-        if value is None or not owners or (name not in COLORS and name not in _AXES):
-            lost.append(f"materialValues {named} {name}")
-            continue
-        for owner in owners:
-            if name in COLORS:
-                target = linear_color(name, value).tolist()
-                kind = COLORS[name]
-                colors.append({"material": owner, "type": kind, "targetValue": target})
-                continue
-            move = moves.setdefault(owner, main_transform(materials[owner]))
-            for axis in _AXES[name]:
-                scale, offset = float(value[axis]), float(value[2 + axis])
-                move["scale"][axis] = scale
-                move["offset"][axis] = 1.0 - offset - scale if axis else offset
-    found: dict[str, Any] = {"materialColorBinds": colors} if colors else {}
-    if moves:
-        found["textureTransformBinds"] = [{"material": n, **move} for n, move in moves.items()]
-    return found
+    binds, unknown = old_binds(told, materials)
+    lost += [f"materialValues {each}" for each in unknown]
+    colors = [
+        {"material": owner, "type": kind, "targetValue": value.tolist()}
+        for owner, kind, value in binds
+        if kind != TRANSFORM
+    ]
+    moves = [
+        {"material": owner, "scale": value[:2].tolist(), "offset": value[2:].tolist()}
+        for owner, kind, value in binds
+        if kind == TRANSFORM
+    ]
+    named = {"materialColorBinds": colors, "textureTransformBinds": moves}
+    return {name: rows for name, rows in named.items() if rows}

@@ -29,15 +29,15 @@ _LICENCES = {
 }
 
 
-def upgraded_meta(told: Any, record: VrmRecord, name: str, lost: list[str]) -> dict[str, Any]:
+def upgraded_meta(data: Any, record: VrmRecord, name: str, lost: list[str]) -> dict[str, Any]:
     """Return the meta data; permissions that version 0.x does not have keep their defaults.
 
-    ``told``: meta data of version 0.x.
-    ``record``: of the file, whose textures have the thumbnail.
-    ``name``: name of a character without one.
+    ``data``: meta data of version 0.x.
+    ``record``: that of the file, whose textures include the thumbnail.
+    ``name``: used if the meta data has none.
     ``lost``: extended by the members without a counterpart.
     """
-    given = told if isinstance(told, dict) else {}
+    given = data if isinstance(data, dict) else {}
     texts = {key: value for key, value in given.items() if isinstance(value, str) and value.strip()}
     meta: dict[str, Any] = {"name": texts.get("title", name)}
     author = texts.get("author")

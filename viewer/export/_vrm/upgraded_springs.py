@@ -1,7 +1,7 @@
 """Spring bones of VRM 0.x as those of VRM 1.0.
 
 In version 0.x all joints below a bone swing, each towards its first child, and the last one towards
-a point 7 cm further. In version 1.0 a chain is a list of joints, whose last one only ends it.
+a point 7 cm further. In version 1.0 a chain is a list of joints; the last one only ends it.
 """
 
 from __future__ import annotations
@@ -26,11 +26,11 @@ _DOWN = {"x": 0.0, "y": -1.0, "z": 0.0}
 def with_ends(
     figure: Figure, record: VrmRecord, springs: Springs | None
 ) -> tuple[Figure, VrmRecord]:
-    """Return a figure with an end joint below each last joint of a chain, and its record.
+    """Return a figure with an end joint below the last joint of each chain, and its record.
 
-    The record refers to end joints by nodes that the file does not have.
+    In the record, the nodes of end joints are additional to those of the file.
 
-    ``springs``: of the figure as read; they have the points that swing.
+    ``springs``: those of the figure as read, which include the swinging points.
     """
     skeleton = figure.require_skeleton()
     children = _children(record.joints, skeleton.parents)
@@ -52,7 +52,7 @@ def with_ends(
 
 
 def _extended(figure: Figure, tails: Mapping[int, Floats]) -> Figure:
-    """Return a figure with further joints below some joints, at these places."""
+    """Return a figure with an additional joint below each of these, at these positions."""
     skeleton, count, skin = figure.require_skeleton(), len(tails), figure.skin
     more = replace(
         skeleton,
@@ -91,21 +91,21 @@ def _paths(start: int, children: Mapping[int, list[int]]) -> Iterator[list[int]]
 
 
 def upgraded_springs(
-    told: Any, figure: Figure, record: VrmRecord, lost: list[str]
+    data: Any, figure: Figure, record: VrmRecord, lost: list[str]
 ) -> dict[str, Any]:
     """Return ``VRMC_springBone``; empty if there are no springs.
 
-    ``told``: ``secondaryAnimation``.
+    ``data``: ``secondaryAnimation``.
     ``figure``, ``record``: from ``with_ends``.
-    ``lost``: extended by chains that have no joint in the figure.
+    ``lost``: extended by the chains whose first joint the figure does not have.
     """
     parents = figure.require_skeleton().parents
     children = _children(record.joints, parents)
     nodes = {joint: node for node, joint in record.joints.items()}
-    colliders, groups, places = _colliders(told)
+    colliders, groups, places = _colliders(data)
     springs = []
-    for group in listed(told, "boneGroups"):
-        shared = _shared(group, places, len(listed(told, "colliderGroups")))
+    for group in listed(data, "boneGroups"):
+        shared = _shared(group, places, len(listed(data, "colliderGroups")))
         for bone in listed(group, "bones"):
             if not isinstance(bone, int) or bone not in record.joints:
                 lost.append(f"secondaryAnimation.boneGroups.bones {bone}")
@@ -140,10 +140,10 @@ def _swing(group: Any) -> dict[str, Any]:
     return {**found, "gravityDir": [0.0 - x, y, z]}
 
 
-def _colliders(told: Any) -> tuple[list[Any], list[Any], dict[int, int]]:
+def _colliders(data: Any) -> tuple[list[Any], list[Any], dict[int, int]]:
     """Return the colliders, their groups, and the new place of each group that is not empty."""
     colliders, groups, places = list[Any](), list[Any](), dict[int, int]()
-    for index, each in enumerate(listed(told, "colliderGroups")):
+    for index, each in enumerate(listed(data, "colliderGroups")):
         own = []
         for sphere in listed(each, "colliders"):
             x, y, z = (part(sphere, "offset", axis) or 0.0 for axis in "xyz")

@@ -68,7 +68,7 @@ def open_archive(source: Source) -> Archive:
 
 
 def _pickle_data(source: Source) -> Data:
-    """Return the bytes of a pickle; those of a large file are read on demand."""
+    """Return the bytes of a pickle; the bytes of a large file are read on demand."""
     from viewer.formats._archive.stored_file import StoredFile
 
     if source._data is None:

@@ -1,8 +1,8 @@
 """Part-by-part reading of long ``.bvh`` files, in memory that does not depend on their length.
 
-A file can be streamed if it is regular: all frames are declared, each is on a line of its own, and
-there is nothing to report about them. Any other file must be read as a whole by ``bvh.read``, which
-finds and reports all errors.
+A file can be streamed if it is regular: the number of frames is declared, each frame has its own
+line, and there is nothing to report about the frames. Any other file must be read as a whole by
+``bvh.read``, which finds and reports all errors.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["BvhStream", "Irregular", "open_stream"]
 
-_HEAD = 1 << 20  # bytes that must contain the hierarchy
-_PART = 1 << 19  # bytes that are parsed at once, plus the rest of the last line
-_LONGEST = 1 << 24  # bytes of a line
+_HEAD = 1 << 20  # maximum number of bytes up to the end of the hierarchy
+_PART = 1 << 19  # bytes per part, which is extended to the end of its last line
+_LONGEST = 1 << 24  # maximum length of a line, bytes
 _MARK = b"\xef\xbb\xbf"  # byte order mark, which Source removes
 
 
-class Irregular(Exception):  # noqa: N818 - it is no error
-    """The file must be read as a whole."""
+class Irregular(Exception):  # noqa: N818 - it is not an error
+    """Raised if a file is not regular, so that it must be read as a whole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,7 @@ class BvhStream:
         Offset of the first frame in the file.
     motion : SkeletonMotion
         The skeleton, with the few frames that the estimates need. The timing of its clip has all
-        frames, each with the row of one of these.
+        frames, each of which refers to the row of one of these few.
     """
 
     path: Path
@@ -83,7 +83,8 @@ class BvhStream:
     def clips(self, first: int, stop: int) -> Iterator[SampledClip]:
         """Yield a range of frames as clips of consecutive parts, each starting at 0 seconds.
 
-        Raises Irregular if any part of the file is invalid, also after parts have been yielded.
+        Raises Irregular if any part of the file is invalid, even if parts have already been
+        yielded.
         """
         clip, count, is_zero = self.motion.clip, 0, True
         for part in _parts(self.path, self.start):

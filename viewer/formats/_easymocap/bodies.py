@@ -165,7 +165,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return the timing of the kept rows; the person is absent in all other frames."""
+        """Return the timing of the valid rows; the person is absent in all other frames."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]

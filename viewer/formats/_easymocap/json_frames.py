@@ -61,7 +61,7 @@ class RecordError(MisfitError):
 
 
 class _RepeatedKeyError(ValueError):
-    """Error about an object with a repeated key; its text is the key."""
+    """Error about an object with a repeated key, which is the error's text."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:

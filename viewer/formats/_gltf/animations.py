@@ -34,7 +34,7 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     """Return the animations that are valid, except for keys that are read later.
 
     An invalid animation is omitted with a warning. The keys of the first one are read, because it
-    is played by default; if errors are kept, all keys are read.
+    is played by default; if errors are only recorded, all keys are read.
     """
     table = document.table("animations")
     unused = _Unused()

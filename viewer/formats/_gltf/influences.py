@@ -42,7 +42,7 @@ def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None,
 
 
 def _finite(attributes: Attributes, number: int, weights: Floats) -> Floats:
-    """Return weights; non-finite ones become 0 if errors are kept, else raise FormatError."""
+    """Return weights; non-finite ones are errors, and become 0 if errors are only recorded."""
     bad = ~np.isfinite(weights)
     if bad.any():
         row, column = (int(axis[0]) for axis in np.nonzero(bad))

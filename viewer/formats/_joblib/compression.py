@@ -43,7 +43,7 @@ class _Unpacker(Protocol):
 
 
 class _Zlib:
-    """The decompressor of zlib with the interface of those of bz2 and lzma."""
+    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
 
     def __init__(self, window: int) -> None:
         self._inner = zlib.decompressobj(window)

@@ -22,7 +22,7 @@ _SIZES = {3: "triangle", 4: "quad"}
 def filled_normals(
     source: Source, normals: Floats | None, positions: Floats, triangles: Ints
 ) -> Floats:
-    """Return a normal for every vertex: that of the file, or a computed one.
+    """Return a normal for every vertex, from the file or computed.
 
     Parameters
     ----------

@@ -122,7 +122,7 @@ class _Grouping:
         return order + _preorder(self.tree, sorted(more - set(tops)))
 
     def _skins(self) -> list[int]:
-        """Return the skins of the meshes, then others whose joints are all in the scene."""
+        """Return the skins of the meshes, then other skins whose joints are all in the scene."""
         used = dict.fromkeys(int(self.tree.skins[node]) for node in self.mesh_nodes)
         used.pop(-1, None)
         rest = (n for n in range(len(self.file.skins)) if n not in used)
@@ -213,7 +213,7 @@ class _Grouping:
         return None
 
     def _merge(self, keys: list[tuple[str, int]]) -> None:
-        """Merge figures into the first of them."""
+        """Merge figures into the first one."""
         into, wanted = self.figures[keys[0]], self.wanted[keys[0]]
         for key in keys[1:]:
             figure = self.figures.pop(key)

@@ -46,8 +46,8 @@ class Machine:
     depth : int
         Number of pickles that contain this one.
     persistent, load_bytes : callable or None
-        Return the value of a persistent id, and that of torch's storages saved as bytes; None if
-        the file must not contain any.
+        Functions that return the value of a persistent id, and the value of torch's storages saved
+        as bytes; None if the file must not contain these.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Machine:
             raise self.fail(Phrase("pickle-steps", most=self._most))
 
     def nested(self, data: Data, start: int, end: int) -> Machine:
-        """Return a machine for a pickle inside this one, which continues its budget.
+        """Return a machine for a pickle inside this one; it continues with the same budget.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Arrays of a PIG model, read from a folder of text tables or an archive with the same checks."""
+"""Arrays of a PIG model, read from text tables or an archive with the same checks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Part:
     name : str
         File name or key, for messages.
     values : (N, columns)
-        Numbers; of a sparse matrix (joint, vertex, weight) rows.
+        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
     source : Source
         The file, which records errors.
     offset_of : callable or None
@@ -138,7 +138,7 @@ def _from_folder(source: Source) -> PigFiles:
 def _text_part(source: Source, name: str, columns: int) -> Part:
     rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
     if name not in CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # an incomplete array cannot be used
+        rows = rows[:0]  # An incomplete array cannot be used.
     return Part(f"{name}.txt", rows, source, offset_of)
 
 

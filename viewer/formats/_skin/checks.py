@@ -24,14 +24,15 @@ __all__ = [
     "unbound_skin",
 ]
 
-WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums farther from 1 cause a warning
+# Tolerance of the format for sums of weights; larger deviations from 1 cause a warning.
+WEIGHT_TOLERANCE = 0.01
 _SINGULAR = 1e-12  # minimum determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # maximum condition number
 _FAR = 1e6  # multiple of the median distance beyond which a vertex is stray
 
 
 def even_counts(source: Source, sections: Sections) -> None:
-    """Refuse sections whose number of vertices differs from that of the positions.
+    """Refuse sections whose number of vertices differs from the number of positions.
 
     If all other sections agree, the positions are assumed to be wrong.
     """

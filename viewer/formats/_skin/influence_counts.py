@@ -25,7 +25,7 @@ def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
     size = len(values)
     if count == 0:
         return None if size else np.zeros(0, np.int32)
-    # There are two extra positions, the end of the block and one beyond it; both map to the latter.
+    # There are two extra positions, the end of the block and one beyond it; both map to the second.
     kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
     after = np.full(size + 2, size + 1, dtype=kind)
     counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)

@@ -1,6 +1,6 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
-It has a count for each vertex, followed by that many pairs of joint and weight. Valid numbers are
+It has a count for each vertex, followed by as many pairs of joint and weight. Valid numbers are
 parsed together; otherwise every word is examined, and an unreadable vertex gets no influence.
 """
 

@@ -133,8 +133,8 @@ def _nearest(
 def _placed(numbers: Words, exponents: Indices, decimals: Indices, most: int, least: int) -> Digits:
     """Place the point in numbers * 10^-decimals.
 
-    ``exponents`` are those of the first digits; from -4 to below ``most``, no exponent is written.
-    ``least`` is the number of decimals of integers.
+    ``exponents`` are the exponents of the first digits; from -4 to below ``most``, no exponent is
+    written. ``least`` is the number of decimals of integers.
     """
     exponents = np.where(numbers == 0, 0, exponents)
     numbers, decimals = _stripped(numbers, decimals)

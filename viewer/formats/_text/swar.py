@@ -77,7 +77,7 @@ def digits_only(words: Words, lengths: Indices) -> Words:
 
 
 def first_of(words: Words, letters: np.uint64) -> Words:
-    """Return the top bit of the first character that equals that of ``letters``, or 0."""
+    """Return the top bit of the first character that matches its counterpart in ``letters``."""
     x = words ^ letters
     zero = ~(((x & _LOW7) + _LOW7) | x | _LOW7)
     return zero & (~zero + _U(1))

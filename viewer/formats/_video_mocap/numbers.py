@@ -37,11 +37,11 @@ Frames = np.ndarray[Any, np.dtype[np.int64]]
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
 _MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")
-_SMALLEST = 1e-3  # minimum determinant; that of a rotation is 1, of a missing one 0
+_SMALLEST = 1e-3  # minimum determinant; a rotation has 1, a missing rotation 0
 
 
 class RowBudget:
-    """Counter of the frames of all people, which dicts that share arrays multiply."""
+    """Limit of the number of frames of all people, which dicts that share arrays could multiply."""
 
     def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
         self._archive, self._most, self._left = archive, most, most
@@ -122,7 +122,7 @@ def frames_of(archive: Archive, key: str, count: int) -> Frames:
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
     """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
 
-    Single precision leaves matrices that are not exactly orthogonal; the nearest rotation is used.
+    Matrices in single precision are not exactly orthogonal; the nearest rotation is used.
 
     Raises
     ------

@@ -66,7 +66,7 @@ _PEOPLE = ("person_id", "track_id", "tracklet_id", "person", "pid", "id")
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _LARGEST = 1 << 30  # maximum number of a frame or person
 _DEEPEST = 3  # maximum depth of dicts inside dicts
-_COST = 20  # frames; inspecting a dict takes about as long as reading this many
+_COST = 20  # number of frames that take about as long to read as one dict takes to inspect
 _LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
 _LISTED = 12  # maximum number of ignored keys that are listed
 
@@ -94,7 +94,7 @@ def recognises(archive: Archive) -> bool:
         budget = RowBudget(archive, _COST * _LOOKED_AT)
         try:
             return next(_found(archive, budget), None) is not None
-        except FormatError:  # there are thousands of dicts without poses
+        except FormatError:  # There are thousands of dicts without poses.
             return False
     is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
     return not is_plain or layout.place in _CAMERA or bool(layout.frames)
@@ -223,7 +223,7 @@ def _people(
 def _people_of_frames(
     source: Source, found: list[tuple[Archive, _Layout]], tracks: list[Track]
 ) -> dict[int, Track]:
-    """Return the people of single frames, by their numbers or else by how often a frame occurs."""
+    """Return the people of single frames; without numbers, they are counted within each frame."""
     persons = [_number(archive, layout.person) for archive, layout in found]
     known = [person for person in persons if person is not None and person >= 0]
     if len(known) < len(tracks):
@@ -284,7 +284,7 @@ def _width(shape: Floats | None) -> int:
 def _joined(tracks: list[Track]) -> Track:
     """Return the frames of one person, each of which is a separate dict.
 
-    Frames keep their numbers if all are different; else they are in the given order.
+    The numbers of frames are used if all are different; otherwise frames are in the given order.
     """
     numbers = np.concatenate([track.frames for track in tracks])
     frames, order = np.unique(numbers, return_index=True)

@@ -6,8 +6,8 @@
                       size (height, width), smpl {global_orient (1, 3, 3), body_pose (23, 3, 3),
                       betas (10,)}; bbox, mask, 3d_joints … are not read
 
-SMPL in the camera's space, with ``camera`` as its translation. Trackers keep lost people for a
-while: they are listed in ``tid``, but ``tracked_time`` counts the frames since they were last seen.
+SMPL in the camera's space, with ``camera`` as its translation. Trackers continue to list lost
+people in ``tid`` for a while, but ``tracked_time`` counts the frames since they were last seen.
 """
 
 from __future__ import annotations

@@ -78,7 +78,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cameras:
-    """The camera of a video, in each of its frames: pixel K (R X + T), as for ``CameraView``.
+    """The camera of a video, in each of its frames: K (R X + T) in pixels, as for ``CameraView``.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Results:
     model : str
         The member of the SMPL family, or ``"MHR"``; empty if there are no bodies.
     people : mapping of space to {person: Track}
-        ``"world"`` and ``"camera"``, or the one that the file has; the first is the default.
+        ``"world"`` and ``"camera"``, or only the space that the file has; the first is the default.
     ups : mapping of space to axis
         The axis that points up; empty if it is unknown.
     cameras : mapping of space to Cameras

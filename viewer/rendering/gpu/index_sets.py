@@ -27,7 +27,7 @@ _CURVE_BITS = 10  # bits per axis
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles with one material, and of one part until runs are merged.
+    """Consecutive triangles of one material, and of one part until runs are merged.
 
     First index, number of indices, surface, and part; -1 for several or none.
     """

@@ -69,7 +69,7 @@ class JointMarks:
 
     @property
     def bones(self) -> tuple[Ints, Ints]:
-        """Shown joints with a parent, and these parents: (N,) and (N,)."""
+        """Shown joints with a parent, and their parents: (N,) and (N,)."""
         parents, shown = shown_parents(self.skeleton), shown_joints(self.skeleton)
         children = shown[parents[shown] >= 0]
         return children, parents[children]

@@ -87,7 +87,7 @@ class SkeletonBuffers:
             return
         skeleton = shaped_skeleton(self.figure, pose.shape_weights)
         are_boxes = self.style(options) == "boxes"
-        # Bones need the matrices of all joints, as they reach from one joint to another.
+        # Bones reach from one joint to another, so they need the matrices of all joints.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
         self._key = pose.skinning_key, are_boxes
 
@@ -100,7 +100,7 @@ class SkeletonBuffers:
 
 
 class JointPass:
-    """Draws skeletons.
+    """Pass that draws skeletons.
 
     Parameters
     ----------
@@ -155,7 +155,7 @@ class JointPass:
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
         if opacity < 1.0:
-            # Only the nearest parts are drawn: the others would show through.
+            # Only the nearest parts are drawn, as the others would show through.
             draw_nearest(self.context, draw)
         else:
             draw()

@@ -31,7 +31,7 @@ class CameraImages(Protocol):
         """
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
-        """Return the width and height of a camera's images, pixels; None if it has none."""
+        """Return the width and height of a camera's images, pixels; None if it has no images."""
 
     def notes_of(self, camera: str) -> list[str]:
         """Return messages about a camera's missing or unusable images, one line each."""

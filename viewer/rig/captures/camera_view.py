@@ -66,7 +66,7 @@ class CameraView:
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     motion : CameraMotion or None
-        Its placement over time if it moves; the fields above are then those of the first frame.
+        Its placement over time if it moves; the fields above then apply to the first frame.
     """
 
     name: str

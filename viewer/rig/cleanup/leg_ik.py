@@ -43,9 +43,9 @@ def bend(
 ) -> tuple[Floats, Floats]:
     """Return the rotations of thigh and shin that bring the ankle to a target.
 
-    The shin rotates about the normal of the leg's plane until the distance from hip to ankle is
-    that of the target (law of cosines). Then the whole leg rotates about the hip by the smallest
-    angle that points it at the target, so the knee keeps its direction.
+    The shin rotates about the normal of the leg's plane until the distance from hip to ankle equals
+    the target's (law of cosines). Then the whole leg rotates about the hip by the smallest angle
+    that points it at the target, so the knee keeps its direction.
 
     Parameters
     ----------

@@ -1,7 +1,8 @@
 """Smooth curves through weighted targets: discrete smoothing splines (Whittaker 1923).
 
 A curve c minimises sum(w (c - t)^2) + s^4 sum((c[k - 1] - 2 c[k] + c[k + 1])^2). Where the weights
-are 1 and the targets 0, it decays within a few s rows. Its slope never changes suddenly.
+are 1 and the targets 0, it decays within a few multiples of s rows. Its slope never changes
+suddenly.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def smooth_curves(targets: Floats, weights: Floats, span: float) -> Floats:
         matrix = _diagonal_block(main[:, rows], next_[rows], second[rows])
         sums = right[:, rows].copy()
         if solved:
-            # The block before, A x + E y = b, is eliminated from E' x + B y = c.
+            # The previous block, A x + E y = b, is eliminated from E' x + B y = c.
             changes = np.einsum("ab,sac->sbc", coupling, solved[-1])
             matrix[:, :2, :2] -= changes[..., :2]
             sums[:, :2] -= changes[..., 2:]

@@ -15,8 +15,8 @@ __all__ = ["DENSITY", "Measures", "measure"]
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 
-# Maximum fraction of the surface that may be missing, as at the eyes or the mouth of a body, for a
-# meaningful volume.
+# Maximum fraction of the surface that may be missing, for example at the eyes or the mouth of a
+# body, for a meaningful volume.
 _HOLE = 0.01
 
 
@@ -31,7 +31,7 @@ class Measures:
     volume : float or None
         Enclosed volume, cubed units; None if the mesh is open.
     mass : float or None
-        Volume times ``DENSITY``, kilograms; None without a volume, or unless the unit is metres.
+        Volume times ``DENSITY``, kilograms; None if there is no volume or the unit is not metres.
     n_open_edges : int
         Number of edges that belong to a single triangle, with coincident vertices merged.
     """

@@ -55,7 +55,7 @@ class Soles:
         world : (F, J, 4, 4)
             Joint space to figure space.
         axis : (4,)
-            Row of the placement matrix that gives the height.
+            Row of the placement matrix that yields the height.
         scale : float
             Scene units per figure unit.
 
@@ -166,7 +166,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return the downward direction, and directions tilted from it all around: (D, 3)."""
+    """Return the downward direction, and directions tilted from it to all sides: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

@@ -109,8 +109,8 @@ def counterpart(figure: Figure, animation: Animation) -> int:
 def own_first(figure: Figure, others: Sequence[Figure]) -> int:
     """Return 0 if a figure shares no animation with the others of its file, else -1.
 
-    Such a figure is an independent character, which plays its first animation whatever the others
-    play.
+    Such a figure is an independent character, which plays its first animation regardless of the
+    others.
 
     Parameters
     ----------

@@ -1,6 +1,7 @@
 """Editing of keyed clips: every function returns a new channel or clip; the original is unchanged.
 
-Keys keep their order and therefore their indices: a moved key stops at an unmoved neighbour.
+The order of keys and therefore their indices never change: a moved key stops at an unmoved
+neighbour.
 """
 
 from __future__ import annotations
@@ -267,7 +268,7 @@ def key_pose(
     time : float
         Seconds.
     only_changed : bool
-        Skip DOFs whose value equals that of the clip, clamped to the limits, at that time.
+        Skip DOFs whose value equals the clip's value at that time, clamped to the limits.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)

@@ -35,11 +35,11 @@ class SampledClip:
     figure_scales : (N,) or None
         Scales of the whole figure.
     shape_weights : (N, S) or (1, S) or None
-        Blend shape weights; a single row applies to all frames. If None, those of the pose are
+        Blend shape weights; a single row applies to all frames. If None, the pose's values are
         used.
     scales : (N, J, 3) or (1, J, 3) or None
-        Local scale factors of the joints; a single row applies to all frames. If None, those of the
-        pose are used.
+        Local scale factors of the joints; a single row applies to all frames. If None, the pose's
+        values are used.
     """
 
     name: str

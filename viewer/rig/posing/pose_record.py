@@ -68,7 +68,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
         only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; if None, all but those of 45 values are.
+        Whether hand poses are coefficients; None means True unless there are 45 values.
     joint_rotations : JointRotations or None
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
@@ -278,7 +278,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's pose vector, or that of another member of the SMPL family."""
+    """Apply the pose vector of the model, or of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers

@@ -25,9 +25,9 @@ class Drive:
     joint_map : JointMap or None
         The requested match of joints; None for the automatic one.
     keeps_up : bool
-        Whether the result keeps the up axis of the motion's world instead of using the figure's.
+        Whether the result has the up axis of the motion's world instead of the figure's up axis.
     plants_feet : bool
-        Whether feet stay planted while those of the source are on the ground.
+        Whether feet stay planted while the source's feet are on the ground.
     hangs : bool
         Whether the up axis of the motion points down.
     finish : callable or None

@@ -26,7 +26,7 @@ from viewer.rig.shape import shaped
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
-_ALIKE = 1e-4  # lengths this close are equal, relative to the body
+_ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
 _UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
 _FOLDED = 1e-3  # extension at rest below which a leg is folded
 _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
@@ -80,7 +80,7 @@ class DrivenLegs:
     clearance : float
         Height of the balls above the soles in the rest pose.
     travel : (N, 3) or None
-        Translation relative to moving ground in each row; None if the ground rests.
+        Translation relative to moving ground in each row; None if the ground does not move.
     """
 
     chains: Chains
@@ -108,9 +108,9 @@ class DrivenLegs:
         return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
     def straightness(self, worlds: Floats) -> Floats:
-        """Return the distance from hip to ankle relative to that in the rest pose: (N, L).
+        """Return the distance from hip to ankle relative to the distance in the rest pose: (N, L).
 
-        Legs that are folded at rest are compared with straight ones.
+        Legs that are folded at rest are compared with straight legs.
         """
         usual = np.where(self.extensions > _FOLDED, self.extensions, 1.0)
         return _extensions(worlds, self.legs) / usual

@@ -10,7 +10,7 @@ from viewer.rig.scalars import length_text
 
 __all__ = ["feet_notes"]
 
-_ROUNDING = 1e-6  # fraction of the body's height; smaller lengths are shown as 0
+_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
 def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:

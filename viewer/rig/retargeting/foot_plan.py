@@ -90,7 +90,7 @@ class FootPlan:
     def gap(self, heights: Floats) -> float:
         """Return the largest distance of a planted foot from the ground.
 
-        ``heights`` are those of the lowest point of each foot, (N, L).
+        ``heights`` are the heights of the lowest point of each foot, (N, L).
         """
         stands, largest = self.holds() >= 1.0, 0.0
         for foot in range(len(self.contacts)):
@@ -103,7 +103,7 @@ class FootPlan:
         """Return the height below which a foot with contacts must not sink: (N,).
 
         This is the ground of the previous or next contact, whichever is lower. If the source's foot
-        sinks below that, the limit follows it.
+        sinks below this ground, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))

@@ -14,9 +14,9 @@ __all__ = ["foot_shifts"]
 
 _EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
-_LIFTS, _LIFTED = 4, 20.0  # passes that lift sinking feet, and their weight
-_SWAY = 0.15  # seconds over which the shifts of the feet are averaged, twice
-_FLIGHT = 0.05  # weight of the default translation relative to that of a planted foot
+_LIFTS, _LIFTED = 4, 20.0  # number of passes that lift sinking feet, and their weight
+_SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
+_FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
 _STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 
 
@@ -25,7 +25,7 @@ class _Wanted:
     """Corrections of one foot during its contacts."""
 
     flat: Floats  # (N, 3), horizontal
-    is_flat: Bools  # (N,), rows with horizontal corrections
+    is_flat: Bools  # (N,), whether a row has a horizontal correction
     rise: Floats  # (N,)
     holds: Floats  # (N,), degree to which the foot is held in place, 0 to 1
     above: Floats  # (N,), height of the sole above the floor
@@ -40,7 +40,7 @@ def foot_shifts(
     """Return the translations of all feet and of the body.
 
     A foot is corrected while it is on the ground. The body smoothly follows planted feet on
-    straight legs, so that these need not bend; other feet follow the body.
+    straight legs, so that these legs need not bend; other feet follow the body.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ def foot_shifts(
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
     """Return the corrections of a foot.
 
-    At the beginning and end of a contact, the foot follows that of the source.
+    At the beginning and end of a contact, the foot follows the source's foot.
     """
     path = plan.feet[foot]
     flat, rise = np.zeros_like(points[0]), np.zeros(len(heights))
@@ -125,7 +125,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
 
 
 def _strength(holds: Floats) -> Floats:
-    """Return the weights of held rows, between that of free rows, 1, and exact ones."""
+    """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
@@ -141,8 +141,8 @@ def _smoothed(plan: FootPlan, targets: Floats, weights: Floats) -> Floats:
 def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) -> Floats:
     """Return the mean translation of the planted feet, (N, 3), smooth over time.
 
-    ``weights`` are those of the feet, (N, L); ``usual`` is the translation without planted feet,
-    (N, 3).
+    ``weights`` are the weights of the feet, (N, L); ``usual`` is the translation without planted
+    feet, (N, 3).
     """
     sums, total = _FLIGHT * usual, np.full((len(usual), 1), _FLIGHT)
     for foot, shift in enumerate(shifts):

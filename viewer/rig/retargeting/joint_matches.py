@@ -66,7 +66,8 @@ def match_joints(
     source, target : Skeleton
         The skeleton of the motion, and the skeleton to which it is retargeted.
     mapping : JointMap, or mapping of str to str, optional
-        Target joints and their source joints; or joint names of the source to those of the target.
+        Target joints and their source joints; or joint names of the source to joint names of the
+        target.
     titles : (str, str)
         Names of the two skeletons in messages.
 

@@ -1,4 +1,4 @@
-"""Rules that translate joint names of many programs to those of the SMPL family.
+"""Rules that translate joint names of many programs to the names of the SMPL family.
 
 The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
 MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds

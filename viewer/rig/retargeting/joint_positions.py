@@ -52,7 +52,7 @@ def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Fl
     up : "y" or "z"
         Up axis.
     is_source : bool
-        Whether the points are those of the motion.
+        Whether the points belong to the motion.
     """
     upward = np.eye(3)["xyz".index(up)]
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))

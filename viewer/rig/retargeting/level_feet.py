@@ -1,8 +1,9 @@
-"""Soles of driven figures, kept level where those of the source rest flat on the ground.
+"""Levelling of a driven figure's soles while the source's soles rest flat on the ground.
 
-Retargeting keeps the direction from the ankle to the ball. Where ankles have different heights, or
-the rest pose of a file is inexact, the sole is then tilted. While the ball and the heel of the
-source stand, the foot rotates until its sole is level; while only the ball stands, the toes do.
+Retargeting preserves the direction from the ankle to the ball. Where ankles have different heights,
+or the rest pose of a file is inexact, the sole is then tilted. While the ball and the heel of the
+source stand, the foot rotates until its sole is level; while only the ball stands, the toes rotate
+instead.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ __all__ = ["levelled"]
 _NOISE = 0.04  # seconds below which changes of a standing foot's rotation are noise
 _EASE = 0.06  # seconds over which a correction falls to 40 % outside contacts
 _EXACT = 6.0  # decimal exponent of the weight of a standing foot
-# Cosines of tilts between which a sole goes from untouched to fully levelled.
+# Cosines of the tilts beyond which a sole is unchanged and below which it is fully levelled.
 _TILTED = (np.cos(np.radians(55.0)), np.cos(np.radians(35.0)))
 
 
@@ -62,11 +63,11 @@ def levelled(clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan
 
 
 def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
-    """Return how far feet and toes stand, and how far they are flat: (2, N, L)."""
+    """Return how firmly feet and toes stand, and how firmly with flat soles: (2, N, L) each."""
     holds = np.zeros((2, len(plan.feet[0].toe), len(legs)))
     flat = np.zeros_like(holds)
     for foot, leg in enumerate(legs):
-        if plan.feet[foot].toe is plan.feet[foot].heel:  # animals stand on their toes
+        if plan.feet[foot].toe is plan.feet[foot].heel:  # Animals stand on their toes.
             continue
         for contact, rows, _ in plan.stances(foot):
             holds[:, rows, foot] = contact.hold
@@ -76,7 +77,7 @@ def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
 
 
 def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
-    """Return rotations, (2, N, L, 4), smooth over time where feet stand: without noise."""
+    """Return rotations, (2, N, L, 4), smoothed over time where feet stand."""
     signs = np.where((rotations[:, 1:] * rotations[:, :-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
     signs = np.concatenate([np.ones_like(signs[:, :1]), np.cumprod(signs, axis=1)], axis=1)
     rotations = rotations * signs[..., None]

@@ -1,7 +1,7 @@
 """Speed of the ground below motions in place, as on a treadmill or with the travel removed.
 
-Standing feet then move at a constant velocity while the body stays. Contacts are found in the axes
-of the moving ground.
+Standing feet then move at a constant velocity while the body stays in place. Contacts are found in
+the axes of the moving ground.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ from viewer.rig.retargeting.source_contacts import FootPath
 __all__ = ["ground_velocity", "on_moving_ground"]
 
 # Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SAME = 0.08  # speeds this close are those of standing feet, per second
-_SLOWEST = 0.2  # speed of the ground, per second
-_DRIFT = 0.25  # maximum speed of the body relative to that of the ground
+_SAME = 0.08  # tolerance for the speed of standing feet, per second
+_SLOWEST = 0.2  # minimum speed of the ground, per second
+_DRIFT = 0.25  # maximum speed of the body relative to the speed of the ground
 _USUAL = 0.4  # minimum fraction of the rows in which the lowest foot has the ground's velocity
-_OFTENER = 3.0  # this must occur so many times as often as resting feet
+# Minimum ratio of the number of these rows to the number of rows with a resting foot.
+_OFTENER = 3.0
 _WINDOW = 0.1  # seconds over which velocities are averaged
-_MOST = 500  # candidates
+_MOST = 500  # maximum number of candidates
 
 
 def ground_velocity(
     feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
 ) -> Floats | None:
-    """Return the velocity of the ground, (3,) per second; None if it rests.
+    """Return the velocity of the ground, (3,) per second; None if it does not move.
 
     Parameters
     ----------

@@ -30,7 +30,7 @@ def path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[fl
     source, target : RestPose
         Rest poses in common axes.
     matches : Matches
-        Joints of the source for those of the target.
+        Joints of the source for joints of the target.
     """
     partners, names = matches.partners, matches.names
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}

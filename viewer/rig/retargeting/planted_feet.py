@@ -1,6 +1,6 @@
 """Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
 
-Retargeting keeps the directions of limbs, so that feet slide and sink if proportions differ.
+Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
 sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
 the ankles reach their targets, and the body is lowered if a leg is too short.
@@ -36,9 +36,9 @@ from viewer.rig.retargeting.retarget import Retargeted
 
 __all__ = ["PlantedFeet", "plant_feet"]
 
-_EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
+_EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
-_STEPS = 5  # reported as progress, from retargeting to the comparison
+_STEPS = 5  # number of steps reported as progress, from retargeting to the comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class PlantedFeet:
     size : float
         Approximate height of the body.
     ground_speed : float
-        Speed of the ground on which the feet stand, per second; 0 if it rests.
+        Speed of the ground on which the feet stand, per second; 0 if it does not move.
     """
 
     n_contacts: int = 0
@@ -117,7 +117,7 @@ def plant_feet(
     feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
     how = spans_of(timing), timing.frame_rate
     moves = ground_velocity(feet, *how, body.size, up)
-    if moves is not None:  # contacts and corrections are found in the axes of the ground
+    if moves is not None:  # Contacts and corrections are found in the axes of the ground.
         seconds = np.flatnonzero(timing.present) / timing.frame_rate
         travel = -seconds[:, None] * moves
         body = replace(body, travel=travel)

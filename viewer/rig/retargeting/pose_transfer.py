@@ -73,7 +73,7 @@ class JointRotations:
     layout : str
         Result of ``dof_layout``: figures with the same layout use the DOF values directly.
     rotations : (J, 4) or None
-        Base rotations, before the DOFs, as in ``Pose``; None for those of the rest pose.
+        Base rotations, before the DOFs, as in ``Pose``; None for the rest pose's.
     meanings : tuple of J str
         For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
     left : (3,)
@@ -173,7 +173,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
         Provides the base rotations and translations.
     is_whole : bool
         Whether all DOFs of the source's pose are applied: joints that it does not contain are then
-        reset to the rest pose instead of keeping their values.
+        reset to the rest pose; by default, their values are unchanged.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -207,7 +207,7 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
 def rotate_joints(
     source: JointRotations, target: Figure, start: Pose
 ) -> tuple[Pose, list[Diagnostic]]:
-    """Return a figure's pose with its joints rotated like those of another figure.
+    """Return a figure's pose with its joints rotated like another figure's joints.
 
     Parameters
     ----------

@@ -149,7 +149,7 @@ def _at_joint(
     stands: Floats,
     reference: Floats,
 ) -> Floats:
-    """Return one joint's rotation; ``reference`` is that of the nearest matched ancestor."""
+    """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation."""
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
     mine, theirs = (_directions(bone) for bone in bones)
     if not children:

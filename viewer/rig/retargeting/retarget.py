@@ -7,7 +7,7 @@ of source and target::
     W_t(frame) = W_s(frame) R_s^-1 B R_t
 
 where B rotates the figure's rest pose to the source's at that joint, for instance from a T-pose
-to an A-pose. Lengths are those of the figure; the path is scaled by the ratio of leg lengths.
+to an A-pose. Lengths are the figure's; the path is scaled by the ratio of leg lengths.
 """
 
 from __future__ import annotations
@@ -109,7 +109,7 @@ class Retargeted:
     source : SkeletonMotion
         The motion, with the rest pose that was used.
     matches : Matches
-        Joints of the source for those of the figure.
+        Joints of the source for joints of the figure.
     to_target : (3, 3)
         Rotation from the source's axes to the figure's.
     scale : float

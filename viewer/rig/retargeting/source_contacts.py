@@ -2,9 +2,9 @@
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
 moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A contact
-is valid only if, at some time during it, the foot is the lowest one (not one held still in the
-air), and if it is below its hip (not next to it, as in a lying person). The ground therefore need
-not be flat: every contact has its own height, as on stairs.
+is valid only if, at some time during it, the foot is the lowest one, not a foot held still in the
+air, and if it is below its hip, not next to it as in a lying person. The ground therefore need not
+be flat: every contact has its own height, as on stairs.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"
 _SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
 # Heights above the foot's lower point at which a contact begins and ends.
 _LOW, _HIGH = 0.015, 0.025
-_LOWEST = 0.02  # a foot at most this far above the other one may be the lowest
+_LOWEST = 0.02  # maximum height above the other foot of a foot that may be the lowest
 _UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
-_LEVEL = 0.015  # heights this close belong to one level
+_LEVEL = 0.015  # maximum difference between heights of one level
 _GROUND = (-0.015, 0.06)  # range of heights of feet on a ground at height 0
 _SIMILAR = 1.0 / 3.0  # minimum fraction of the longest duration for a similar duration
 _TILTED = 0.04  # height of the heel above the ball, or vice versa, of a tilted foot

@@ -70,7 +70,7 @@ def with_source_rest(
     motion : SkeletonMotion
         The same clip, with another rest pose of the skeleton.
     notes : list of Diagnostic
-        The chosen rest pose, unless it is that of the skeleton.
+        The chosen rest pose, unless it is the skeleton's.
 
     Raises
     ------
@@ -142,9 +142,9 @@ def _row(motion: SkeletonMotion, frame: int) -> int:
 
 
 def _is_body(still: Postures) -> bool:
-    """Return whether a rest pose is that of a body: legs apart from the trunk, limbs unfolded.
+    """Return whether a rest pose is a body's: legs apart from the trunk, limbs unfolded.
 
-    It need not be upright, and may be that of an animal, whose legs are across its trunk.
+    The body need not be upright, and may be an animal's, whose legs are perpendicular to its trunk.
     """
     trunk = still.trunk()[0]
     side = still.direction("right_hip", "left_hip")[0]
@@ -185,7 +185,7 @@ def _calibration(postures: Postures) -> tuple[int, float]:
 
 
 def _is_rolled(postures: Postures, left: Floats, forward: Floats) -> Bools:
-    """Return a mask of the frames whose bending axes are not those of a T- or A-pose: (F,)."""
+    """Return a mask of the frames whose bending axes differ from a T- or A-pose: (F,)."""
     result = np.zeros(len(postures.rows), dtype=bool)
     for limb in limb_axes(postures):
         if limb.is_seen:

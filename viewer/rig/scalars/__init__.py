@@ -71,8 +71,8 @@ class Quantity:
     moves : bool
         Whether the values depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` if the quantity refers to one, which its name may specify; empty
-        otherwise.
+        ``"joint"`` or ``"field"`` if the quantity refers to a joint or field, which its name may
+        specify; empty otherwise.
     isolines : bool
         Whether isolines are drawn by default.
     least : float
@@ -294,7 +294,7 @@ def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
 
 
 def missing_part(name: str, figure: Figure) -> str:
-    """Return the name of the part that a figure lacks for a quantity; empty if it lacks none.
+    """Return the name of the part that a figure lacks for a quantity; empty if none is missing.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def _blended(
 def _blend(
     skin: Skin, starts: Ints, listing: np.ndarray, duals: Floats, stretches: Floats
 ) -> tuple[Floats, Floats, Bools]:
-    """Blend the influences of one chunk; the mask is False if those of a vertex cancel out."""
+    """Blend the influences of one chunk; the mask is False for vertices where they cancel out."""
     span = slice(starts[0], starts[-1])
     edges = starts[listing] - starts[0]
     joints, weights = skin.joints[span], skin.weights[span]
