@@ -13,11 +13,11 @@ uniform mat3 u_normal_matrix;  // inverse transpose of the model-view matrix
 uniform mat4 u_projection;
 uniform bool u_has_colors;     // use in_color instead of u_color
 uniform vec3 u_color;          // linear
-uniform float u_hull_width;    // camera space, or a fraction of the height of the picture
-uniform bool u_hull_on_screen; // the latter
+uniform float u_hull_width;    // camera space, or a fraction of the image height
+uniform bool u_hull_on_screen; // whether u_hull_width is a fraction of the image height
 uniform bool u_has_width_map;
-uniform sampler2D u_width_map; // factor on the width, in the green channel
-uniform mat3 u_width_place;    // texture coordinates to those of the map
+uniform sampler2D u_width_map; // factor of the width, in the green channel
+uniform mat3 u_width_place;    // transform of the texture coordinates to the map's
 uniform int u_width_set;       // 0: in_uv, 1 and 2: in_other_uvs
 
 out vec3 v_position;    // camera space

@@ -20,7 +20,7 @@ uniform float u_opacity;
 
 #ifdef HULL
 uniform vec3 u_outline_color;   // linear
-uniform float u_outline_mix;    // 0 to 1: how much the surface's colour multiplies it
+uniform float u_outline_mix;    // 0 to 1: degree to which the surface's colour multiplies it
 #endif
 
 out vec4 f_color;               // sRGB, premultiplied by alpha
@@ -39,7 +39,7 @@ void main() {
     // rounding would flip pixels at random.
     float side = dot(normal, face) < -0.1 ? -1.0 : 1.0;
 #ifdef HULL
-    side = 1.0;                 // back faces of a hull are lit as the surface at its edge
+    side = 1.0;                 // back faces of a hull are lit like the surface at its edge
 #endif
     normal *= side;
     float opacity = u_opacity * v_opacity;

@@ -145,7 +145,8 @@ def test_people_without_shapes_are_reported_once(tmp_path, smpl):
         f"{tmp_path / 'output'}: no shape coefficients in the files: the model's mean shape is "
         "used for all"
     )
-    assert load(tmp_path / "output", smpl).warnings == (text,)
+    motion = MotionSettings(frame_rate=30.0)
+    assert load(tmp_path / "output", smpl, motion=motion).warnings == (text,)
     (folder / "000299.json").write_text(json.dumps([person(0, 0.0), people[1]]))
     assert text not in load(tmp_path / "output", smpl).warnings
 

@@ -105,7 +105,7 @@ def test_closed_error_stream_does_not_change_results(rig, tmp_path, sink):
     done = shell(f"viewer info missing.skel 2>{sink}", *rig)
     assert (done.returncode, done.stdout) == (2, b"")
     target = tmp_path / "x.bmp"
-    # That BMP is opaque is a warning.
+    # A warning states that BMP is opaque.
     line = f'viewer render "$@" -o "{target}" {SMALL} --background transparent'
     assert b"transparency" in shell(line, *rig).stderr
     done = shell(f"{line} --force 2>{sink}", *rig)

@@ -48,7 +48,7 @@ def _chosen(vertices: Floats, j: int) -> np.ndarray:
     offset = vertices - CENTRES[j]
     unit = np.asarray(ring.normal) / np.linalg.norm(ring.normal)
     near = np.linalg.norm(offset, axis=1) < ring.radius
-    if side:  # Rings of paired joints stay on the side of the joint.
+    if side:  # rings of paired joints stay on the side of the joint
         near &= vertices[:, 0] >= 0
     away = np.abs(offset @ unit)
     chosen = np.nonzero(near & (away < ring.band))[0]

@@ -23,11 +23,11 @@ uniform vec3 u_shade_color;     // colour of the side away from the key light, l
 uniform vec2 u_shade_range;     // cosines at which the surface is fully in shade and fully lit
 uniform sampler2D u_shade_map;
 uniform bool u_has_shade_map;
-uniform bool u_has_rim;         // the metallic and roughness maps then are matcap and rim map
+uniform bool u_has_rim;         // true: the metallic and roughness maps are matcap and rim map
 uniform vec3 u_rim_color;       // linear
 uniform float u_rim_power;
 uniform float u_rim_lift;
-uniform float u_rim_mix;        // 0 to 1: how much the light multiplies the rim
+uniform float u_rim_mix;        // 0 to 1: degree to which the light multiplies the rim
 uniform vec3 u_matcap_factor;   // linear
 #endif
 

@@ -20,7 +20,7 @@ SIDES = {"POSITION": "VEC3", "NORMAL": "VEC3", "TEXCOORD_0": "VEC2", "TEXCOORD_1
 
 
 class Gltf:
-    """A file, of which every rule is checked on opening."""
+    """A file that is checked against every rule when it is opened."""
 
     def __init__(self, path: Path) -> None:
         data = path.read_bytes()

@@ -34,7 +34,7 @@ def steps(start: int, length: int, distance: float) -> np.ndarray:
 STILL = np.zeros(FRAMES)
 
 
-def test_low_swings_beside_a_standing_foot_are_no_slides() -> None:
+def test_low_swings_next_to_a_standing_foot_are_not_slides() -> None:
     # 0.5 m in 0.4 s, at up to 1.9 m/s.
     swings = steps(5, 12, 0.5) + steps(40, 12, 0.5)
     assert codes(swings, STILL) == []
@@ -43,14 +43,14 @@ def test_low_swings_beside_a_standing_foot_are_no_slides() -> None:
 
 @pytest.mark.parametrize("speed", [0.3, 0.5, 0.8])
 def test_feet_that_slide_together_are_found(speed: float) -> None:
-    # The body is carried along, as if on wheels.
+    # The body moves with the feet, as if on wheels.
     assert "C007" in codes(speed * _K / RATE, speed * _K / RATE)
 
 
-def test_a_standing_foot_that_starts_to_drift_is_found() -> None:
+def test_standing_foot_that_starts_to_drift_is_found() -> None:
     assert "C007" in codes(steps(10, 20, 0.2), STILL)
 
 
-def test_short_landings_are_no_slides() -> None:
-    # Each lands within 0.13 s.
+def test_short_landings_are_not_slides() -> None:
+    # Each foot lands within 0.13 s.
     assert codes(steps(10, 4, 0.06), steps(30, 4, 0.06)) == []

@@ -1,4 +1,4 @@
-"""Videos with write errors at every write and fill level, which leave one line and no file."""
+"""Write errors of videos at every write and fill level: one line is printed and no file is left."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def record(path: Path, frames: list[np.ndarray]) -> list[str]:
 
 
 class Disk:
-    """A raw file that is full from the n-th write on, half of which is still written."""
+    """A raw file that is full from the n-th write on. Half of that write succeeds."""
 
     def __init__(self, number: int, is_kept: bool = True) -> None:
         self.calls, self.number, self.is_kept = 0, number, is_kept
@@ -156,7 +156,7 @@ for level in range(17):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_disk_fill_level_results_in_one_line_or_a_video(tiny_disk, suffix):
+def test_every_disk_fill_level_results_in_one_message_or_a_video(tiny_disk, suffix):
     """The test runs in a separate process, because FFmpeg could crash with a segmentation fault."""
     folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(

@@ -93,7 +93,7 @@ def check_lines(
     lines = []
     if out:
         skeleton = figure.skeleton
-        assert skeleton is not None  # Only joints of a skeleton are listed.
+        assert skeleton is not None  # only joints of a skeleton are listed
         names = [joint_label(skeleton, joint) for joint in out]
         joints = np.array(out, dtype=np.int32)
         lines.append(Diagnostic("R009.joints", None, None, "joints", joints, {"names": names}))

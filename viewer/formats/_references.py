@@ -40,7 +40,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     try:
         # Unlike Path.resolve(), this does not raise for circular links; reading reports them.
         inside, base = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    except ValueError:  # The name has a NUL character, which is invalid in a path.
+    except ValueError:  # the name has a NUL character, which is invalid in a path
         return path
     return path if inside != base and inside.is_relative_to(base) else None
 

@@ -236,7 +236,7 @@ def _split_poses(
             raise archive.fault("F002.motion-width", item=key, expected=list(joints), found=columns)
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
             source.warn("F007.motion-angles", item=key)
-        if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one
+        if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one eye
             _compare_again(source, key, joints[columns], rows, names, parts)
             continue
         names += joints[columns]

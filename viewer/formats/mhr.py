@@ -40,8 +40,8 @@ __all__ = ["read"]
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")
 _USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
-_ROWS = 8  # correctives that are read together, 1.8 MB at the usual level of detail
-_N_IDENTITY = 45  # number of shapes of the identity; the others are expressions
+_ROWS = 8  # number of correctives per block, 1.8 MB at the default level of detail
+_N_IDENTITY = 45  # number of shapes of the identity; all other shapes are expressions
 _SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "

@@ -68,7 +68,7 @@ def read(source: Source) -> Figure:
     source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)
-    # They are no longer needed, and large.
+    # These tables are large and no longer needed.
     parts.normals, parts.corners = parts.normals[:0].copy(), parts.corners[:0].copy()
     materials, of_face = _materials(source, parts)
     names, part_of_face = _parts_of(parts)

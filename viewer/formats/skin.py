@@ -163,7 +163,7 @@ def _skin(source: Source, sections: Sections) -> Skin | None:
     inverse_bind = invert_bindings(source, sections)
     joints, weights = checked_influences(source, sections, len(inverse_bind))
     skin = Skin(starts=sections.starts, joints=joints, weights=weights, inverse_bind=inverse_bind)
-    if not source.diagnostics.errors:  # After errors, warnings about weights are redundant.
+    if not source.diagnostics.errors:  # after errors, warnings about weights are redundant
         check_weights(source, skin)
     return skin
 
@@ -291,13 +291,13 @@ def _as_rest_of_line(texture: str | None) -> str | None:
     """Return a texture's name as it would be read back."""
     try:
         text = (texture or "").encode("utf-8", "surrogateescape").strip()
-    except UnicodeEncodeError:  # The name has a lone surrogate, which decoding never yields.
+    except UnicodeEncodeError:  # the name has a lone surrogate, which decoding never yields
         return None
     return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
 
 
 def _bindings_text(skin: Skin) -> bytes:
-    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # Adding 0.0 replaces -0.0 by 0.0.
+    bindings = np.linalg.inv(skin.inverse_bind) + 0.0  # adding 0.0 replaces -0.0 by 0.0
     # The rows of the text are the matrix's columns.
     blocks = [_matrix_text(columns) for columns in bindings[:, :3, :].transpose(0, 2, 1)]
     return f"bindings {len(bindings)} {{\n{''.join(blocks)}}}\n".encode()
@@ -312,7 +312,7 @@ def _save_texture(material: Material, folder: Path) -> None:
     """Save an image under its name in the file, unless the same image is already there."""
     if material.texture is None or material.image is None:
         return
-    name = Path(material.texture.replace("\\", "/"))  # The reader interprets it in the same way.
+    name = Path(material.texture.replace("\\", "/"))  # the reader interprets it in the same way
     path = folder / name
     if path.exists():
         there = load_image(Source(folder / "x.skin", b""), material.texture, 0)

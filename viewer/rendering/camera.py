@@ -157,7 +157,7 @@ class Camera:
 
             return pinhole_projection(pinhole, aspect, box)
         reach = box_size(box) + float(np.linalg.norm(box.mean(axis=0) - self.target))
-        reach = reach or self.distance  # Even an empty scene needs a depth range.
+        reach = reach or self.distance  # even an empty scene needs a depth range
         far = self.distance + 20.0 * reach
         if self.orthographic:
             half = self.half_height
@@ -272,7 +272,7 @@ def camera_from_view(
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
     distance = float((place - middle) @ backward)
-    if distance <= _SMALLEST:  # The object is behind the camera.
+    if distance <= _SMALLEST:  # the object is behind the camera
         distance = float(np.linalg.norm(place - middle)) or 1.0
     x, y, z = backward if up == "y" else (backward[0], backward[2], -backward[1])
     focal = float(view.intrinsic[1, 1] / view.intrinsic[2, 2])

@@ -57,7 +57,7 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     for index in _looked_at(recording):
         pose_scene(scene, recording, float(recording.times[index]))
         if not any(actor.is_drawn for actor in scene.actors) and len(recording.times) > 1:
-            continue  # All actors are absent in this frame.
+            continue  # all actors are absent in this frame
         points = outermost(scene_points(scene, show))
         boxes.append(bounding_box(points))
         if follow is not None:

@@ -13,7 +13,7 @@ __all__ = ["MaterialLooks"]
 
 
 class MaterialLooks:
-    """The surfaces of one actor that differ from those of its figure.
+    """The surfaces of one actor that differ from its figure's surfaces.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ class MaterialLooks:
         self._changed: dict[int, Surface] = {}
 
     def update(self, pose: Pose | None) -> None:
-        """Compute the surfaces of a pose; None for those of the figure."""
+        """Compute the surfaces of a pose; None for the figure's surfaces."""
         shapes = self._mesh.figure.blend_shapes
         binds = None if shapes is None else shapes.material_binds
         if shapes is None or binds is None:

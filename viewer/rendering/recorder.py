@@ -261,7 +261,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         while wait([closing], _PATIENCE).not_done:
             yield progress(total)
         closing.result()
-    except BaseException:  # This includes Ctrl-C and the closing of the generator.
+    except BaseException:  # this includes Ctrl-C and the closing of the generator
         queue.stop()
         sink.abort()
         raise

@@ -75,7 +75,7 @@ class Deferred:
         return self._values
 
     def blocks(self, count: int) -> Iterator[NDArray[Any]]:
-        """Yield blocks of at most ``count`` rows, each valid until the next; raises as above."""
+        """Yield blocks of at most ``count`` rows, each valid until the next; see ``values``."""
         if self._by_blocks is not None and self._values is None:
             yield from self._by_blocks(count)
             return
@@ -128,7 +128,7 @@ def frozen(
 def freeze(array: NDArray[Item]) -> NDArray[Item]:
     """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
 
-    For new arrays that nobody else changes; a copy takes as much memory again.
+    For new arrays that no other code changes; a copy would double the memory.
 
     >>> array = np.zeros(3)
     >>> frozen("offset", freeze(array), (3,)) is array

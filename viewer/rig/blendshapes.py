@@ -199,7 +199,7 @@ class Correctives:
     offsets : (P, V, 3), or Deferred
         Figure units per unit of weight.
     feature : Feature or None
-        Computes the weights of a pose; None for those of SMPL, ``corrective_weights``, which are
+        Computes the weights of a pose; None for SMPL's weights, ``corrective_weights``, which are
         nine for each joint except the root.
     """
 

@@ -12,7 +12,7 @@ from viewer.rig.pose import Pose
 
 __all__ = ["apply_coefficients", "unused_coefficients"]
 
-_MOST_SIGMA = 1e6  # standard deviations; larger coefficients are implausible
+_MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:

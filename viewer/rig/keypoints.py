@@ -82,7 +82,7 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     Returns
     -------
     Figure
-        It has no joint regressor, so its joints do not follow its shape.
+        Figure without a joint regressor, so its joints do not follow its shape.
     """
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives

@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
-# The camera ignores this fraction of outlying points ...
+# Fraction of outlying points that the camera ignores if they enlarge the bounding box a lot.
 _OUTLIER_FRACTION = 0.001
-# ... if the bounding box of all points is this many times larger.
+# Minimum ratio of the bounding boxes with and without outliers for which they are ignored.
 _OUTLIER_RATIO = 100.0
 
 
@@ -121,7 +121,7 @@ class Actor:
 
     @property
     def title(self) -> str:
-        """Name of the recording, or else of the figure; the same for all people of a recording."""
+        """Name of the recording or, without one, of the figure; common to a recording's people."""
         return self.called or self.figure.name
 
     @property

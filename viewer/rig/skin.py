@@ -30,7 +30,7 @@ __all__ = [
     "weight_sums",
 ]
 
-_NO_SUM = 1e-12  # sums of weights smaller than this cannot be scaled to 1
+_NO_SUM = 1e-12  # minimum sum of weights that can be scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)

@@ -1,4 +1,4 @@
-"""Complete alignment, which is unchanged, searched, from landmarks or given, and its report."""
+"""Alignment by search, by landmarks or as given, and its report; skipped if unnecessary."""
 
 import numpy as np
 import pytest

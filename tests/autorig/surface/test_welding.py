@@ -24,7 +24,7 @@ def test_weld_treats_minus_zero_as_zero():
 
 
 def test_weld_joins_vertices_that_differ_by_rounding():
-    # The median edge is 1, so vertices within 1e-4 are one.
+    # The median edge is 1, so vertices within 1e-4 are joined.
     positions = SQUARE[[0, 1, 2, 0, 2, 3]].copy()
     positions[3, 2] = 0.5e-4
     positions[4, 2] = 2e-4

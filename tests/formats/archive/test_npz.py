@@ -166,7 +166,7 @@ def test_blocks_of_rows_are_those_of_the_whole_array(packed: bool, count: int) -
                 assert not array.is_loaded
 
 
-def test_damage_is_found_while_reading_blocks() -> None:
+def test_damage_is_detected_while_reading_blocks() -> None:
     values = np.arange(60_000.0).reshape(-1, 3)
     data = bytearray(npz(v=values))
     data[len(data) // 2] ^= 1

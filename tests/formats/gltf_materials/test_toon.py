@@ -118,7 +118,7 @@ def test_defaults_are_those_of_the_extension(tmp_path: Path) -> None:
     assert (found.rim.power, found.rim.lift, found.rim.mix) == (5.0, 0.0, 1.0)
 
 
-def test_members_that_are_not_drawn_are_named(tmp_path: Path) -> None:
+def test_members_that_are_not_drawn_are_listed(tmp_path: Path) -> None:
     toon = {
         "uvAnimationScrollXSpeedFactor": 0.5,
         "uvAnimationScrollYSpeedFactor": 0.0,

@@ -98,7 +98,7 @@ def test_animations_are_assigned_to_the_figures_that_they_move():
     assert len(rest.animations) == 1
 
 
-def test_actors_of_a_file_keep_their_relative_positions_and_cameras_follow():
+def test_actors_and_cameras_of_a_file_keep_their_relative_positions():
     first, second = (group_of(two_characters()) for _ in range(2))
     assert first.views[0].name == "eye"
     contents = Contents()

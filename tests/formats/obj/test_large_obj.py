@@ -16,7 +16,7 @@ def test_rows_are_those_that_were_added():
     assert GrowingTable((2,)).rows().shape == (0, 2)
 
 
-def test_wider_numbers_widen_the_table():
+def test_table_is_widened_for_large_numbers():
     table = GrowingTable((), np.int32)
     table.add(np.array([1], np.int32))
     table.add(np.array([1 << 40], np.int64))

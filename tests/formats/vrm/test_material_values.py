@@ -60,7 +60,7 @@ def old_values(*values: tuple[str, str, list[float]]) -> File:
     return file
 
 
-def test_values_of_version_0_are_translated(tmp_path: Path) -> None:
+def test_values_of_version_0_are_converted(tmp_path: Path) -> None:
     file = old_values(
         ("cloth", "_Color", [0.5, 1.0, 0.0, 0.25]),
         ("skin", "_EmissionColor", [0.5, 2.0, 0.0, 1.0]),
@@ -78,7 +78,7 @@ def test_values_of_version_0_are_translated(tmp_path: Path) -> None:
     )
     assert_allclose(red, [0.2140411, 1.0, 0.0, 0.25], atol=1e-7)  # sRGB, except the opacity
     assert light == [0.5, 2.0, 0.0, 1.0]
-    # The image begins at the bottom in Unity, and at the top in glTF: 1 - 0.2 - 0.25.
+    # The first row of the image is the bottom in Unity, and the top in glTF: 1 - 0.2 - 0.25.
     assert_allclose(place, [0.5, 0.25, 0.1, 0.55], atol=1e-12)
     assert not found
 
@@ -91,7 +91,7 @@ def test_values_for_one_axis_keep_the_other(tmp_path: Path) -> None:
     assert_allclose(rows(shapes)[0][3], [0.5, 0.5, 0.25, 1.0 - 0.2 - 0.5], atol=1e-12)
 
 
-def test_changes_without_effect_are_named(tmp_path: Path) -> None:
+def test_changes_without_effect_are_reported(tmp_path: Path) -> None:
     file = old_values(
         ("cloth", "_Cutoff", [0.5, 0, 0, 0]),
         ("hood", "_Color", [1, 0, 0, 1]),

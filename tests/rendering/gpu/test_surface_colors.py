@@ -56,7 +56,7 @@ def test_textures_use_their_set_of_coordinates(offscreen):
     ("minified", "wanted"), [("", 188), ("linear_mipmap_nearest", 188), ("nearest", (0, 255))]
 )
 def test_reduced_textures_are_averaged_unless_the_sampler_forbids_it(offscreen, minified, wanted):
-    """A checkerboard with 3.2 texels per pixel has half of the light, sRGB 188."""
+    """The mean of a checkerboard with 3.2 texels per pixel is half of the light, sRGB 188."""
     white, black = (255, 255, 255), (0, 0, 0)
     rows = [[(white, black)[(x + y) % 2] for x in range(256)] for y in range(256)]
     made = texture(*rows, minification=minified)
@@ -87,7 +87,7 @@ def test_image_is_uploaded_once_per_sampler(offscreen):
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_vertex_colours_multiply_the_base_colour(offscreen, count):
-    """The colours go from red on the left to half blue on the right; the pixel is at x = 0.025."""
+    """The colours change from red on the left to half blue on the right."""
     colors = [[1, 0, 0, 1.0] if x < 0 else [0, 0, 0.5, 0.5] for x in square().positions[:, 0]]
     base = (0.5, 1.0, 1.0, 1.0)
     for material, factor in (
@@ -98,7 +98,7 @@ def test_vertex_colours_multiply_the_base_colour(offscreen, count):
         figure = painted(material, colors=np.array(colors))
         scene = Scene([Actor(figure) for _ in range(count)])
         shown = front_view(offscreen, scene, lights=dark())
-        found = np.array(pixel(shown, 0.0, 0.0))
+        found = np.array(pixel(shown, 0.0, 0.0))  # centred at x = 0.025
         expected = encoded([factor * 0.4875, 0.0, 0.5 * 0.5125])
         assert np.allclose(found[:3], expected, atol=2)
         if count == 1:

@@ -67,7 +67,7 @@ def test_ridge_rotates_with_the_roll(offscreen, style):
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_every_child_has_a_bone_and_the_gap_between_has_none(offscreen, style):
+def test_bone_is_drawn_to_every_child_and_not_between_the_children(offscreen, style):
     places = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.5, 0.0], [-1.0, -1.0, 0.0]]
     picture = draw(offscreen, scene_of([-1, 0, 0, 0], places), 2.0, style)
     for x, y in ((0.4, 0.0), (0.0, 0.4), (-0.4, -0.4)):

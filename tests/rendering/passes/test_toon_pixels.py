@@ -33,7 +33,7 @@ from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.scene import Actor, Scene, scene_box
 
 DARK = (0.0, 0.0, 0.0)
-# In shade for all directions of the light, so that only the rim is seen.
+# The material is in shade for all directions of the light, so that only the rim is visible.
 SHADED = Material(
     "", None, WHITE, unlit=True, shade_color=DARK, shade_range=(2.0, 3.0), is_physical=True
 )
@@ -60,7 +60,7 @@ def ball(outline: Outline | None, **changes) -> Figure:
 @pytest.mark.parametrize(
     ("lift", "power", "fraction"), [(1.0, 5.0, 1.0), (0.5, 2.0, 0.25), (0, 3, 0)]
 )
-def test_rim_light_rises_with_the_angle_to_the_eye(offscreen, lift, power, fraction):
+def test_rim_light_increases_with_the_angle_to_the_eye(offscreen, lift, power, fraction):
     """On a surface that faces the eye, n . v = 1."""
     rim = Rim((0.8, 0.4, 0.2), power, lift)
     shown = draw(offscreen, replace(SHADED, rim=rim), shadows=False)
@@ -80,7 +80,7 @@ def test_rim_light_at_the_edge_of_a_ball_follows_the_formula(offscreen):
 
 
 def test_matcap_and_rim_texture_multiply(offscreen):
-    # The picture of the sphere is looked up at its middle, where four texels meet.
+    # The matcap is sampled in the middle, between four texels.
     matcap = texture([(255, 0, 0), (255, 0, 0)], [(255, 0, 0), (255, 0, 0)])
     rim = Rim(matcap=matcap, matcap_factor=(0.5, 1.0, 1.0))
     shown = draw(offscreen, replace(SHADED, rim=rim), shadows=False)
@@ -90,7 +90,7 @@ def test_matcap_and_rim_texture_multiply(offscreen):
     assert_allclose(pixel(shown, 0, 0)[:3], encoded([0.25, 0, 0]), atol=2)
 
 
-def test_matcap_is_seen_from_the_eye(offscreen):
+def test_matcap_is_relative_to_the_eye(offscreen):
     matcap = texture([(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 255)])
     mesh = ball(None, rim=Rim(matcap=matcap)).require_mesh()
     black = replace(mesh.materials[0], shade_color=DARK)
@@ -182,7 +182,7 @@ def test_crowds_have_outlines(offscreen):
 
 
 def blushing(kind: str, target: tuple[float, ...], **material) -> Actor:
-    """Return a square with an expression that changes its material and moves nothing."""
+    """Return a square with an expression that changes only its material."""
     figure = grid_figure()
     mesh = figure.require_mesh()
     look = replace(SHADED, shade_range=(-3.0, -2.0), **material)
@@ -230,7 +230,7 @@ def test_sliders_blend_colours(offscreen, kind, material):
         assert_allclose(pixel(shown, 0.1, 0.1)[:3], encoded(color), atol=2)
 
 
-def test_actors_of_one_figure_differ(offscreen):
+def test_actors_of_one_figure_can_have_different_materials(offscreen):
     actor = blushing("color", (1.0, 0.0, 0.0, 1.0))
     left, right = actor, Actor(actor.figure)
     left.placement, right.placement = np.diag([0.5, 1, 1, 1.0]), np.diag([0.5, 1, 1, 1.0])
@@ -250,7 +250,7 @@ def test_crowds_show_their_expression(offscreen):
     assert pixel(shown, 0.1, 0.1)[:3] == [255, 0, 0]
 
 
-def test_opacity_of_blended_materials_follows(offscreen):
+def test_opacity_of_blended_materials_changes(offscreen):
     actor = blushing("color", (1.0, 1.0, 1.0, 0.25), alpha_mode="blend", base_color=WHITE)
     actor.pose.shape_weights[:] = 1.0
     shown = front_view(offscreen, Scene([actor]), lights=dark(), shadows=False)

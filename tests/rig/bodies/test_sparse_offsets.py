@@ -13,7 +13,7 @@ ROWS, VERTICES = 200, 50
 
 
 class AnyWeights:
-    """Stands for a feature of the same number of weights."""
+    """A stand-in for a feature with the same number of weights."""
 
     n_weights = ROWS
 
@@ -22,7 +22,7 @@ def array(density: float) -> np.ndarray:
     generator = np.random.default_rng(1)
     values = generator.normal(size=(ROWS, VERTICES, 3))
     values *= generator.random(values.shape) < density
-    values[:, 7] = 0.0  # a vertex that nothing moves
+    values[:, 7] = 0.0  # a vertex that is never moved
     values[3] = 0.0
     return values.astype(np.float32)
 
@@ -64,7 +64,7 @@ def test_offsets_of_some_vertices_are_the_stored_ones() -> None:
     assert_array_equal(sparse(values, []).of_vertices(few), values[:, few].astype(np.float64))
 
 
-def test_nothing_is_read_for_a_pose_at_rest() -> None:
+def test_rest_pose_reads_no_data() -> None:
     loads: list[str] = []
     correctives = Correctives(sparse(array(0.05), loads), AnyWeights())
     assert not correctives.displacement(np.zeros(ROWS)).any() and loads == []

@@ -1,4 +1,4 @@
-"""Materials changed by the weights of expressions, against hand calculation."""
+"""Materials changed by the weights of expressions, compared with hand calculation."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def binds(*rows: tuple[int, int, str, tuple[float, ...]]) -> MaterialBinds:
     return MaterialBinds(np.array(shapes), np.array(materials), kinds, np.array(targets))
 
 
-def test_targets_of_several_expressions_add_up():
+def test_targets_of_several_expressions_are_added():
     found = binds(
         (0, 0, "color", (1.0, 0.0, 0.5, 1.0)), (1, 0, "color", (0.5, 1.0, 0.5, 0.0))
     ).changed([TOON], np.array([0.5, 0.25]))
@@ -72,7 +72,7 @@ def test_scale_and_offset_are_blended_and_rotation_is_kept(angle, weight):
     assert_allclose(found, transform_matrix(offset, angle, scale), atol=1e-12)
 
 
-def test_a_mirrored_texture_stays_mirrored():
+def test_mirrored_texture_remains_mirrored():
     before = transform_matrix(np.zeros(2), 0.3, np.array([1.0, -2.0]))
     material = Material(base_texture=Texture("a", transform=before))
     rows = binds((0, 0, "transform", (1.0, -2.0, 0.5, 0.0)))

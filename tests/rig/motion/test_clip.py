@@ -55,7 +55,7 @@ def test_slopes_accept_a_value_on_each_side() -> None:
 
 
 def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
-    """The expected values use the textbook basis h00, h10, h01, h11; the code does not."""
+    """The expected values use the textbook basis h00, h10, h01, h11, unlike the code."""
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.1, 2.0, 6))
     values = rng.normal(size=6)
@@ -74,7 +74,7 @@ def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
             assert found == pytest.approx(wanted, abs=1e-12)
 
 
-# The keys are on a straight line from (1, 10) to (3, 14); every mode is worked out by hand.
+# The keys are on a straight line from (1, 10) to (3, 14); every mode is computed by hand.
 @pytest.mark.parametrize(
     ("mode", "time", "expected"),
     [
@@ -127,7 +127,7 @@ def test_channel_without_keys_is_zero() -> None:
     np.testing.assert_array_equal(evaluate(empty, np.array([-1.0, 0.0, 5.0])), 0.0)
 
 
-def test_equal_times_jump_without_dividing_by_zero() -> None:
+def test_keys_at_equal_times_are_a_jump_without_dividing_by_zero() -> None:
     keys = [(0, 0), (1, 1), (1, 5), (2, 6)]
     for rule in TANGENT_RULES:
         values = evaluate(channel([(t, v, rule, rule) for t, v in keys]), np.array([1.0, 1.5]))
@@ -220,7 +220,7 @@ def test_clip_refuses_an_invalid_range(start, end) -> None:
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
 def test_real_walk_has_the_published_values() -> None:
-    """Section 10 of the format's specification."""
+    """The values are in section 10 of the format's specification."""
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     clip = scene.actors[0].clip
     assert clip is not None

@@ -66,7 +66,7 @@ def test_time_of_every_frame_maps_to_its_row(rate):
     assert (before == frames).all() and not fraction.any()
 
 
-def test_frames_have_their_times():
+def test_times_of_frames_include_gaps():
     assert (GAP.n_frames, GAP.end, GAP.time(4)) == (6, 2.25, 2.0)
     assert GAP.present.tolist() == [True, True, False, False, True, True]
 

@@ -1,4 +1,4 @@
-"""Edits of keyed transforms, with curves compared with closed forms before and after."""
+"""Edits of keyed transforms. Curves before and after are compared with closed forms."""
 
 import numpy as np
 import pytest

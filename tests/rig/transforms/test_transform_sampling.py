@@ -11,7 +11,7 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.transforms.rate import key_rate
 from viewer.rig.transforms.sampling import sample_transforms
 
-EXACT = 1e-14  # a few roundings of numbers near 1
+EXACT = 1e-14  # a few rounding errors of numbers near 1
 
 
 def test_linear_rotations_have_constant_speed_along_the_shorter_arc():

@@ -261,7 +261,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
     solved = np.linalg.lstsq(rows, np.concatenate([values, HOLD * gaps.ravel()]))[0]
     rotation = rotation_vector_to_matrix(solved[:3])
     grow = 1.0 + (float(solved[6]) if scales else 0.0)
-    grow = min(max(grow, 0.5), 2.0)  # The linearisation is invalid beyond these limits.
+    grow = min(max(grow, 0.5), 2.0)  # the linearisation is invalid beyond these limits
     # The step rotates and scales about the centre: p' = g R (p - c) + c + v.
     shift = grow * rotation @ (similarity.shift - center) + center + size * solved[3:6]
     return Similarity(

@@ -78,7 +78,7 @@ def at_vertices(
     used, first = np.unique(corners, return_index=True)
     place = np.full(len(places), -1)
     place[used] = first
-    rows = rows[place[same[rows]] >= 0]  # A vertex without triangles is not on the surface.
+    rows = rows[place[same[rows]] >= 0]  # a vertex without triangles is not on the surface
     at = place[same[rows]]
     triangles, barycentric = points.triangles.copy(), points.barycentric.copy()
     found, distances = points.positions.copy(), points.distances.copy()

@@ -144,7 +144,7 @@ def _symmetric(template: Figure, offsets: Floats, scale: float, transferred: Boo
     try:
         partners = joint_partners(template)
     except RigError:
-        return offsets  # The template is not symmetric, so there is no symmetry to preserve.
+        return offsets  # the template is not symmetric, so there is no symmetry to preserve
     flip = np.ones(3)
     flip[mirror_axis(template)] = -1.0
     zero = _zero_pose(skeleton)

@@ -131,7 +131,7 @@ def _factorised(matrix: Any) -> _Solve | None:
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
         )
-    except (RuntimeError, MemoryError):  # The matrix is singular or too large.
+    except (RuntimeError, MemoryError):  # the matrix is singular or too large
         return None
     return lambda right: factors.solve(right)
 

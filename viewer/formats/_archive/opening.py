@@ -11,7 +11,7 @@ from viewer.formats._source import Source
 
 __all__ = ["is_archive", "open_archive"]
 
-_LARGE = 32 << 20  # bytes; smaller pickles are read as a whole
+_LARGE = 32 << 20  # bytes up to which pickles are read as a whole
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"

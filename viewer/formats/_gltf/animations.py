@@ -18,7 +18,7 @@ from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 
 __all__ = ["read_animations"]
 
-_SAME_TIME = 1e-4  # seconds; rounding error of times in JSON
+_SAME_TIME = 1e-4  # rounding error of times in JSON, seconds
 
 
 @dataclass(slots=True)

@@ -110,7 +110,7 @@ def _omitted(told: Mapping[str, Any]) -> list[str]:
 
 
 def _toon(document: Document, element: Element) -> Toon:
-    """Return the toon shading of version 1.0; invalid values are those without shade."""
+    """Return the toon shading of version 1.0; an invalid shade colour means no shade."""
     told = element.values
     toony = value_of(told.get("shadingToonyFactor"), _TOONY)
     shift = value_of(told.get("shadingShiftFactor"), 0.0)
@@ -132,7 +132,7 @@ def _toon(document: Document, element: Element) -> Toon:
 
 
 def _rim(told: Mapping[str, Any]) -> Rim:
-    """Return the rim light; the defaults of the extension for invalid values."""
+    """Return the rim light; invalid values are replaced by the extension's defaults."""
 
     def color(name: str, default: tuple[float, float, float]) -> Any:
         value = rows_of(told.get(name), default)

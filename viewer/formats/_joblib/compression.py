@@ -16,7 +16,7 @@ from viewer.phrases import printable
 
 __all__ = ["is_compressed", "unpacked"]
 
-_SHORTEST = 12  # bytes; minimum size of a compressed pickle
+_SHORTEST = 12  # minimum size of a compressed pickle, bytes
 _PIECE = 1 << 20  # number of bytes unpacked at a time
 _PICKLE = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
 # The header of zlib may consist of letters, but in a text no control characters follow them.

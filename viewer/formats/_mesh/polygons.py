@@ -11,7 +11,8 @@ __all__ = ["Picks", "first_known", "picked", "triangles_of", "triangulate"]
 
 Picks = NDArray[np.integer]
 
-_MOST_CORNERS = 400  # larger polygons become fans, as ear clipping would take seconds
+# Maximum for ear clipping, which would take seconds for larger polygons; they become fans.
+_MOST_CORNERS = 400
 _CHUNK = 4_000_000  # (corner, corner) pairs per batch
 
 

@@ -27,8 +27,8 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_attributes"]
 
-_GROUP = 16  # elements
-_LARGEST_BLOCK = 256  # elements
+_GROUP = 16  # number of elements per group
+_LARGEST_BLOCK = 256  # maximum number of elements per block
 _BLOCK_BYTES = 8192
 _ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
 # Bits per delta of the four group modes: in version 0, and for control modes 0 and 1.

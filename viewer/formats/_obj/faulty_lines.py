@@ -171,7 +171,7 @@ def checked_corners(
     faces : FaceRows
         All faces of the file; their corners are changed.
     faults : list of CornerFault
-        Errors in these faces, to be recorded.
+        Errors in these faces, which the caller records.
     ends : dict of str to int
         Number of lines with each keyword.
 

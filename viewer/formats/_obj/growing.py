@@ -9,7 +9,7 @@ from numpy.typing import DTypeLike, NDArray
 
 __all__ = ["GrowingTable"]
 
-_GROWTH = 1.1  # of the capacity; new rows take memory even before they are used
+_GROWTH = 1.1  # growth factor of the capacity; new rows take memory even before they are used
 
 
 class GrowingTable:

@@ -22,7 +22,7 @@ __all__ = ["ObjParts", "read_parts"]
 # Smoothing groups, and keywords that a viewer does not need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
 _SHAPES = {b"l": "line", b"p": "point"}
-_WIDTHS = {"v": 3, "vt": 2, "vn": 3}  # numbers of an element
+_WIDTHS = {"v": 3, "vt": 2, "vn": 3}  # number of values of an element
 _RUNS = (b"usemtl", b"g", b"o")
 _NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
 
@@ -161,7 +161,7 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
 
 
 def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
-    """Return lines without faces of one or two corners, as which Blender once wrote loose edges."""
+    """Return lines without faces of one or two corners, once Blender's form of loose edges."""
     counts = np.array([len(lines.text(line).split()) - 1 for line in lines.of["f"].tolist()])
     is_edge = (counts > 0) & (counts < FEWEST)
     if not is_edge.any():

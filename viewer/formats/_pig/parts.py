@@ -138,7 +138,7 @@ def _from_folder(source: Source) -> PigFiles:
 def _text_part(source: Source, name: str, columns: int) -> Part:
     rows, offset_of = read_table(source, columns, _PARTS.get(name, ""))
     if name not in CORE and np.isnan(rows.sum()):
-        rows = rows[:0]  # An incomplete array cannot be used.
+        rows = rows[:0]  # an incomplete array cannot be used
     return Part(f"{name}.txt", rows, source, offset_of)
 
 

@@ -44,7 +44,7 @@ class BinaryRows:
         if element.count == 0:
             return False
         counts = self._list_sizes(element, self.position)[1]
-        # Longer lists than the file are refused with the element.
+        # Lists longer than the file are refused with the element.
         if sum(counts) > len(self.data) or any(count < 0 for count in counts):
             return False
         found = even_binary(element, self.data, self.position, self.order, counts)
@@ -126,7 +126,7 @@ class BinaryRows:
             self.position = int(cursor[-1])
 
     def finish(self) -> None:
-        """Warn about bytes after those of the last element."""
+        """Warn about bytes after the last element."""
         left = len(self.data) - self.position
         if left:
             self.source.warn("F006.ply-bytes", n=left)

@@ -68,7 +68,7 @@ class _Text:
         self._begins: Places | None = None
         self._firsts: Places | None = None
         self._values: Numbers | None = None
-        self.has_bad = False  # known when all values have been parsed
+        self.has_bad = False  # correct once all values have been parsed
 
     @property
     def data(self) -> bytes:
@@ -77,7 +77,7 @@ class _Text:
 
     @property
     def values(self) -> Numbers:
-        """All values; only irregular files need them at once."""
+        """All values; only irregular files need them together."""
         if self._values is None:
             self._values, bad = parse_numbers(self.data, self.start, len(self.data))
             if bad >= 0:

@@ -74,7 +74,7 @@ def read_rows(
     """
     values, bad = parse_numbers(source.data, block.start, block.end)
     if bad < 0 and len(values) == count * width:
-        values.flags.writeable = False  # The mesh can use a read-only array without a copy.
+        values.flags.writeable = False  # the mesh can use a read-only array without a copy
         begin, end = block.start, block.end
         return values.reshape(count, width), lambda row: source.number_offset(
             begin, end, width * row

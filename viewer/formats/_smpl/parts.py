@@ -31,7 +31,7 @@ _NOT_NEEDED = (
 IGNORED = frozenset(_NOT_NEEDED.split())
 """Keys of models that are not needed for posing."""
 
-_SHAPES = 300  # number of shapes of models with at least 400 columns; the expressions follow
+_SHAPES = 300  # number of shapes, before the expressions, of models with at least 400 columns
 _FEW_SHAPES = 10  # number of shapes of older models
 
 

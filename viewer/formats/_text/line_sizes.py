@@ -36,9 +36,9 @@ class LineSizes:
     marks: list[tuple[int, int]]
 
     def offset(self, line: int) -> int:
-        """Return an offset between the words of a line and those of the line before it.
+        """Return an offset between the words of a line and the words of the previous line.
 
-        That of the end of the text follows the last line.
+        The offset of the end of the text follows the last line.
         """
         if line >= len(self.words):
             return len(self.data)

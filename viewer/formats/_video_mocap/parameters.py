@@ -94,7 +94,7 @@ def recognises(archive: Archive) -> bool:
         budget = RowBudget(archive, _COST * _LOOKED_AT)
         try:
             return next(_found(archive, budget), None) is not None
-        except FormatError:  # There are thousands of dicts without poses.
+        except FormatError:  # there are thousands of dicts without poses
             return False
     is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
     return not is_plain or layout.place in _CAMERA or bool(layout.frames)

@@ -181,7 +181,7 @@ def claims_folder(source: Source, names: set[str]) -> bool:
     file = Source(source.path / first, max_size=source.max_size)
     try:
         return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
-    except FormatError:  # The folder is in another format.
+    except FormatError:  # the folder is in another format
         return False
 
 

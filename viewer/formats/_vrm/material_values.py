@@ -40,12 +40,12 @@ _AXES = {"_MainTex_ST": (0, 1), "_MainTex_ST_S": (0,), "_MainTex_ST_T": (1,)}
 
 
 def old_binds(told: Any, materials: list[Any]) -> tuple[list[Bind], list[str]]:
-    """Return the changes by an expression of version 0.x, and labels of those without effect.
+    """Return the changes by an expression of version 0.x, and labels of changes without effect.
 
     Parameters
     ----------
     told : Any
-        A member of ``blendShapeGroups``, as parsed.
+        A member of ``blendShapeGroups``, as parsed from JSON.
     materials : list
         ``materialProperties``, whose names the expression uses.
     """
@@ -80,7 +80,7 @@ def _linear(name: str, value: Floats) -> Floats:
 def main_transform(properties: Any) -> Floats:
     """Return scale and offset of the texture coordinates of a material, origin at the top: (4,).
 
-    ``properties``: a member of ``materialProperties``, as parsed.
+    ``properties``: a member of ``materialProperties``, as parsed from JSON.
     """
     value = rows_of(part(properties, "vectorProperties", "_MainTex"), (0.0, 0.0, 1.0, 1.0))
     x, y, width, height = (0.0, 0.0, 1.0, 1.0) if value is None else value.tolist()
@@ -88,9 +88,9 @@ def main_transform(properties: Any) -> Floats:
 
 
 def modern_binds(told: Any, n_materials: int) -> tuple[list[Bind], list[str]]:
-    """Return the changes by an expression of version 1.0, and labels of those without effect.
+    """Return the changes by an expression of version 1.0, and labels of changes without effect.
 
-    ``told``: the expression, as parsed.
+    ``told``: the expression, as parsed from JSON.
     """
     found: list[Bind] = []
     lost: list[str] = []

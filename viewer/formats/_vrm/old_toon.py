@@ -1,7 +1,7 @@
 """Toon materials of VRM 0.x, ``materialProperties``, in the terms of VRM 1.0.
 
-Colours are sRGB, widths of outlines centimetres or hundredths of half the height of the picture,
-and rotations of texture coordinates turns per second.
+Colours are sRGB, widths of outlines are in centimetres or hundredths of half the image height, and
+rotations of texture coordinates are in revolutions per second.
 """
 
 from __future__ import annotations
@@ -39,18 +39,19 @@ _NUMBERS = {
     "_UvAnimScrollY": ("uvAnimationScrollYSpeedFactor", 0.0, -1.0),
     "_UvAnimRotation": ("uvAnimationRotationSpeedFactor", 0.0, 2.0 * np.pi),
 }
-# Default of each number without a counterpart, and textures without one.
+# Default of each number without a counterpart, and textures without a counterpart.
 _LOST_NUMBERS = {"_ReceiveShadowRate": 1.0, "_ShadingGradeRate": 1.0, "_LightColorAttenuation": 0.0}
 _LOST_TEXTURES = ("_ReceiveShadowTexture", "_ShadingGradeTexture")
 _MODES = ("none", "worldCoordinates", "screenCoordinates")
-_WIDTHS = (0.0, 0.01, 0.005)  # centimetres, and hundredths of half the height
-_WRITES_DEPTH = 3  # _BlendMode
+# Metres per centimetre, and image heights per hundredth of half the height.
+_WIDTHS = (0.0, 0.01, 0.005)
+_WRITES_DEPTH = 3  # value of _BlendMode
 
 
 def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
     """Return the members of ``VRMC_materials_mtoon``, and the properties without a counterpart.
 
-    ``told``: a member of ``materialProperties``, as parsed.
+    ``told``: a member of ``materialProperties``, as parsed from JSON.
     """
 
     def number(name: str, default: float) -> float:
@@ -86,7 +87,7 @@ def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
 
 
 def _textures(told: Any) -> dict[str, Any]:
-    """Return the textures, placed as the main texture except the sphere map."""
+    """Return the textures, placed like the main texture, except for the sphere map."""
     found, values = dict[str, Any](), main_transform(told).tolist()
     is_moved, place = values != [1.0, 1.0, 0.0, 0.0], {"scale": values[:2], "offset": values[2:]}
     for old, new in _TEXTURES.items():

@@ -109,7 +109,7 @@ class BackFaces:
         near = matrix[2] + matrix[3]
         distances = spheres[:, :3] @ near[:3] + near[3] - spheres[:, 3] * np.linalg.norm(near[:3])
         if not distances.min(initial=np.inf) > 0.0:
-            return None  # The near plane may cut the surface open.
+            return None  # the near plane may cut the surface open
         if not len(self._borders):
             return ()
         clip = self._borders @ matrix[[0, 1, 3], :3].T + matrix[[0, 1, 3], 3]

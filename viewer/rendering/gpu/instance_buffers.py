@@ -123,7 +123,7 @@ class InstanceBuffers:
         changed = [row for row, key in enumerate(keys) if row >= len(old) or key != old[row]]
         self._how, self._skinning_key, self.count = how, skinning_key, len(poses)
         if changed:
-            self._keys = []  # After an error, everything is uploaded again.
+            self._keys = []  # after an error, everything is uploaded again
             self._reserve(len(poses))
             # Sums of pose correctives differ between actors and are uploaded separately.
             self._rest.update(figure, poses[0], replace(how, correctives=False))

@@ -72,7 +72,7 @@ class SummedOffsets:
             self._weights = grown
         self._weights[rows] = weights
         if not self._weights[:count].any():
-            self._sums = self._sums[:0]  # All sums are invalid.
+            self._sums = self._sums[:0]  # all sums are invalid
             return
         if self.way == "texture":
             self._list_weights(count)

@@ -89,7 +89,7 @@ class Target:
             check_errors(context, f"an image of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
-            context.clear_errors()  # This clears the error of the failed allocation.
+            context.clear_errors()  # this clears the error of the failed allocation
             raise self._no_room() from None
 
     def _allocate(self) -> None:

@@ -48,7 +48,7 @@ _GROUPS = (
     ("NotoSansThai-Regular.ttf", "Loma.ttf", "LeelawUI.ttf"),
     ("DejaVuSans.ttf", "Arial Unicode.ttf", "FreeSans.ttf"),
 )
-_NOWHERE = "\uffff"  # Not a character, so every font draws its glyph for missing characters.
+_NOWHERE = "\uffff"  # not a character, so every font draws its glyph for missing characters
 
 
 def interface_font() -> Path | None:

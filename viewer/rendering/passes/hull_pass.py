@@ -41,9 +41,9 @@ def draw_hulls(
     Parameters
     ----------
     array : moderngl.VertexArray
-        The mesh with the program of ``hull.vert``, whose other uniforms are set.
+        The mesh with the program of ``hull.vert``, whose other uniforms are already set.
     runs : sequence of MeshRun
-        Of ``outlined_runs``.
+        Result of ``outlined_runs``.
     placement : (4, 4)
         Matrix from figure space to scene space.
     unit : str
@@ -51,7 +51,7 @@ def draw_hulls(
     options : DisplayOptions
         Display options.
     is_mirrored : bool
-        Whether the mesh is reflected, which turns its front faces over.
+        Whether the mesh is reflected, which reverses the winding of its front faces.
     """
     program, context = array.program, array.ctx
     scale = float(np.cbrt(abs(np.linalg.det(placement[:3, :3])))) / METRES.get(unit, 1.0)

@@ -68,7 +68,7 @@ class MotionPathBuffers:
         key = (id(actor.clip), joints, min_confidence, actor.offset, *_still(actor))
         if key == self._key or actor.clip is None:
             return
-        self._clip = actor.clip  # A reference keeps the clip alive, so that its id is not reused.
+        self._clip = actor.clip  # a reference keeps the clip alive, so that its id is not reused
         path = motion_path(
             actor.figure, actor.clip, joints, base=actor.pose, min_confidence=min_confidence
         )
@@ -190,7 +190,7 @@ class MotionPathPass:
         }
         set_uniforms(program, values)
         array = paths.array(program)
-        with without_depth_writes(self.context):  # Overlapping lines must not hide each other.
+        with without_depth_writes(self.context):  # overlapping lines must not hide each other
             for opacity in opacities(self.context, _HIDDEN):
                 set_uniforms(program, {"u_opacity": opacity})
                 array.render(moderngl.TRIANGLE_STRIP, vertices=4, instances=paths.count)

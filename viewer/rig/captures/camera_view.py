@@ -62,7 +62,7 @@ class CameraView:
     translation : (3,)
         T, scene units.
     size : (int, int) or None
-        Width and height of its images, if the files give them.
+        Width and height of its images, if the files state them.
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     motion : CameraMotion or None

@@ -1,6 +1,6 @@
 """Layouts of captured keypoints, chosen by keypoint count: names, limbs and sides.
 
-body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others are those of
+body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others come from
 COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe.
 """
 

@@ -15,7 +15,7 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["resampled"]
 
-_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame are treated as that frame
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, for times that are treated as that frame
 _MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per second
 
 

@@ -16,11 +16,14 @@ from viewer.rig.retargeting.joint_names import sided_words
 
 __all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
 
-_LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable direction
-# Fraction of the figure's size: a head this far from the centre is in front of the body.
+# Minimum length of offsets with a reliable direction, as a fraction of the figure's size.
+_LEAST = 0.01
+# Minimum distance from the centre, as a fraction of the figure's size, of a head in front of the
+# body.
 _CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
-_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and range of the ankles
+# Height of the soles and range of the ankles, as fractions of the figure's height.
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)
 # Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
 _MIRRORED = 0.98
 _LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
@@ -69,7 +72,7 @@ def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     """Return evidence from the ends of an animal: the head is in front, the tail behind.
 
-    A head directly above the centre, as in people, gives no evidence.
+    A head directly above the centre, as in people, is no evidence.
     """
     words = [word for _, word in sided_words(names)]
     heads = [j for j, word in enumerate(words) if word.startswith("head")]

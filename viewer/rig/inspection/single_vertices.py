@@ -88,7 +88,7 @@ def check_vertices(figure: Figure, vertices: Ints) -> None:
     Raises
     ------
     RigError
-        If an index is out of range; the message gives the index and the range.
+        If an index is out of range; the message states the index and the range.
     """
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]

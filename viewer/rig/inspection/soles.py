@@ -154,7 +154,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
     vertices = owners(skin)
     order = np.lexsort((skin.weights, vertices))
     last = np.flatnonzero(np.diff(vertices[order], append=-1))
-    strongest = order[last]  # strongest influence of each vertex that has any
+    strongest = order[last]  # strongest influence of each vertex that has influences
     strongest = strongest[is_foot[skin.joints[strongest]] & (skin.weights[strongest] > 0.0)]
     if len(strongest) == 0:
         return None

@@ -65,7 +65,7 @@ class MaterialBinds:
         materials : sequence of Material
             Materials of the mesh.
         weights : (N,)
-            Displayed weights of the blend shapes; missing ones count as 0.
+            Displayed weights of the blend shapes; missing weights are treated as 0.
         """
         whole = np.zeros(max(int(self.shapes.max(initial=-1)) + 1, len(weights)))
         whole[: len(weights)] = weights
@@ -131,7 +131,7 @@ def _moved(
 
 
 def _placed(texture: Texture, moves: list[tuple[float, Floats]]) -> Texture:
-    """Return a texture with weighted targets of its scale and offset; its rotation is kept.
+    """Return a texture with weighted targets of its scale and offset; its rotation is unchanged.
 
     With v flipped, M = [[a, -b, b + x], [-c, d, 1 - d - y]] for the linear part (a, b; c, d) = R S
     and the offset (x, y).

@@ -1,4 +1,4 @@
-"""Textures: an image, and how it is placed and sampled."""
+"""Textures: images with their placement and sampling."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MINIFICATIONS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Texture:
-    """An image, and how it is placed and sampled.
+    """An image, and its placement and sampling.
 
     Attributes
     ----------

@@ -11,7 +11,7 @@ from viewer.rig.materials.texture import Texture
 __all__ = ["OUTLINE_MODES", "Outline", "Rim"]
 
 OUTLINE_MODES = ("world", "screen")
-"""Widths of outlines: lengths, or fractions of the height of the picture."""
+"""Units of outline widths: lengths, or fractions of the image height."""
 
 Color = tuple[float, float, float]
 
@@ -20,21 +20,21 @@ Color = tuple[float, float, float]
 class Rim:
     """Light at the edges of a surface, added to its colour.
 
-    With the normal n and the direction v to the eye, it is (f m + c s) t, where m is the matcap,
-    s = clamp(1 - n . v + lift)^power, and t the texture.
+    With the normal n and the direction v to the eye, the added light is (f m + c s) t, where m is
+    the matcap, s = clamp(1 - n . v + lift)^power, and t the texture.
 
     Attributes
     ----------
     color : (r, g, b)
         c, linear.
     power, lift : float
-        Exponent, at least 0; summand.
+        Exponent, at least 0, and summand.
     mix : float
-        0 to 1: how much the light on the surface multiplies the rim.
+        0 to 1: degree to which the rim is multiplied by the light on the surface.
     texture : Texture or None
         t, sRGB.
     matcap : Texture or None
-        m, a picture of a lit sphere, sRGB.
+        m, an image of a lit sphere, sRGB.
     matcap_factor : (r, g, b)
         f, linear.
     """
@@ -73,7 +73,7 @@ class Outline:
     mix : float
         0 to 1: how much the colour of the surface multiplies that of the line.
     texture : Texture or None
-        Factor on the width, in the green channel.
+        Factor of the width, in the green channel.
     """
 
     width: float

@@ -43,7 +43,7 @@ __all__ = [
 ]
 
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
-_UNCHANGED = 1e-9  # radians or lengths; a DOF this close to its curve is treated as unchanged
+_UNCHANGED = 1e-9  # tolerance, in radians or lengths, within which a DOF equals its curve
 
 
 def add_key(
@@ -55,8 +55,8 @@ def add_key(
     """Return a channel with one more key, and its index.
 
     Without value and tangents, a key between others preserves the curve exactly: it gets the slope
-    of the curve there, and neighbours whose rules depend on adjacent keys keep their slopes as
-    explicit values. An existing key at this time is changed instead.
+    of the curve there, and neighbours whose rules depend on adjacent keys get their current slopes
+    as explicit values. An existing key at this time is changed instead.
 
     Parameters
     ----------
@@ -176,7 +176,7 @@ def set_key(
 
 
 def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
-    """Return a channel without the given keys; the others keep their tangents."""
+    """Return a channel without the given keys; the tangents of other keys are unchanged."""
     stays = np.ones(len(channel.times), dtype=np.bool_)
     stays[list(keys)] = False
     return replace(

@@ -42,7 +42,8 @@ def single_frame(
     Returns
     -------
     SampledAnimation
-        Its ``motion`` also contains the frame: one key per DOF for rigs with keyed clips.
+        Animation whose ``motion`` also contains the frame: one key per DOF for rigs with keyed
+        clips.
 
     Raises
     ------

@@ -36,7 +36,7 @@ _COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 class TransformChannel:
     """The keys of one property of one joint, or of the weights of blend shapes.
 
-    Before its first and after its last key a channel keeps the value of that key (glTF 2.0,
+    Before its first key and after its last key, a channel has the value of that key (glTF 2.0,
     section 3.11).
 
     Attributes
@@ -105,7 +105,7 @@ class TransformClip:
     name : str
         Display name.
     channels : tuple of TransformChannel
-        At most one per joint and path; properties without a channel keep their values in the pose.
+        At most one per joint and path; properties without a channel have their values in the pose.
     start, end : float
         Playback range in seconds.
     """

@@ -17,7 +17,7 @@ __all__ = ["CUSTOM", "guess_up"]
 CUSTOM = "z"
 """Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
 
-_ENOUGH = 64  # maximum number of frames per person; more would not change the result
+_ENOUGH = 64  # maximum number of frames per person, as more frames would not change the result
 _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
 _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 

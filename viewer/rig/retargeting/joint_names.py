@@ -53,8 +53,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # fraction of the joints; a first word shared by more joints is a prefix
-_MOST = 2000  # maximum number of joints; a skeleton with more is not a body
+_SHARED = 0.6  # fraction of the joints above which a shared first word is a prefix
+_MOST = 2000  # maximum number of joints of a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
@@ -172,8 +172,8 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
 
     Words whose meaning depends on the convention are resolved by the skeleton's other names:
     ``LeftShoulder`` is a collar if there is a ``LeftArm``, ``LeftFoot`` an ankle if there
-    is none. Chains of spine joints are numbered from the pelvis; of more than three, the first,
-    middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
+    is none. Chains of spine joints are numbered from the pelvis; if there are more than three, the
+    first, middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
 
 
 def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
-    """Name the pelvis: the joint above both legs, or else above the first leg or spine joint."""
+    """Name the pelvis: the joint above both legs; otherwise, above the first leg or spine."""
     legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
     paths = [_ancestors(joint, parents) for joint in legs]
     shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []

@@ -67,7 +67,7 @@ def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
     holds = np.zeros((2, len(plan.feet[0].toe), len(legs)))
     flat = np.zeros_like(holds)
     for foot, leg in enumerate(legs):
-        if plan.feet[foot].toe is plan.feet[foot].heel:  # Animals stand on their toes.
+        if plan.feet[foot].toe is plan.feet[foot].heel:  # animals stand on their toes
             continue
         for contact, rows, _ in plan.stances(foot):
             holds[:, rows, foot] = contact.hold

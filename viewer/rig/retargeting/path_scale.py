@@ -12,7 +12,7 @@ from viewer.rig.retargeting.rest_poses import RestPose
 
 __all__ = ["path_scale"]
 
-_ROUNDING = 1e-9  # a ratio this close to 1 is treated as 1
+_ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),

@@ -117,7 +117,7 @@ def plant_feet(
     feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
     how = spans_of(timing), timing.frame_rate
     moves = ground_velocity(feet, *how, body.size, up)
-    if moves is not None:  # Contacts and corrections are found in the axes of the ground.
+    if moves is not None:  # contacts and corrections are found in the axes of the ground
         seconds = np.flatnonzero(timing.present) / timing.frame_rate
         travel = -seconds[:, None] * moves
         body = replace(body, travel=travel)

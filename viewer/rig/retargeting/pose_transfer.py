@@ -50,7 +50,7 @@ __all__ = [
     "rotate_joints",
 ]
 
-_INEXACT = 1e-4  # radians; a rotation with a smaller error is treated as reached
+_INEXACT = 1e-4  # error in radians below which a rotation is treated as reached
 _REST_DIGITS = 5  # number of decimals to which equal rest rotations agree
 
 
@@ -254,7 +254,7 @@ def _partners(source: JointRotations, target: Skeleton) -> Ints:
     """Return the source joint of each target joint, by name, then by stated bones; -1 for none."""
     partners = joints_by_name(source.names, target.names)
     if source.meanings or target.humanoid is not None:
-        # The names of other figures may be those of the SMPL family.
+        # Other figures may have the names of the SMPL family.
         theirs = source.meanings or source.names
         mine = target.names if target.humanoid is None else joint_meanings(target)
         meant = joints_by_name(theirs, mine)

@@ -17,7 +17,7 @@ __all__ = ["SIDES", "Postures", "postures_of", "rest_posture", "unit"]
 
 SIDES = ("left", "right")
 _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_MOST = 4000  # maximum number of frames; of longer motions, every n-th frame is used
+_MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -25,7 +25,8 @@ _SAME = np.cos(np.radians(20.0))
 _NATURAL = np.cos(np.radians(25.0))
 # Cosine of the maximum angle of an upright body from the up axis.
 _UPRIGHT = np.cos(np.radians(25.0))
-_SHORT = 1e-6  # fraction of the skeleton's size; shorter bones have no reliable direction
+# Minimum length of bones with a reliable direction, as a fraction of the skeleton's size.
+_SHORT = 1e-6
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")

@@ -44,7 +44,7 @@ from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
 
-_STILL = 1e-6  # fraction of the skeleton's size; position channels with less motion are ignored
+_STILL = 1e-6  # minimum motion of used position channels, as a fraction of the skeleton's size
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:

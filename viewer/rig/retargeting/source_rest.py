@@ -26,7 +26,8 @@ __all__ = ["SourceRest", "rest_fault", "with_source_rest"]
 SourceRest = int | str
 """A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
 
-_FOLDED = np.cos(np.radians(60.0))  # joint chains this close to the trunk's direction are not legs
+# Cosine of the minimum angle between the trunk and a leg's bones.
+_FOLDED = np.cos(np.radians(60.0))
 _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
 _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal

@@ -95,8 +95,7 @@ class Skinning:
     blend_factor : float
         Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
     max_influences : int
-        Keep only this many of the strongest influences, scaled to a sum of 1; 0 keeps all as
-        stored.
+        Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool

@@ -24,7 +24,7 @@ from viewer.rig.skinning._normals import inverse_transposed
 __all__ = ["deform", "linear_maps", "split_palette"]
 
 _CHUNK = 1 << 16  # number of vertices per chunk, which limits the memory for large meshes
-_RIGID = 1e-12  # a stretch this close to the identity is a rounding error
+_RIGID = 1e-12  # tolerance within which a stretch is treated as the identity
 _TINY = 1e-12  # minimum length of a blended quaternion that defines a rotation
 
 

@@ -49,8 +49,8 @@ def added_key(
     time : float
         Seconds. An existing key at this time is changed instead.
     value : (C,), optional
-        Its value; by default the curve keeps its shape. A cubic key with a value gets the slope
-        between its neighbours.
+        Its value; by default the shape of the curve is unchanged. A cubic key with a value gets the
+        slope between its neighbours.
     """
     there = key_at(channel, time)
     if there >= 0:

@@ -40,7 +40,7 @@ __all__ = [
 Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
 
-_STEEPEST = math.radians(90.0)  # limit of the middle angle; beyond it, angles are ambiguous
+_STEEPEST = math.radians(90.0)  # limit of the middle angle, beyond which angles are ambiguous
 
 
 def with_transform_channel(
