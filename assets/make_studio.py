@@ -1,4 +1,4 @@
-"""Generate the light of metallic-roughness shading, and the matcaps, in assets/studio.
+"""Generate the light of metallic-roughness shading, and the matcaps in assets/studio.
 
 Run ``python assets/make_studio.py`` from any folder; it takes about two minutes. Needs numpy.
 Writes ``studio.npz``:
@@ -24,7 +24,7 @@ from studio_generator.studio import radiance
 
 SIZE, LAYERS, SAMPLES, TABLE = 128, 9, 1024, 64
 MATCAP_SIZE = 256
-# Bits of the mantissa that are kept: steps of 0.4 %, and the file compresses to a third.
+# Number of preserved bits of the mantissa: steps of 0.4 %, and the file compresses to a third.
 _KEPT_BITS = 8
 
 

@@ -1,5 +1,5 @@
 #version 330
-// A texture times a factor.
+// Multiplies a texture by a factor.
 
 in vec2 v_place;
 

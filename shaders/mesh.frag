@@ -1,6 +1,6 @@
 #version 330
 // Two-sided shading of a surface in camera space, with linear colours. The result of a chunk is
-// shown as it is: lit chunks apply the tone curve, chunks that show data do not.
+// displayed unchanged: lit chunks apply the tone curve, chunks that show data do not.
 
 #pragma include tone
 #ifdef SHADOWS
@@ -18,6 +18,11 @@ uniform bool u_flat;            // one normal per triangle
 uniform bool u_orthographic;
 uniform float u_opacity;
 
+#ifdef HULL
+uniform vec3 u_outline_color;   // linear
+uniform float u_outline_mix;    // 0 to 1: degree to which the surface's colour multiplies it
+#endif
+
 out vec4 f_color;               // sRGB, premultiplied by alpha
 
 #pragma chunk
@@ -33,11 +38,18 @@ void main() {
     // Flip normals that face away. The threshold is well beyond 90 degrees: at exactly 90 degrees
     // rounding would flip pixels at random.
     float side = dot(normal, face) < -0.1 ? -1.0 : 1.0;
+#ifdef HULL
+    side = 1.0;                 // back faces of a hull are lit like the surface at its edge
+#endif
     normal *= side;
     float opacity = u_opacity * v_opacity;
 #ifdef MATERIALS
     normal = mapped_normal(v_position, normal, side);
     opacity *= surface_alpha();
 #endif
-    f_color = vec4(encode(shade(v_position, normal, to_eye)) * opacity, opacity);
+    vec3 color = shade(v_position, normal, to_eye);
+#ifdef HULL
+    color = u_outline_color * mix(vec3(1.0), color, u_outline_mix);
+#endif
+    f_color = vec4(encode(color) * opacity, opacity);
 }

@@ -43,7 +43,7 @@ void main() {
     way = v_length > 0.0 ? way / v_length : vec2(1.0, 0.0);
     v_radius = 0.5 * in_width;
     bool at_end = gl_VertexID >= 2;
-    // Half a pixel more on all sides, for antialiased edges.
+    // Extend all sides by half a pixel, for antialiased edges.
     float reach = v_radius + u_border + 0.5;
     float along = at_end ? reach : -reach, side = gl_VertexID % 2 == 0 ? -reach : reach;
     vec4 place = at_end ? end : start;

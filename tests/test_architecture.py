@@ -151,7 +151,7 @@ def part_of(path: Path) -> str:
     return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
 
 
-def test_imports_point_one_way() -> None:
+def test_imports_follow_the_allowed_directions() -> None:
     for path in SOURCES:
         allowed = ALLOWED.get(part_of(path))
         if allowed is None:
@@ -161,11 +161,11 @@ def test_imports_point_one_way() -> None:
 
 
 def part_of_app(name: str) -> str:
-    """Return the folder of a module of the window, or the module itself if it is in none."""
+    """Return the folder of a window module, or the module itself if it is in no folder."""
     return name.split(".")[2]
 
 
-def test_window_features_import_one_way() -> None:
+def test_window_features_follow_the_allowed_directions() -> None:
     folders = {path.name for path in (PACKAGE / "app").iterdir() if path.is_dir()}
     assert folders - {"__pycache__"} <= set(ALLOWED_IN_APP)
     for path in (PACKAGE / "app").rglob("*.py"):
@@ -176,13 +176,13 @@ def test_window_features_import_one_way() -> None:
         assert "viewer.app" not in names, path
 
 
-def test_folders_stay_small() -> None:
+def test_folders_have_few_files() -> None:
     folders = {path.parent for path in SOURCES}
     counts = {str(path.relative_to(PACKAGE)): len([*path.glob("*.py")]) for path in folders}
     assert not {name for name, count in counts.items() if count > 30}
 
 
-def test_test_files_stay_short_in_folders_that_mirror_the_sources() -> None:
+def test_test_files_are_short_in_folders_that_mirror_the_sources() -> None:
     for path in TEST_FILES:
         assert path.read_text().count("\n") <= 400, path
     counts = Counter(path.parent.relative_to(TESTS).as_posix() for path in TEST_FILES)
@@ -213,7 +213,7 @@ def test_third_party_modules_are_imported_by_one_part_only() -> None:
             assert homes is None or any(inside.startswith(home) for home in homes), (path, name)
 
 
-def test_dataclasses_compile_nothing_at_import() -> None:
+def test_standard_dataclass_decorator_is_not_used() -> None:
     """The decorator of the standard library delays every start by 0.5 ms for each class."""
     for path in SOURCES:
         found = re.search(
@@ -222,7 +222,7 @@ def test_dataclasses_compile_nothing_at_import() -> None:
         assert not found, path
 
 
-def test_files_and_functions_stay_short() -> None:
+def test_files_and_functions_are_short() -> None:
     for path in SOURCES:
         assert path.read_text().count("\n") <= 400, path
         for node in nodes(path):

@@ -1,4 +1,4 @@
-"""The dataclass decorator of the package against that of the standard library."""
+"""The dataclass decorator of the package, compared with that of the standard library."""
 
 import copy
 import dataclasses
@@ -87,7 +87,7 @@ def made(kinds, name):
 def test_fields_slots_and_signature_are_those_of_the_standard_decorator(name):
     ours, standard = getattr(classes(data_classes.dataclass), name), getattr(STANDARD, name)
 
-    # Asked of a class without instances, whose ``__init__`` is not compiled yet.
+    # The class has no instances yet, so its ``__init__`` is not compiled.
     assert str(inspect.signature(ours)) == str(inspect.signature(standard)).removesuffix(" -> None")
     assert getattr(ours, "__slots__", None) == getattr(standard, "__slots__", None)
     assert ours.__match_args__ == standard.__match_args__
@@ -149,7 +149,7 @@ def test_frozen_fields_are_neither_assigned_nor_deleted():
         assert point.x == 1.0
 
 
-def test_subclasses_of_frozen_classes_have_attributes_of_their_own():
+def test_subclasses_of_frozen_classes_can_have_further_attributes():
     class Named(OURS.Single):
         pass
 
@@ -161,7 +161,7 @@ def test_subclasses_of_frozen_classes_have_attributes_of_their_own():
         named.value = 1.0
 
 
-def test_each_instance_gets_its_own_default_of_a_factory():
+def test_each_instance_gets_a_new_default_from_a_factory():
     first, second = OURS.Point(1.0), OURS.Point(1.0)
     first.names.append("a")
 
@@ -174,7 +174,7 @@ def test_replace_changes_some_fields():
     assert (changed.x, changed.y, changed.names) == (1.0, 5.0, ["a"])
 
 
-def test_pickle_keeps_frozen_instances_with_slots():
+def test_frozen_instances_with_slots_can_be_pickled():
     loaded = pickle.loads(pickle.dumps(Stored("a", (1, 2))))
 
     assert (loaded.name, loaded.values) == ("a", (1, 2))

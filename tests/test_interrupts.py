@@ -146,7 +146,7 @@ INFO = ("info",), {}
         "viewer.rendering.gpu.program",
     ],
 )
-def test_interrupted_import_ends_in_one_line(end, module):
+def test_interrupted_import_prints_one_line(end, module):
     command, places = PNG
     moment = f"sys.meta_path.insert(0, At({module!r}))"
     assert end(moment, INT, *command, **places, imports=True) == (*ENDINGS[INT], OLD)
@@ -304,7 +304,7 @@ def test_run_works_in_another_thread(tmp_path, capsys):
     assert codes == [0] and not capsys.readouterr().err
 
 
-def test_signal_raises_inside_watched(ctrl_c):
+def test_signal_raises_an_exception_inside_watched(ctrl_c):
     reached = []
     with pytest.raises(Interrupted) as stop, watched():
         ctrl_c()
@@ -312,7 +312,7 @@ def test_signal_raises_inside_watched(ctrl_c):
     assert stop.value.exit_code == 130 and not reached
 
 
-def test_deferred_signal_raises_at_the_end_of_the_block(ctrl_c):
+def test_deferred_signal_raises_an_exception_at_the_end_of_the_block(ctrl_c):
     reached = []
     with pytest.raises(Interrupted), watched():
         with deferred():
@@ -334,7 +334,7 @@ def test_signal_outside_watched_is_left_to_the_caller(ctrl_c):
     assert signal.getsignal(INT) is signal.default_int_handler
 
 
-def test_held_signal_waits_for_a_poll(ctrl_c):
+def test_held_signal_is_raised_by_a_poll(ctrl_c):
     reached = []
     with pytest.raises(Interrupted), watched():
         hold()
@@ -353,7 +353,7 @@ def test_held_signal_without_a_poll_is_dropped(ctrl_c):
     gc.collect()
 
 
-def test_hold_lasts_until_the_end_of_the_block(ctrl_c):
+def test_signal_is_held_until_the_end_of_the_block(ctrl_c):
     reached = []
     with pytest.raises(Interrupted), watched():
         with deferred():

@@ -67,14 +67,14 @@ def refusal(*paths, **options):
 # Pairs
 
 
-def test_skeleton_alone_opens_as_boxes(files):
+def test_skeleton_without_a_skin_opens_as_boxes(files):
     scene = viewer.load(*files("2.skel"))
     assert parts(scene) == [("2", 2, None)]
     assert scene.actors[0].pose is not None
     assert scene.warnings == ()
 
 
-def test_skin_alone_opens_in_bind_pose(files):
+def test_skin_without_a_skeleton_opens_in_bind_pose(files):
     scene = viewer.load(*files("2.skin"))
     assert parts(scene) == [("2", None, 2)]
     assert scene.actors[0].pose is None

@@ -43,7 +43,7 @@ def units(scene):
     return [actor.figure.unit for actor in scene.actors]
 
 
-def test_bvh_alone_keeps_its_file_units(bvh):
+def test_single_bvh_keeps_its_file_units(bvh):
     path = bvh()
     scene = load(path)
     assert units(scene) == ["cm"] and scene.warnings == (f"{path}: {GUESS}; --unit overrides it",)

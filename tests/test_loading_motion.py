@@ -145,7 +145,8 @@ def test_people_without_shapes_are_reported_once(tmp_path, smpl):
         f"{tmp_path / 'output'}: no shape coefficients in the files: the model's mean shape is "
         "used for all"
     )
-    assert load(tmp_path / "output", smpl).warnings == (text,)
+    motion = MotionSettings(frame_rate=30.0)
+    assert load(tmp_path / "output", smpl, motion=motion).warnings == (text,)
     (folder / "000299.json").write_text(json.dumps([person(0, 0.0), people[1]]))
     assert text not in load(tmp_path / "output", smpl).warnings
 
@@ -162,7 +163,7 @@ def test_requested_up_axis_is_used(recording, smpl):
     assert_allclose(turned.actors[1].placement[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-15)
 
 
-def test_hands_alone_require_a_hand_model(tmp_path):
+def test_hands_without_bodies_require_a_hand_model(tmp_path):
     folder = tmp_path / "smpl"
     folder.mkdir()
     record = person(0, 0.0) | {"poses": [[0.0] * 9]}
@@ -231,7 +232,7 @@ def test_morph_is_added_to_its_skin_with_or_without_a_skeleton(tmp_path):
         assert (viewer.deform(actor.figure, actor.pose)[0] != rest).any()
 
 
-def test_morph_alone_and_morph_of_another_skin_are_refused(tmp_path):
+def test_morph_without_a_skin_and_morph_of_another_skin_are_refused(tmp_path):
     morph = tmp_path / "smile.morph"
     morph.write_text("positions 1 { 99999 5 6 7 } normals 1 { 99999 0 0 1 }")
     with pytest.raises(RigError, match=r"open it together with its \.skin"):

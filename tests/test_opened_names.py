@@ -88,7 +88,7 @@ def test_dot_in_a_folder_name_is_not_a_suffix(tmp_path):
     assert names(tmp_path / "dance.v2")[1] == "dance.v2"
 
 
-def test_body_motions_are_named_after_their_file_whatever_the_model(walk, tmp_path):
+def test_body_motions_are_named_after_their_file_for_any_model(walk, tmp_path):
     assert names(walk) == (["walk"], "walk")
     (tmp_path / "jump.bvh").write_text(BVH)
     driven = load(bundled_body_path(), tmp_path / "jump.bvh")

@@ -33,7 +33,7 @@ def call(*command: object, cwd: Path) -> str:
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("wheel")
-    # No isolation: hatchling is a development dependency, and the network may be away.
+    # Without isolation: hatchling is a development dependency, and the network may be unavailable.
     build = ("-m", "build", "--wheel", "--no-isolation", "--outdir", folder)
     call(sys.executable, *build, ROOT, cwd=folder)
     return next(folder.glob("*.whl"))
@@ -55,7 +55,7 @@ def test_wheel_draws_the_bundled_figure_in_an_empty_environment(
 ) -> None:
     venv.create(tmp_path / "venv")
     python = tmp_path / "venv" / "bin" / "python"
-    # Our own pip installs into it, and compiles nothing: both take longer than the rest.
+    # The pip of this environment installs into it without compilation, which takes much less time.
     pip = (sys.executable, "-m", "pip", "--disable-pip-version-check", "--python", python)
     call(*pip, "install", "--quiet", "--no-compile", wheel, cwd=tmp_path)
     picture = tmp_path / "fox.png"

@@ -42,7 +42,7 @@ def shell(line: str, *words: str, folder: Path | None = None) -> subprocess.Comp
 
 
 def refused(done: subprocess.CompletedProcess, *words: str) -> None:
-    """Assert that one line says that the output cannot be written."""
+    """Assert that one line reports that the output cannot be written."""
     lines = done.stderr.decode().splitlines()
     assert done.returncode == 5 and len(lines) == 1, lines
     assert all(word in lines[0] for word in words), lines
@@ -105,7 +105,7 @@ def test_closed_error_stream_does_not_change_results(rig, tmp_path, sink):
     done = shell(f"viewer info missing.skel 2>{sink}", *rig)
     assert (done.returncode, done.stdout) == (2, b"")
     target = tmp_path / "x.bmp"
-    # That BMP is opaque is a warning.
+    # A warning states that BMP is opaque.
     line = f'viewer render "$@" -o "{target}" {SMALL} --background transparent'
     assert b"transparency" in shell(line, *rig).stderr
     done = shell(f"{line} --force 2>{sink}", *rig)
@@ -135,7 +135,7 @@ def test_redirected_file_is_appended_to(rig, tmp_path, options, name, begin):
     done = shell(line, *rig, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert log.read_bytes().startswith(b"precious\n" + begin)
-    # The message about the output goes to the stream that does not hold the image.
+    # The message about the output is written to the stream without the image.
     assert done.stderr.startswith(os.fsencode(name)) and done.stderr.count(b"\n") == 1
     assert os.fsencode(name) not in log.read_bytes()
 

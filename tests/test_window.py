@@ -36,7 +36,7 @@ DRAFT, FINAL = ("--quality", "draft"), ("--quality", "final")
 
 @pytest.fixture(scope="module")
 def display():
-    """The name of an Xvfb display of this module's own."""
+    """The name of an Xvfb display that only this module uses."""
     missing = [tool for tool in ("Xvfb", "xdotool") if shutil.which(tool) is None]
     if missing:
         text = f"{' and '.join(missing)} not installed"
@@ -50,7 +50,7 @@ def display():
         "0",
         "1400x900x24",
         "-r",  # a key that is released late, on a busy machine, must not repeat
-        "-noreset",  # a server that resets when its last client leaves refuses the next
+        "-noreset",  # a server that resets when its last client disconnects refuses the next one
         "-nolisten",
         "tcp",
     ]
@@ -102,7 +102,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     app = window()
     before = app.wait_until_quiet()
     x, y, width, height = map(int, view)
-    inside = (x, y, width, height - 90)  # the lowest part shows messages that go away
+    inside = (x, y, width, height - 90)  # the lowest part shows messages that disappear
     part = np.s_[y : y + inside[3], x : x + width]
 
     # A slider moves the figure, R restores it pixel by pixel.
@@ -134,7 +134,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     app.key("Tab")
     app.wait_until_changed(wide, (0, 100, 200, 500))
 
-    # Smaller, hidden and back, larger again.
+    # The window is made smaller, hidden, shown again, and made larger.
     app.tell("windowsize", app.id, 700, 500)
     _wait_for(lambda: app.screen()[600:, 900:].max() == 0, "the smaller window")
     app.wait_until_quiet()
@@ -153,7 +153,7 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     assert names[0] == [str(path.resolve()) for path in figure]
 
 
-def test_screenshot_is_the_headless_picture_to_the_pixel(window, places, figure):
+def test_screenshot_equals_the_headless_image_in_every_pixel(window, places, figure):
     app = window(*FINAL)
     app.key("F12")
     path = app.folder / f"{figure[1].stem}.png"
@@ -220,7 +220,7 @@ def test_text_is_typed_copied_and_pasted_as_in_other_programs(window, places):
     app.key("ctrl+q")
 
 
-def test_window_closes_as_window_managers_ask(window):
+def test_window_closes_at_the_request_of_window_managers(window):
     app = window()
     _ask_to_close(app.display, int(app.id))
     app.finish()
@@ -248,7 +248,7 @@ def test_layout_is_remembered_between_runs(window, places):
     app.key("ctrl+q")
     app.finish()
     assert (app.folder / "state" / "viewer" / "layout.ini").stat().st_size > 100
-    strip = np.s_[200:700, int(x) + 20 : int(x) + 100]  # was view, is panel now
+    strip = np.s_[200:700, int(x) + 20 : int(x) + 100]  # was in the view, is now in a panel
     assert (wider[strip] != before[strip]).mean() > 0.5
     again = window()
     _wait_for(lambda: (again.screen()[strip] == wider[strip]).mean() > 0.98, "the same layout")
@@ -280,7 +280,7 @@ def surface(figure):
     return middle, seen
 
 
-def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surface):
+def test_vertex_text_is_complete_wherever_the_mouse_is(window, places, surface):
     (x, y, width, height), (tab, seen) = places[1], surface
     part = np.s_[int(y) : int(y + height), int(x) : int(x + width)]
     app = window()
@@ -307,14 +307,14 @@ def test_vertex_text_is_complete_wherever_the_mouse_rests(window, places, surfac
 
 def test_idle_window_uses_no_cpu(window):
     app = window(*FINAL)
-    # Messages at the start go away after some seconds; until then frames are drawn.
+    # Messages at the start disappear after some seconds; until then frames are drawn.
     time.sleep(0.5)
     app.tell("mousemove", 640, 870)
 
     _wait_for(lambda: app.is_asleep(1.5), "an idle processor")
 
 
-def test_bad_file_opens_no_window(display, tmp_path):
+def test_invalid_file_opens_no_window(display, tmp_path):
     bad = tmp_path / "bad.skel"
     bad.write_text("balljoint root {\n offset 1 2\n}\n")
     environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}

@@ -38,7 +38,7 @@ def read_clipboard(environment):
 
 
 def offer_clipboard(environment, text):
-    """Put a text on the clipboard; return the process that holds it."""
+    """Put a text on the clipboard; return the process that owns it."""
     process = subprocess.Popen(
         [sys.executable, "-c", _OFFER, text], env=environment, stdout=subprocess.PIPE, text=True
     )

@@ -23,7 +23,7 @@ __all__ = ["protect_numbers", "run"]
 
 _EPILOG = """\
 Without a command, FILES open in a window; without files, the bundled figure does.
-"viewer COMMAND --help" lists a command's options, "viewer help" the pages of the manual.
+"viewer COMMAND --help" lists a command's options, and "viewer help" lists the manual's pages.
 
 exit codes: 0 success, 1 lint findings or diff above the tolerance, 2 bad input, 4 no usable OpenGL,
 5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that

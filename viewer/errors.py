@@ -54,7 +54,7 @@ class ViewerError(Exception):
 
     @property
     def cause(self) -> str | Diagnostic:
-        """The diagnostic if there is one, otherwise the line: a value for another diagnostic."""
+        """The diagnostic if there is one, otherwise the message; a value for another diagnostic."""
         return self.diagnostic or str(self)
 
     def _line(self, problem: str | Diagnostic) -> str:

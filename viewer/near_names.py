@@ -16,7 +16,7 @@ _LONGEST = 80  # maximum length of a name in characters
 
 
 def near_names(text: str, names: Iterable[str], alike: float = 0.6) -> list[str]:
-    """Return the names that resemble a text, the most likely first.
+    """Return the names that resemble the given text, the most likely first.
 
     Parameters
     ----------

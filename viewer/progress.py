@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["Cancelled", "Receiver", "receiving", "report", "report_bytes"]
+__all__ = ["Cancelled", "Receiver", "receiving", "report", "report_bytes", "silent"]
 
 Receiver = Callable[[int, int, str, str], None]
 """Called with the completed steps, their total (0 if unknown), their unit, and a description of the
@@ -29,6 +29,13 @@ def receiving(receive: Receiver) -> Iterator[None]:
         yield
     finally:
         _receiver.reset(token)
+
+
+@contextmanager
+def silent() -> Iterator[None]:
+    """Ignore progress reported in the block, whose caller reports the progress of the whole."""
+    with receiving(lambda done, total, unit, what: None):
+        yield
 
 
 def report(done: int, total: int, unit: str, what: str = "") -> None:

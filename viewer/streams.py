@@ -115,7 +115,7 @@ class _Messages(io.TextIOBase):
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write a text, or drop it if that fails."""
+        """Write text, or drop it if that fails."""
         try:
             self._stream.write(text)
         except (OSError, ValueError):

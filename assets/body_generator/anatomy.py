@@ -30,7 +30,7 @@ class Bend:
     low, high : (3,)
         Limits of the axis-angle components in degrees, left side.
     chain : (S,)
-        Joints whose polyline is the bone; the skin keeps its distance from it.
+        Joints whose polyline is the bone; the distance of the skin from it is preserved.
     above, below : (3,)
         Offsets from the joint to the flesh on either side of it, at rest.
     reach : float

@@ -21,8 +21,8 @@ SMOOTHING = 8  # smoothing iterations of the values that distinguish front and b
 # Coordinates at which charts end, metres.
 NECK, SHOULDER, WRIST, CROTCH, SOLE = 1.490, 0.200, 0.700, 0.800, 0.030
 
-# Trunk front, back; arm below, above; hand below, above; sole; head; leg front, back: vertical axis
-# and magnification of each chart.
+# Vertical axis and magnification of each chart: trunk (front, back), arm (below, above), hand
+# (below, above), sole, head, leg (front, back).
 UPWARDS = (1, 1, 0, 0, 0, 0, 2, 1, 1, 1)
 ENLARGED = (1.0, 1.0, 1.0, 1.0, 1.4, 1.4, 1.2, 1.6, 1.0, 1.0)
 

@@ -21,10 +21,10 @@ SAMPLES = 24  # number of random rotations per joint, in addition to those about
 RIDGE = 0.05
 ROUNDS = 3  # iterations of correction and smoothing
 SMOOTHING = 3  # smoothing passes per iteration
-LEAST = 3e-4  # metres; smaller corrections are dropped
+LEAST = 3e-4  # minimum length of corrections, metres; smaller ones are dropped
 MUSH_PASSES = 12  # iterations of smoothing a bend
 RESTORE = 0.85  # fraction of the lost distance to the bone that is restored
-DEEPEST = 0.05  # metres; maximum length of corrections
+DEEPEST = 0.05  # maximum length of corrections, metres
 STRAIGHT = 0.2  # minimum length of the sum of two unit vectors at a joint that has a fold
 
 
@@ -66,7 +66,7 @@ def _subtree(j: int) -> np.ndarray:
 
 
 def _influence(body: Body, bend: Bend, j: int) -> Floats:
-    """Return 0..1 (V,): 1 near the joint where its weights blend with its parent's."""
+    """Return values 0..1 (V,): 1 near the joint, where its weights blend with its parent's."""
     far = np.linalg.norm(body.vertices - CENTRES[j], axis=1) / bend.reach
     share = body.weights[:, _subtree(j)].sum(axis=1)
     mixed = np.clip(12 * share * (1 - share), 0, 1)
@@ -95,7 +95,7 @@ def _restored(body: Body, moved: Floats, line: Floats, rest_line: Floats) -> Flo
 
 
 def _fold_side(moved: Floats, bend: Bend, j: int, turned: Floats) -> Floats:
-    """Return 0..1 (V,): how far a point lies on the inner side of the bend."""
+    """Return values 0..1 (V,): how far each point is on the inner side of the bend."""
     inner = np.asarray(bend.above, float) + turned @ np.asarray(bend.below, float)
     size = np.linalg.norm(inner)
     if size < STRAIGHT:

@@ -18,8 +18,9 @@ FINGERS = (
     ((79, -1, -29), (110, -7, -37), (129, -13, -41.5), (147, -20, -45)),
 )
 THICKNESS = (9.4, 9.6, 9.2, 8.1)  # radius of each finger at the knuckle
-TAPER = (0.96, 0.88, 0.76)  # radii at the other joints and the tip, relative to that at the knuckle
-MILLIMETRE = 1e-3  # metres; the tables of the fingers are in millimetres
+# Radii at the other joints and the tip, relative to the radius at the knuckle.
+TAPER = (0.96, 0.88, 0.76)
+MILLIMETRE = 1e-3  # metres per unit of the tables of the fingers, which are in millimetres
 
 
 def _finger(joints: Floats, radius: float) -> list[Part]:

@@ -6,7 +6,7 @@ from generator_tools.shapes import Floats, fold, smooth_max, smooth_min
 from . import extremities, head, limbs, trunk
 from .loft import Part
 
-SOLE = 0.010  # metres; rounding of the edge of the sole
+SOLE = 0.010  # rounding radius of the edge of the sole, metres
 PARTS: list[Part] = trunk.PARTS + limbs.PARTS + head.PARTS + extremities.PARTS
 
 
@@ -22,7 +22,7 @@ def distance(points: Floats) -> Floats:
 
 def gradient(points: Floats) -> Floats:
     """Return the gradient (N, 3) of `distance` by central differences."""
-    step = 2e-4  # metres; well below the smallest feature, well above rounding errors
+    step = 2e-4  # step in metres, well below the smallest feature and well above rounding errors
     slopes = np.empty_like(points)
     for axis in range(3):
         shift = np.zeros(3)

@@ -8,7 +8,7 @@ from generator_tools.shapes import Floats
 from .joints import PARENTS
 from .shape import DIRECTIONS
 
-PLACE = 1e-5  # metres; rounding step of the template
+PLACE = 1e-5  # rounding step of the template, metres
 SHAPE_LEVELS = 2.0**15  # rounding steps per metre of the shape directions
 POSE_LEVELS = 2.0**13  # rounding steps per metre of the pose directions
 FEWEST = 2  # minimum number of steps of a pose direction; smaller ones are dropped

@@ -7,7 +7,7 @@ from generator_tools.shapes import FAR, Ellipsoid, Floats, Tube, smooth_max
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-CAP = 0.012  # metres; rounding radius of a loft's flat ends
+CAP = 0.012  # rounding radius of a loft's flat ends, metres
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 from .joints import CENTRES, NAMES, PARTNERS
 
 EXACT = 1e3  # weight of the error of a centre relative to the unevenness of weights
-FOLLOW = 30.0  # the same weight for the error of a centre under a shape direction
+FOLLOW = 30.0  # relative weight of the error of a centre under a shape direction
 SMALLEST = 1e-4  # weights below this are dropped
 MOST = 64  # maximum number of vertices in a ring
 

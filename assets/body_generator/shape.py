@@ -12,7 +12,7 @@ from generator_tools.shapes import Floats
 from .joints import CENTRES, NAMES, PARENTS
 
 Triple = tuple[float, float, float]
-MIDDLE = (0.0, 1.19, 0.0)  # metres; the fixed point of a growing figure
+MIDDLE = (0.0, 1.19, 0.0)  # fixed point of a growing figure, metres
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +164,7 @@ DIRECTIONS = (
 
 
 def _stretches(direction: Direction) -> Floats:
-    """Return the stretch (J, 3) in each joint's own frame."""
+    """Return the stretch (J, 3) in each joint's frame."""
     rows = np.zeros((len(NAMES), 3))
     for j, name in enumerate(NAMES):
         side, _, kind = name.rpartition("_")

@@ -8,9 +8,9 @@ from generator_tools.surface import graded_length, mirror
 
 from .figure import distance, project
 
-STEPS = (0.0056, 0.0026)  # metres between grid planes, coarse and fine
-LARGEST = 0.0245  # metres; maximum edge length, on the trunk and thighs
-GROWTH = 0.20  # metres of edge length per metre from the nearest detail
+STEPS = (0.0056, 0.0026)  # distances between grid planes, coarse and fine, metres
+LARGEST = 0.0245  # maximum edge length, on the trunk and thighs, metres
+GROWTH = 0.20  # growth of the edge length in metres per metre from the nearest detail
 # Centre, radius and edge length of balls with finer triangles.
 DETAILS = (
     ((0.0315, 1.5910, 0.0930), 0.0160, 0.0027),

@@ -15,9 +15,9 @@ from scipy.sparse.linalg import splu
 
 from .joints import NAMES, PARENTS, PARTNERS
 
-DIFFUSION = 0.013  # metres; distance over which the weights spread
+DIFFUSION = 0.013  # distance over which the weights spread, metres
 MOST = 4  # maximum number of joints per vertex
-LEVELS = 4096  # weights are multiples of the inverse of this number
+LEVELS = 4096  # number of levels: weights are multiples of its inverse
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,10 +53,10 @@ STEPS = {
 }
 BESIDE_NECK = Step((0.100, 0, 0), (-1, 0, 0), 0.045)
 BESIDE_SPINE = Step((0.075, 0, 0), (1, 0, 0), 0.060)
-CROTCH = 0.805  # metres above the floor; the inner thighs below follow only the legs
+CROTCH = 0.805  # height in metres below which the inner thighs follow only the legs
 BETWEEN = Step((0.033, 0, 0), (1, 0, 0), 0.040)
 BELOW_WAIST = Step((0, 1.12, 0), (0, -1, 0), 0.050)
-NAPE = 1.44  # metres above the floor, above which the neck's step is not limited sideways
+NAPE = 1.44  # height in metres above which the neck's step is not limited sideways
 
 
 def _gate(name: str, points: Floats) -> Floats:
@@ -94,7 +94,7 @@ def _totals(vertices: Floats) -> Floats:
 
 
 def _limited(weights: Floats) -> Floats:
-    """Keep the `MOST` largest weights of each row; the others fade out continuously."""
+    """Preserve the `MOST` largest weights of each row; the others fade out continuously."""
     next_largest = np.sort(weights, axis=1)[:, -MOST - 1]
     weights = np.maximum(weights - next_largest[:, None], 0)
     return weights / weights.sum(axis=1, keepdims=True)

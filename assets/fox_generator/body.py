@@ -242,7 +242,7 @@ def distance(points: Floats) -> Floats:
 
 def gradient(points: Floats) -> Floats:
     """Return the unit gradient (N, 3) of `distance` by central differences."""
-    step = 4e-4  # metres; well below the smallest feature, well above rounding errors
+    step = 4e-4  # step in metres, well below the smallest feature and well above rounding errors
     slopes = np.empty_like(points)
     for axis in range(3):
         shift = np.zeros(3)

@@ -6,13 +6,13 @@ from generator_tools.shapes import Floats
 from .skeleton import Joint
 
 TRIM = 6.0  # percentage of the vertices that lie outside the box on each side
-# A skull box and a muzzle box are recognisable as a fox; one box around the whole head would not
+# With a skull box and a muzzle box, the head is recognisable as a fox's; with one box it would not
 # be.
 FIXED = {
     "head": ((-0.060, 0.452, 0.205), (0.060, 0.548, 0.308)),
     "jaw": ((-0.024, 0.438, 0.300), (0.024, 0.484, 0.382)),
 }
-LEAST = 0.006  # metres; half the minimum thickness of a box
+LEAST = 0.006  # half the minimum thickness of a box, metres
 
 
 def fit_boxes(vertices: Floats, weights: Floats, table: list[Joint]) -> Floats:

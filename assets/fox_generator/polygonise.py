@@ -6,7 +6,7 @@ from generator_tools.shapes import Floats
 
 from .body import distance
 
-STEPS = (0.0035, 0.0017)  # metres between grid planes, coarse and fine
+STEPS = (0.0035, 0.0017)  # distances between grid planes, coarse and fine, metres
 
 
 def polygonise_half() -> tuple[Floats, np.ndarray]:

@@ -8,8 +8,8 @@ from generator_tools.surface import graded_length, project
 from .body import distance, gradient
 from .polygonise import polygonise_half
 
-LARGEST = 0.0174  # metres; maximum edge length, on the torso and tail
-GROWTH = 0.22  # metres of edge length per metre from the nearest detail
+LARGEST = 0.0174  # maximum edge length, on the torso and tail, metres
+GROWTH = 0.22  # growth of the edge length in metres per metre from the nearest detail
 # Centre, radius and edge length of balls with finer triangles.
 DETAILS = (
     ((0.0345, 0.5015, 0.3000), 0.014, 0.0038),

@@ -17,7 +17,7 @@ COLOURS = 256  # number of colours in the palette
 
 
 def crease_shade(vertices: Floats, normals: Floats) -> Floats:
-    """Return 0..1 per vertex: openness of the surroundings along the normal (ambient occlusion)."""
+    """Return the ambient occlusion of each vertex: openness along its normal, 0..1."""
     shade = np.ones(len(vertices))
     for reach, strength in ((0.008, 9.0), (0.02, 5.0), (0.045, 3.2)):
         blocked = reach - distance(vertices + reach * normals)

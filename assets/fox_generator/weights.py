@@ -23,8 +23,8 @@ SPREAD = {"torso": 0.75, "neck": 0.8, "head": 0.5, "jaw": 0.35, "ear": 0.8, "tai
 def _allowed(vertices: Floats, table: list[Joint]) -> np.ndarray:
     """Return a mask (V, J) of the joints that may influence a vertex: same region, same side."""
     own = np.array(REGIONS)[regions(vertices)]
-    # Between the legs the underside of the trunk is nearer to the shapes of the legs than to that
-    # of the trunk.
+    # Between the legs, the underside of the trunk is nearer to the shapes of the legs than to the
+    # trunk's.
     own[np.isin(own, ("fore", "hind")) & (np.abs(vertices[:, 0]) < INNER_LEG)] = "torso"
     allowed = own[:, None] == np.array([joint.region for joint in table])
     side = np.array([joint.name[-2:] for joint in table])

@@ -23,7 +23,7 @@ _WIDTH = 96
 
 
 def file_name(name: str) -> str:
-    """Return the file name of a picture; that of the window is also used by the README."""
+    """Return the file name of a picture; the README also uses the picture of the window."""
     return "window.png" if name == "window" else f"gallery_{name}.png"
 
 

@@ -173,7 +173,7 @@ PICTURES: dict[str, Picture] = {
     ),
     "sheet": Picture(
         "A contact sheet",
-        "The same walk in cells with frame numbers, at one scale and with one ground line.",
+        "The same walk in cells with frame numbers, with a common scale and ground line.",
         ("viewer render walk --model body.npz --contact-sheet 6 --frames 0:28 --azimuth -75",),
         size=(1350, 405),
     ),

@@ -8,7 +8,7 @@ from skimage.measure import marching_cubes
 
 from .shapes import Floats
 
-BLOCK = 4  # grid cells per side of a block, which is skipped if far from the surface
+BLOCK = 4  # number of grid cells per side of a block; blocks far from the surface are skipped
 Distance = Callable[[Floats], Floats]
 
 
@@ -52,13 +52,13 @@ def polygonise(distance: Distance, axes: list[Floats]) -> tuple[Floats, np.ndarr
     """Return vertices (V, 3) and triangles (T, 3) of the half x >= 0, open along x = 0.
 
     The first axis starts at 0 and the boundary vertices have x exactly 0, so that the mirrored
-    half closes the surface. Of several pieces, only the largest is kept.
+    half closes the surface. If there are several pieces, only the largest is returned.
     """
     grid = _sample(distance, axes)
     pieces, _ = label(grid < 0)
     inside = pieces == np.bincount(pieces[pieces > 0]).argmax()
     grid = np.where((grid < 0) & ~inside, 1e-4, grid)
-    # For fields that are negative inside, skimage winds triangles clockwise unless told otherwise.
+    # For fields that are negative inside, skimage winds triangles clockwise by default.
     indices, triangles, _, _ = marching_cubes(grid, 0.0, gradient_direction="descent")
     vertices = np.stack(
         [np.interp(indices[:, a], np.arange(len(axes[a])), axes[a]) for a in range(3)], axis=1

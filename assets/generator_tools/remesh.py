@@ -169,7 +169,7 @@ def _merged(
 ) -> tuple[Ints, Floats]:
     """Return the vertex that each vertex is merged with, and the new positions.
 
-    Rim vertices keep their positions, and so do pointed ones: midpoints would wear down the tips.
+    Rim vertices and pointed vertices are not moved: midpoints would wear down the tips.
     """
     target, moved = np.arange(len(vertices)), vertices.copy()
     keep, gone = ends.T

@@ -11,8 +11,8 @@ from scipy.interpolate import PchipInterpolator
 
 Floats = NDArray[np.float64]
 
-MIRROR_SOFTNESS = 0.006  # metres; radius that rounds the crease left by mirroring on the midline
-FAR = 0.12  # metres; farther than this from its box, a shape's distance is only a bound
+MIRROR_SOFTNESS = 0.006  # radius that rounds the crease left by mirroring on the midline, metres
+FAR = 0.12  # distance from its box above which a shape's distance is only a bound, metres
 
 
 def fold(points: Floats) -> Floats:

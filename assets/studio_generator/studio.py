@@ -1,7 +1,7 @@
 """Radiance of the studio: a grey room with soft boxes, as a function of direction.
 
-Directions are unit vectors, +y up, +z towards the camera, +x to its right. Radiance is linear, in
-units in which a white matte surface is as bright as its irradiance divided by pi.
+Directions are unit vectors, +y up, +z towards the camera, +x to its right. Radiance is linear; the
+radiance of a white matte surface is its irradiance divided by pi.
 """
 
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ class SoftBox:
     azimuth, inclination : float
         Direction of its centre, degrees: to the right of +z, and above the horizon.
     width, height : float
-        Half its sides, as tangents of the angle seen from the centre of the room.
+        Half the lengths of its sides, as tangents of angles seen from the centre of the room.
     color : (r, g, b)
         Radiance.
     """
@@ -40,7 +40,7 @@ BOXES = (
     SoftBox(-142.0, 18.0, 0.16, 0.80, (3.4, 3.5, 3.7)),
     SoftBox(138.0, 24.0, 0.20, 0.70, (3.9, 3.8, 3.6)),
 )
-_EXPOSURE = 0.48  # exposure with which the brightest point of a white matte sphere is almost white
+_EXPOSURE = 0.48  # exposure for which the brightest point of a white matte sphere is almost white
 _EDGE = 0.07  # width of a box's soft edge, as a tangent
 
 

@@ -32,7 +32,7 @@ float visibility(int light, vec3 position, vec3 normal, float cosine) {
 }
 
 #ifdef OCCLUSION
-uniform sampler2D u_occlusion;   // fraction of the ambient light, depth; half as many pixels
+uniform sampler2D u_occlusion;   // fraction of the ambient light, and depth; at half resolution
 uniform float u_occlusion_strength;
 #endif
 

@@ -30,7 +30,7 @@ uniform bool u_has_tint;        // v_tint multiplies the base colour and replace
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
 uniform mat3 u_places[7];       // transform of the texture coordinates of each image
-uniform int u_uv_sets[6];       // 0: v_uv, 1 and 2: v_other_uvs
+uniform int u_uv_sets[7];       // 0: v_uv, 1 and 2: v_other_uvs
 uniform sampler2D u_normal_map;
 uniform float u_normal_scale;   // 0: no map
 

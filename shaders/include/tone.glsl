@@ -1,6 +1,6 @@
 // Conversion of scene-linear light for display: one tone curve, then the sRGB encoding.
 
-// Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping): colours up to 0.8 stay as they are,
+// Khronos PBR Neutral (github.com/KhronosGroup/ToneMapping): colours up to 0.8 are unchanged,
 // brighter colours approach 1 and fade towards white, so that nothing saturates and no hue shifts.
 // The curve's toe is omitted: it removes the 4 % that glossy surfaces reflect in a white room, and
 // would blacken surfaces without that reflection.

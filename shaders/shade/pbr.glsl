@@ -23,6 +23,12 @@ uniform vec3 u_shade_color;     // colour of the side away from the key light, l
 uniform vec2 u_shade_range;     // cosines at which the surface is fully in shade and fully lit
 uniform sampler2D u_shade_map;
 uniform bool u_has_shade_map;
+uniform bool u_has_rim;         // true: the metallic and roughness maps are matcap and rim map
+uniform vec3 u_rim_color;       // linear
+uniform float u_rim_power;
+uniform float u_rim_lift;
+uniform float u_rim_mix;        // 0 to 1: degree to which the light multiplies the rim
+uniform vec3 u_matcap_factor;   // linear
 #endif
 
 const float PI = 3.14159265358979;
@@ -85,17 +91,34 @@ vec3 direct(Surface s, vec3 normal, vec3 to_eye, vec3 to_light) {
 }
 
 #ifdef MATERIALS
+// Light at the edges of a toon surface, with this fraction of the key light.
+vec3 rim(vec3 normal, vec3 to_eye, float seen) {
+    float edge = clamp(1.0 - dot(normal, to_eye) + u_rim_lift, 0.0, 1.0);
+    vec3 color = u_rim_color * pow(max(edge, 1e-6), u_rim_power);
+    if (u_has_metallic_map) {
+        vec3 right = normalize(vec3(to_eye.z, 0.0, -to_eye.x)), up = cross(to_eye, right);
+        vec2 uv = 0.5 + 0.5 * vec2(dot(right, normal), dot(up, normal));
+        color += u_matcap_factor * texture(u_metallic_map, uv).rgb;
+    }
+    if (u_has_roughness_map)
+        color *= texture(u_roughness_map, place(ROUGHNESS_MAP)).rgb;
+    return color * mix(1.0, seen, u_rim_mix);
+}
+
 // Two colours of a surface, by the angle of incidence of the key light (VRMC_materials_mtoon 1.0).
-vec3 toon(vec3 lit, vec3 position, vec3 normal) {
+vec3 toon(vec3 lit, vec3 position, vec3 normal, vec3 to_eye) {
     vec3 dark = u_shade_color;
     if (u_has_shade_map)
         dark *= texture(u_shade_map, place(SHADE_MAP)).rgb;
     float cosine = dot(normal, u_light_directions[0]), width = u_shade_range.y - u_shade_range.x;
     float part = clamp((cosine - u_shade_range.x) / max(width, 1e-4), 0.0, 1.0);
-    part *= visibility(0, position, normal, max(cosine, 0.0));
+    float seen = visibility(0, position, normal, max(cosine, 0.0));
+    part *= seen;
     vec3 color = u_emissive;
     if (u_has_emissive_map)
         color *= texture(u_emissive_map, place(EMISSIVE_MAP)).rgb;
+    if (u_has_rim)
+        color += rim(normal, to_eye, seen);
     return color + mix(dark, lit, part);
 }
 #endif
@@ -104,7 +127,7 @@ vec3 shade(vec3 position, vec3 normal, vec3 to_eye) {
     vec3 base = base_color().rgb;
 #ifdef MATERIALS
     if (u_toon)
-        return toon(base, position, normal);
+        return toon(base, position, normal, to_eye);
 #endif
     if (u_unlit)
         return base;

@@ -15,7 +15,7 @@ vec3 category_color(float number) {
 }
 
 // Colour of the category with the largest barycentric weight here. Interpolating the numbers would
-// give other categories.
+// yield other categories.
 vec3 category() {
     bvec3 same = equal(v_corners.xyz, v_corners.yzx);  // corners 1 and 2, 2 and 3, 3 and 1
     vec3 w = v_barycentric;  // summed over corners of the same category

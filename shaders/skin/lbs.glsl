@@ -1,5 +1,5 @@
-// Linear blend skinning: v' = B [v 1] and n' = B [n 0] with B = sum w M, or n' = B^-T n where
-// joints scale or shear.
+// Linear blend skinning: v' = B [v 1] and n' = B [n 0] with B = sum w M, or n' = B^-T n if joints
+// scale or shear.
 void skin(inout vec3 position, inout vec3 normal) {
     vec4 x = vec4(0.0), y = vec4(0.0), z = vec4(0.0);
     uint end = in_bindings.x + in_bindings.y;

@@ -1,7 +1,7 @@
 """A box-shaped body model for hand calculation: three joints, two shapes, one corrective.
 
 The box is 2 m high, 0.5 m wide and 0.25 m deep. Its joints are at the middle of the box, of its
-left side (+x), and of its right side (-x). Each side follows its own joint rigidly.
+left side (+x), and of its right side (-x). Each side follows its joint rigidly.
 """
 
 from __future__ import annotations

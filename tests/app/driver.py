@@ -114,7 +114,7 @@ class Driver:
         self.step()
 
     def click(self, target, button=0, held=""):
-        # Check boxes, radio buttons and menus react at their left end, whatever their width.
+        # Check boxes, radio buttons and menus of any width react at their left end.
         self.move(self.place(target, 0.1) if isinstance(target, str) else target)
         with self.holding(held):
             self.press(button)

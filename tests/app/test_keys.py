@@ -161,7 +161,7 @@ def test_escape_closes_the_topmost_item_and_never_quits(hand):
     assert "quit" not in state.wants and (hand.dofs() == before).all()
 
 
-def test_letters_do_nothing_under_a_dialog_or_message(hand):
+def test_letters_have_no_effect_under_a_dialog_or_message(hand):
     before = hand.state.options.show, hand.dofs()
     hand.state.error = "something"
     hand.step(2)

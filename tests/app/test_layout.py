@@ -82,7 +82,7 @@ def test_menu_brings_a_hidden_tab_to_the_front_and_into_view(drive, rig):
     assert hand.state.of(ShownPanels).closed == {"display"}
 
 
-def test_panel_closes_by_its_cross(hand):
+def test_panel_closes_with_its_close_button(hand):
     tab = imgui.internal.find_window_by_name("Joints").dc.dock_tab_item_rect
     hand.click((tab.max.x - 8, (tab.min.y + tab.max.y) / 2))
     hand.step(3)

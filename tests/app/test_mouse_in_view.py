@@ -114,7 +114,7 @@ def test_orbit_stops_at_the_poles(hand):
     assert hand.state.camera.inclination == -90
 
 
-def test_repeated_zoom_stays_finite(hand):
+def test_repeated_zoom_keeps_values_finite(hand):
     for notches in (200, -400, 800):
         hand.wheel(notches, hand.middle)
         hand.assert_sane()

@@ -183,7 +183,7 @@ def test_key_includes_time_only_if_motion_paths_are_drawn(state):
     assert keys.key(state, SIZE) != before
 
 
-def test_restored_values_give_an_equal_key(state):
+def test_restored_values_have_an_equal_key(state):
     keys = PictureKeys()
     before = keys.key(state, SIZE)
     state.actor.pose.dofs[0] += 0.5

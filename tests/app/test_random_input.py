@@ -1,4 +1,4 @@
-"""Random mouse and keyboard input, which must raise nothing and keep all values finite.
+"""Random mouse and keyboard input, which must not raise errors and must keep all values finite.
 VIEWER_MONKEY_EVENTS=20000 runs more events.
 """
 
@@ -127,7 +127,7 @@ def _keep_inside(folder, monkeypatch):
 
 
 @pytest.mark.parametrize("files", [_rig_files, _body_files], ids=["rig", "body"])
-def test_random_input_raises_nothing_and_keeps_numbers_finite(drive, tmp_path, monkeypatch, files):
+def test_random_input_raises_no_error_and_keeps_values_finite(drive, tmp_path, monkeypatch, files):
     monkeypatch.chdir(tmp_path)
     _keep_inside(tmp_path, monkeypatch)
     opened, dropped = files(tmp_path)

@@ -62,7 +62,7 @@ def test_coloured_text_is_legible_on_panels(hand, monkeypatch, name):
 
 
 @pytest.mark.parametrize("panels", ["dark", "light"])
-def test_selected_keys_and_their_handles_stand_out_from_the_plot(curves, monkeypatch, panels):
+def test_selected_keys_and_their_handles_contrast_with_the_plot(curves, monkeypatch, panels):
     theme.set_theme(panels)
     shown = []
     for name in ("ink", "faint"):

@@ -1,4 +1,4 @@
-"""Small rigged figures for the tests of rig transfer."""
+"""Small rigged figures for tests of rig transfer."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def mesh_of(positions, triangles) -> Mesh:
 
 
 def tube(around=16, along=21, length=2.0):
-    """Return a closed tube along y with an asymmetric section that widens upwards."""
+    """Return a closed tube along y with an asymmetric cross-section that widens upwards."""
     angles = np.arange(around) * 2 * np.pi / around
     heights = np.linspace(0.0, length, along)
     section = np.stack([0.3 * np.cos(angles) + 0.08 * np.cos(2 * angles), 0.2 * np.sin(angles)], 1)
@@ -45,7 +45,7 @@ def tube(around=16, along=21, length=2.0):
 
 
 def arm(root_moves=True, limit=np.inf) -> Figure:
-    """Return a tube with joints at y = 0 and y = 1, weights blended linearly from 0.8 to 1.2."""
+    """Return a tube with joints at y = 0 and y = 1 and weights blended linearly from 0.8 to 1.2."""
     positions, triangles = tube()
     fraction = np.clip((positions[:, 1] - 0.8) / 0.4, 0.0, 1.0)
     vertices = np.tile(np.arange(len(positions)), 2)

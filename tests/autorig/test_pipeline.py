@@ -25,7 +25,7 @@ from viewer.rig.skinning import deform
 
 pytestmark = pytest.mark.slow
 
-# An eighth of the usual number: the search takes far less time.
+# With an eighth of the usual number of points, the search is much faster.
 QUICK = TransferSettings(alignment=AlignmentSettings(samples=250))
 ROTATION = turn([0.1, 1, 0.2], 2.0)
 MOVE = np.array([3.0, -4.0, 5.0])
@@ -54,7 +54,7 @@ def transferred():
     return figure, pose, target, transfer(figure, pose, target, QUICK)
 
 
-def test_template_mesh_gets_its_own_rig(transferred):
+def test_template_mesh_as_target_gets_the_rig_of_the_template(transferred):
     figure, _, _, rigged = transferred
     size = 30.0 * 2.4
     assert_allclose(rigged.figure.mesh.positions, 30.0 * figure.mesh.positions, atol=1e-6 * size)
@@ -79,7 +79,7 @@ def test_rigged_result_reproduces_the_target_pose(transferred):
     assert rigged.confidence.tolist() == [0] * target.n_vertices
 
 
-def test_target_is_not_altered_and_keeps_its_texture_coordinates(transferred):
+def test_target_is_not_modified_and_keeps_its_texture_coordinates(transferred):
     figure, pose, target, _ = transferred
     uvs = np.random.default_rng(2).random((target.n_vertices, 2))
     with_uvs = replace(target, uvs=uvs)
@@ -115,7 +115,7 @@ def test_unit_is_inferred_from_size(scale, unit, line):
     assert line in told(rigged.lines)
 
 
-def test_the_templates_clip_plays(transferred):
+def test_clip_of_the_template_is_transferred(transferred):
     figure, _, _, rigged = transferred
     times = np.array([0.0, 1.0])
     linear = (("linear", "linear"),) * 2
@@ -146,7 +146,7 @@ def test_body_correctives_are_transferred():
     target = mesh_of(2.0 * deform(figure, pose)[0], figure.mesh.triangles)
     rigged = transfer(figure, pose, target, QUICK)
     assert rigged.residual < 1e-12
-    # At rest it is the body at rest, without the bulges of the bent knee.
+    # The rest pose is that of the body, without the bulges of the bent knee.
     assert_allclose(rigged.figure.mesh.positions, 2.0 * figure.mesh.positions, atol=1e-6)
     other = rest_pose(figure.skeleton)
     other.dofs[3 * names.index("left_elbow") + 1] = -1.5
@@ -157,9 +157,9 @@ def test_body_correctives_are_transferred():
     assert ("R013.shapes", {"n": 10}) in told(plain.lines)
 
 
-def test_joints_follow_the_surface_and_copies_do_not():
-    # Without alignment the target is offset by 0.1. Closest points measure the component of
-    # that across the surface: about half of it, as cos^2 around a section has the mean 1 / 2.
+def test_joints_follow_the_surface_and_copied_joints_do_not():
+    # Without alignment the target is offset by 0.1. Closest points measure the component normal to
+    # the surface, which is about half, because cos^2 around a section has the mean 1 / 2.
     figure, pose = arm(), rest_pose(arm().skeleton)
     target = mesh_of(figure.mesh.positions + np.array([0.1, 0, 0]), figure.mesh.triangles)
     still = AlignmentSettings(matrix=np.eye(4))
@@ -174,13 +174,14 @@ def test_joints_follow_the_surface_and_copies_do_not():
     assert_allclose(places["alignment"], [0, 1, 0], atol=1e-12)
 
 
-def test_nearest_method_follows_the_seed():
+def test_nearest_method_uses_weights_of_the_nearest_vertex():
     figure, pose = bent_arm()
     stretch, shift = np.array([4.0, 2.0, 3.0]), np.array([1.0, 0, 0])
     posed = deform(figure, pose)[0]
     target = mesh_of(posed * stretch + shift, figure.mesh.triangles)
     rigged = transfer(figure, pose, target, TransferSettings(method="nearest"))
-    # Boxes undo the stretch: vertices match themselves, and inverse skinning returns the template.
+    # Boxes undo the stretch, so vertices match themselves, and inverse skinning returns the
+    # template.
     assert_allclose(rigged.figure.mesh.positions, figure.mesh.positions, atol=1e-10)
     assert rigged.figure.skin.weights.tolist() == figure.skin.weights.tolist()
     assert_allclose(np.diag(rigged.placement), [4.0, 2.0, 3.0, 1.0])
@@ -210,7 +211,7 @@ def test_progress_increases_to_1_and_may_cancel():
 
 
 def test_joint_outside_the_target_is_reported():
-    # The inside of the template is solid; the target is two flat shells far from the axis.
+    # The template is closed and solid; the target is two flat shells far from the axis.
     figure, pose = arm(), rest_pose(arm().skeleton)
     still = AlignmentSettings(matrix=np.eye(4))
     side = figure.mesh.positions[figure.mesh.triangles][:, :, 0].mean(axis=1) > 0.1
@@ -257,7 +258,7 @@ def test_unknown_settings_are_refused(settings, message):
     assert str(problem.value) == message
 
 
-def test_missing_scipy_is_named(monkeypatch):
+def test_missing_scipy_is_reported(monkeypatch):
     import sys
 
     figure, pose = bent_arm()
@@ -267,7 +268,7 @@ def test_missing_scipy_is_named(monkeypatch):
     assert str(problem.value) == "rigging needs scipy: pip install scipy"
 
 
-def test_figure_is_complete():
+def test_rigged_figure_is_complete():
     figure, pose = bent_arm()
     rigged = transfer(figure, pose, moved(figure, pose), QUICK, name="scan")
     assert isinstance(rigged.figure, Figure) and rigged.figure.name == "scan"

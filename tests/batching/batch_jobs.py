@@ -1,4 +1,4 @@
-"""Jobs for worker processes, which import them; the item's name selects how they misbehave."""
+"""Jobs that worker processes import; the name of an item selects the failure."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from viewer.errors import ViewerError
 
 
 def misbehave(item: Item) -> dict[str, int]:
-    """Return the process ID, or crash, hang, allocate 1 GB or raise, as the item's name says."""
+    """Return the process ID, or crash, hang, allocate 1 GB or raise, as the name states."""
     if item.name == "crash.txt":
         os._exit(3)
     if item.name == "term.txt":
-        os.kill(os.getpid(), signal.SIGTERM)  # as batch systems do at the time limit of a job
+        os.kill(os.getpid(), signal.SIGTERM)  # like a batch system at the time limit of a job
     if item.name in ("hang.txt", "term.txt"):
         time.sleep(100)
     if item.name == "hog.txt":
@@ -47,7 +47,7 @@ def items_called(*names: str) -> list[Item]:
 
 
 def write_numbers(folder: Path, count: int) -> list[str]:
-    """Write small files, one in 20 of them broken; return the names of the broken ones."""
+    """Write small files, of which one in 20 is broken; return the names of the broken files."""
     folder.mkdir(parents=True, exist_ok=True)
     for index in range(count):
         text = "1 zero" if index % 20 == 7 else f"1 {index}"

@@ -1,4 +1,4 @@
-"""Engines: every item gets exactly one result, whatever it does to its worker."""
+"""Engines, which must return exactly one result per item, even if a worker crashes."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from itertools import count
 import pytest
 from batching.batch_jobs import items_called, misbehave
 
-from viewer.batching.attempts import FunctionJob
 from viewer.batching.engines import ENGINES, IN_FLIGHT, Limits, load_engine
+from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item
 from viewer.errors import ViewerError
 
@@ -37,7 +37,7 @@ def test_functions_that_workers_cannot_import_are_refused():
 
 
 @pytest.mark.slow
-def test_workers_take_few_items_and_stop_when_asked():
+def test_workers_receive_few_items_and_stop_on_request():
     taken = count()
     finished = []
 

@@ -26,7 +26,7 @@ def data(tmp_path, monkeypatch):
 def test_folder_is_searched_in_natural_order(data):
     found = find_inputs(["data"])
     assert found.paths == ("data/a.bvh", "data/b/walk9.npz", "data/b/walk10.npz", "data/take")
-    assert found.folders == {"data/take"}  # a recording is one input
+    assert found.folders == {"data/take"}  # a recording is a single input
     assert found.base == str(data)
     assert len(found.notes) == 1 and found.notes[0].startswith("1 file ")
 
@@ -39,7 +39,7 @@ def test_pattern_finds_files_in_all_folders(data):
     )
 
 
-def test_common_folder_does_not_depend_on_what_a_pattern_matches(data):
+def test_common_folder_does_not_depend_on_the_matches_of_a_pattern(data):
     assert find_inputs(["data/**/*9.npz"]).base == str(data)
     assert find_inputs(["data/b/walk9.npz"]).base == str(data / "b")
     assert find_inputs(["data/b/walk9.npz", "data/a.bvh"]).base == str(data)
@@ -73,7 +73,7 @@ def test_outputs_of_an_earlier_run_are_not_inputs(data):
     assert "data/out/b/walk9.bvh" in find_inputs(["data"], output="data/ou").paths
 
 
-def test_names_that_exist_are_not_patterns(data):
+def test_existing_names_are_not_patterns(data):
     (data / "walk[1].bvh").touch()
     (data / "@x").touch()
     assert find_inputs(["data/walk[1].bvh"]).paths == ("data/walk[1].bvh",)
@@ -96,7 +96,7 @@ def test_missing_inputs_are_refused(data, words, part):
         find_inputs(words)
 
 
-def test_folder_without_known_files_is_refused(data):
+def test_folder_without_supported_files_is_refused(data):
     (data / "empty").mkdir()
     with pytest.raises(ViewerError, match="empty: no file"):
         find_inputs(["data/empty"])

@@ -24,11 +24,11 @@ def test_output_folder_mirrors_the_folders_of_the_inputs():
     assert outputs("out/", "folder") == ["out/a/x", "out/b/x.v2", "out/take.1"]
 
 
-def test_fields_of_templates():
+def test_fields_of_templates_are_replaced():
     names = ["out/a/0000-x.npz.png", "out/b/0001-x.v2.npz.png", "out/0002-take.1.png"]
     assert outputs("out/{parent}/{index:04}-{name}.png") == names
     assert outputs("{folder}/{stem}-{suffix}.bvh")[:2] == ["d/a/x-npz.bvh", "d/b/x.v2-npz.bvh"]
-    # Numbered images and meshes keep the command's field.
+    # Numbered images and meshes keep the field of the command.
     assert outputs("o/{stem}_{frame:05}.obj")[0] == "o/x_{frame:05}.obj"
 
 
@@ -50,20 +50,20 @@ def test_items_are_named_by_their_path_below_the_common_folder():
         ("{stem.bvh", "", "expected '}'"),
     ],
 )
-def test_wrong_templates_are_refused(output, suffix, part):
+def test_invalid_templates_are_refused(output, suffix, part):
     with pytest.raises(ViewerError, match=part):
         template_of(output, suffix)
 
 
 @pytest.mark.parametrize("names", [("x/A.npz", "y/a.npz"), ("x/Ä.npz", "y/a\u0308.npz")])
-def test_outputs_that_differ_only_in_case_or_composition_clash(names):
+def test_outputs_that_differ_only_in_case_or_composition_are_refused(names):
     items = items_of(Inputs(names, str(Path.cwd())), "out/{stem}.bvh")
     with pytest.raises(ViewerError) as problem:
         check_outputs(items)
     assert "1 output " in str(problem.value) and names[0] in str(problem.value)
 
 
-def test_inputs_are_never_outputs(tmp_path):
+def test_inputs_are_refused_as_outputs(tmp_path):
     (tmp_path / "a.bvh").touch()
     (tmp_path / "b.bvh").symlink_to(tmp_path / "a.bvh")
     inputs = Inputs((str(tmp_path / "a.bvh"),), str(tmp_path))

@@ -19,7 +19,7 @@ RESULT = Result(
 )
 
 
-def test_results_come_back_from_the_report(tmp_path):
+def test_results_are_read_back_from_the_report(tmp_path):
     with ReportFile(tmp_path / "new" / "report.jsonl") as file:
         file.add(RESULT)
     line = json.loads((tmp_path / "new" / "report.jsonl").read_text())
@@ -29,7 +29,7 @@ def test_results_come_back_from_the_report(tmp_path):
     assert read_results(tmp_path / "new" / "report.jsonl") == [RESULT]
 
 
-def test_last_result_of_an_item_counts(tmp_path):
+def test_last_result_of_an_item_is_used(tmp_path):
     path = tmp_path / "report.jsonl"
     for status in ("crashed", "done"):
         with ReportFile(path) as file:
@@ -38,7 +38,7 @@ def test_last_result_of_an_item_counts(tmp_path):
 
 
 @pytest.mark.parametrize("kept", [1, 30, -2])
-def test_line_of_a_killed_process_is_skipped_and_ended(tmp_path, kept):
+def test_incomplete_line_of_a_killed_process_is_terminated_and_skipped(tmp_path, kept):
     path = tmp_path / "report.jsonl"
     other = Item(4, ("b",), "", "b")
     with ReportFile(path) as file:
@@ -53,7 +53,7 @@ def test_line_of_a_killed_process_is_skipped_and_ended(tmp_path, kept):
     assert [one.item for one in read_results(path)] == [ITEM, other]
 
 
-def test_several_writers_add_whole_lines(tmp_path):
+def test_several_writers_append_whole_lines(tmp_path):
     path = tmp_path / "report.jsonl"
     with ReportFile(path) as first, ReportFile(path) as second:
         for index in range(20):
@@ -63,7 +63,7 @@ def test_several_writers_add_whole_lines(tmp_path):
     assert len(read_results(path)) == 40 == path.read_bytes().count(b"\n")
 
 
-def test_numbers_that_json_cannot_store_become_text(tmp_path):
+def test_numbers_that_json_cannot_store_are_written_as_text(tmp_path):
     with ReportFile(tmp_path / "r.jsonl") as file:
         file.add(Result(ITEM, "done", values={"worst": [1.5, float("nan")]}))
 
@@ -93,7 +93,7 @@ def test_report_counts_and_sorts_failures():
     assert Report(results[2:], n_items=1).is_complete and not Report(n_items=1).is_complete
 
 
-def test_key_depends_on_content_options_and_output_only(tmp_path):
+def test_key_depends_only_on_content_options_and_output(tmp_path):
     one, two, shared = tmp_path / "one", tmp_path / "two", tmp_path / "shared"
     for path in (one, two, shared):
         path.write_text("content")
@@ -151,7 +151,7 @@ def test_key_reads_no_devices(tmp_path):
         item_key(Item(0, (str(tmp_path / "in" / "endless"),), "", ""), "")
 
 
-def test_arrays_and_other_keys_of_functions_are_written(tmp_path):
+def test_arrays_and_other_keys_returned_by_functions_are_written(tmp_path):
     values = {"size": np.float32(2.5), "ids": np.arange(3)}
     with ReportFile(tmp_path / "r.jsonl") as file:
         file.add(Result(ITEM, "done", values=values))

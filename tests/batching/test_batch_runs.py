@@ -1,4 +1,4 @@
-"""Runs of batches: no item is lost or run twice, however a run ends."""
+"""Runs of batches, in which no item is lost or run twice after any kind of end."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from batching.batch_jobs import add_numbers, items_called, misbehave, write_numb
 
 import viewer
 from viewer import interrupts
-from viewer.batching.attempts import FunctionJob, attempt
+from viewer.batching.execution import FunctionJob, attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.report import read_results
 from viewer.batching.running import Settings, run_batch, shard_of
@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.mark.slow
-def test_two_thousand_files_of_which_one_in_twenty_is_broken(tmp_path, monkeypatch):
+def test_two_thousand_files_with_one_in_twenty_broken_are_processed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 2000)
     report = viewer.batch("in/*.txt", add_numbers, "out", to="sum", workers=0)
@@ -82,7 +82,7 @@ def test_killed_batch_is_resumed(tmp_path, monkeypatch):
     assert ended.returncode == -signal.SIGKILL
     path = tmp_path / "out" / "report.jsonl"
     assert len(read_results(path)) == 30
-    # The process may also be killed while it writes a line, or between an output and its line.
+    # The process may also be killed while writing a line, or between an output and its line.
     path.write_bytes(path.read_bytes()[:-20])
     monkeypatch.chdir(tmp_path)
     report = viewer.batch("in/*.txt", add_numbers, "out", to="sum", workers=0, resume=True)
@@ -102,7 +102,7 @@ def test_changed_inputs_and_lost_outputs_are_processed_again(tmp_path, monkeypat
     assert (tmp_path / "out" / "pose1.sum").read_text() == "6"
 
 
-def test_functions_return_numbers_and_their_outputs_are_kept_track_of(tmp_path, monkeypatch):
+def test_numbers_and_outputs_of_functions_are_recorded(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     write_numbers(tmp_path / "in" / "deep", 1)
     (tmp_path / "in" / "top.txt").write_text("1")
@@ -160,7 +160,7 @@ def test_outputs_that_another_shard_replaced_are_written_again(tmp_path, monkeyp
 
 
 @pytest.mark.parametrize("text", ["3/3", "1", "a/b", "-1/3", "1/0", "1/3/2"])
-def test_wrong_shards_are_refused(text):
+def test_invalid_shards_are_refused(text):
     with pytest.raises(ViewerError, match="--shard: expected"):
         shard_of([], text)
 
@@ -185,14 +185,14 @@ def test_first_signal_finishes_the_running_item(tmp_path, ctrl_c):
 
 
 def test_second_signal_cancels_the_running_item(tmp_path, monkeypatch, ctrl_c):
-    monkeypatch.setattr(interrupts, "_SAME", -1.0)  # signals this close count as separate ones
+    monkeypatch.setattr(interrupts, "_SAME", -1.0)  # signals in quick succession count separately
     settings = Settings(report=tmp_path / "r.jsonl")
     with pytest.raises(interrupts.Interrupted):
         run_batch(items_called(*"abcd"), struck(ctrl_c, "b", 2), settings)
     assert [one.item.name for one in read_results(tmp_path / "r.jsonl")] == ["a"]
 
 
-def test_python_callers_get_their_own_interrupt_when_running_items_are_done(
+def test_python_callers_get_their_interrupt_after_running_items_are_done(
     tmp_path, monkeypatch, ctrl_c
 ):
     monkeypatch.chdir(tmp_path)

@@ -14,7 +14,7 @@ from viewer.formats._kept import keeping_figures
 
 @pytest.fixture
 def skel(tmp_path) -> Path:
-    """Return a skeleton whose reader warns about it: its last brace is missing."""
+    """Return a skeleton with a missing last brace, which is reported as a warning."""
     path = tmp_path / "tiny.skel"
     path.write_text(SKEL.rstrip().removesuffix("}"))
     return path
@@ -40,13 +40,13 @@ def test_changed_file_is_read_again(skel):
         skel.write_text(SKEL.replace("arm", "leg"))
         second, warnings = opened(skel)
         assert second.skeleton.names[-1] == "leg" and not warnings
-        # Neither the size nor the name reveals the change.
+        # Neither size nor name reveals the change.
         skel.write_text(SKEL)
         os.utime(skel, ns=(1, 1))
         assert opened(skel)[0].skeleton.names == first.skeleton.names
 
 
-def test_only_requested_files_are_kept_until_others_are_requested(skel, tmp_path):
+def test_files_are_cached_until_others_are_requested(skel, tmp_path):
     first, _ = opened(skel)
     assert opened(skel)[0] is not first
     with keeping_figures([tmp_path / "other"]):
@@ -59,7 +59,7 @@ def test_only_requested_files_are_kept_until_others_are_requested(skel, tmp_path
         assert opened(skel)[0] is not first
 
 
-def test_figures_are_read_again_with_other_options(skel):
+def test_figures_are_read_again_with_different_options(skel):
     with keeping_figures([skel]):
         first, _ = opened(skel)
         source = Source.open(skel)

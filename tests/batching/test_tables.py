@@ -1,4 +1,4 @@
-"""Tables of a batch: numbers, order, and text that a spreadsheet must not execute."""
+"""Tables of a batch: numbers, order, and text that spreadsheets must not execute."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def saved(path, job, results):
         return list(csv.DictReader(stream))
 
 
-def test_rows_of_diff_name_the_worst_vertex_and_pose(tmp_path) -> None:
+def test_rows_of_diff_list_the_worst_vertex_and_pose(tmp_path) -> None:
     worse = measure("vertices", 0.5, 0.125, 0.25, "vertex 7", "pose 3")
     better = measure("surface, from the first", 0.25, 0.0, 0.125, "vertex 1", "pose 1")
     rotated = measure("joint orientations", math.pi / 2, math.pi / 4, 0.0, "elbow", "own pose")
@@ -58,14 +58,14 @@ def test_rows_of_diff_name_the_worst_vertex_and_pose(tmp_path) -> None:
     assert (bob["size"], bob["unit"], bob["seconds"]) == ("2", "m", "0.25")
 
 
-def test_an_input_that_cannot_be_compared_has_its_own_message(tmp_path) -> None:
+def test_input_that_cannot_be_compared_has_its_message(tmp_path) -> None:
     values = compared(error="a.skin:3: expected 3 numbers") | {}
     values["comparisons"][0]["actors"] = []
     result = Result(Item(0, (), "", "x"), "failed", 2, message="last line", values=values)
     assert saved(tmp_path / "t.csv", "diff", [result])[0]["message"].startswith("a.skin:3")
 
 
-def test_names_are_not_formulas_and_keep_their_letters(tmp_path) -> None:
+def test_names_are_not_written_as_formulas_and_keep_their_characters(tmp_path) -> None:
     names = ["=cmd|'/c calc'!A0", "-2+3", "@x", 'Zoë, "Z"']
     results = [Result(Item(n, (), "", name), "done") for n, name in enumerate(names)]
     rows = saved(tmp_path / "t.csv", "convert", results)

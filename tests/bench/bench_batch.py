@@ -1,8 +1,7 @@
-"""1,000 AMASS-like conversions by workers, one process, and a shell loop; overhead per item.
-
-Rates depend on the load of the machine, so ratios are also given by processor time, as if all cores
-were idle, for 1,000 files. Workers start once per batch. The first argument is the number of files
-(1,000), the second that of frames per file (120), the third of rounds.
+"""Conversion of 1,000 AMASS-like files by workers, one process and a shell loop; overhead per item.
+Rates depend on the load of the machine, so ratios are also computed from processor time, as if all
+cores were idle, for 1,000 files. Workers start once per batch. The arguments are the number of
+files (1,000), of frames per file (120), and of rounds.
 """
 
 from __future__ import annotations
@@ -24,23 +23,23 @@ import viewer
 from viewer.batching.items import Item
 
 ROUNDS = 3
-LOOPED = 20  # files of the shell loop
+LOOPED = 20  # number of files of the shell loop
 JOINTS = 52  # SMPL-H
 RATE = 120.0
 WORKERS = 2
-FILES = 1000  # to which the goals refer
+FILES = 1000  # number of files to which the goals refer
 
 
 @dataclass
 class Cost:
-    """Seconds per item: wall time, and processor time of all processes."""
+    """Seconds per item, as wall time and as processor time of all processes."""
 
     wall: float
     work: float
 
 
 def write(folder: Path, count: int, n_frames: int) -> list[str]:
-    """Write motions with AMASS's keys, as slow random walks; return their paths."""
+    """Write motions with the keys of AMASS, as slow random walks; return their paths."""
     rng = np.random.default_rng(0)
     paths = []
     for number in range(count):
@@ -60,7 +59,7 @@ def write(folder: Path, count: int, n_frames: int) -> list[str]:
 
 
 def nothing(item: Item) -> None:
-    """Do nothing, so that all measured time is overhead."""
+    """Return immediately, so that all measured time is overhead."""
 
 
 def cost(run: Callable[[], object], count: int) -> Cost:
@@ -76,7 +75,7 @@ def _work() -> float:
 
 
 def converted(paths: list[str], out: Path, workers: int, cluster: str = "") -> None:
-    """Convert all files by a batch."""
+    """Convert all files in one batch."""
     found = viewer.batch(
         paths, "convert", out, to="bvh", workers=workers, cluster=cluster, force=True
     )
@@ -93,19 +92,19 @@ def looped(paths: list[str], out: Path) -> None:
 
 
 def median(costs: list[Cost], kind: str) -> float:
-    """Return the median of one field of the costs, in seconds."""
+    """Return the median of one field of the costs in seconds."""
     return statistics.median(getattr(one, kind) for one in costs)
 
 
 def per_item(costs: list[Cost], start: list[Cost], count: int) -> tuple[float, float]:
-    """Return the processor time of one item, and of starting the workers."""
+    """Return the processor time of one item and that of starting the workers."""
     few, many = median(start, "work") * WORKERS, median(costs, "work") * count
     each = (many - few) / (count - WORKERS)
     return each, few - WORKERS * each
 
 
 def report(costs: dict[str, list[Cost]], count: int) -> None:
-    """Print rates, and ratios of wall time and of processor time."""
+    """Print rates, and ratios of wall time and processor time."""
     loop, warm, empty = (costs[name] for name in ("shell loop", "one process", "empty job"))
     for name in ("shell loop", "one process"):
         rate, work = 1.0 / median(costs[name], "wall"), 1e3 * median(costs[name], "work")
@@ -136,7 +135,7 @@ def main() -> None:
     """Measure in interleaved rounds."""
     numbers = [int(word) for word in sys.argv[1:] if word.isdecimal()]
     count, n_frames, rounds = [*numbers, *(FILES, 120, ROUNDS)[len(numbers) :]]
-    os.environ["PYTHONPYCACHEPREFIX"] = CACHE.name  # for the workers
+    os.environ["PYTHONPYCACHEPREFIX"] = CACHE.name  # used by the workers
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as name:
         folder = Path(name)
         paths = write(folder / "in", count, n_frames)

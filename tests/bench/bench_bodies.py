@@ -1,4 +1,4 @@
-"""Frames of posed bodies: pose correctives by both methods and without, dual quaternions, PIG."""
+"""Frames of posed bodies: pose correctives by both methods or none, dual quaternions, and PIG."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def main(rounds: int = 30) -> None:
 
 
 def measure(figure: Figure, rounds: int) -> dict[str, list[float]]:
-    """Time frames of a changed pose, and the skinning pass alone."""
+    """Time frames of a changed pose, and only their skinning pass."""
     actor = Actor(figure)
     scene, rng = Scene([actor]), np.random.default_rng(1)
     camera, box = default_camera(scene, SIZE), scene_box(scene)

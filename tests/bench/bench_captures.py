@@ -1,4 +1,4 @@
-"""Reading 10,000 EasyMocap frames of two people, against json.loads over the same bytes."""
+"""Reading of 10,000 EasyMocap frames of two people, compared with json.loads of the same bytes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POINTS = 25
 
 
 def body_text(rng: np.random.Generator) -> str:
-    """Return one frame as EasyMocap's writer prints it: three decimals, CRLF within records."""
+    """Return one frame as written by EasyMocap, with three decimals and CRLF within records."""
     people = []
     for person in range(PEOPLE):
         lines = [f'        "id": {person}']
@@ -33,7 +33,7 @@ def body_text(rng: np.random.Generator) -> str:
 
 
 def points_text(rng: np.random.Generator) -> str:
-    """Return one frame of keypoints, seven decimals."""
+    """Return one frame of keypoints with seven decimals."""
     people = []
     for person in range(PEOPLE):
         rows = ",\n".join(
@@ -70,7 +70,7 @@ def actors(folder: Path, model: object) -> Builder:
 
 
 def parsed(data: list[bytes]) -> None:
-    """Parse and discard: the reference."""
+    """Parse and discard the frames, as the reference."""
     for text in data:
         json.loads(text)
 
@@ -87,7 +87,7 @@ def memory(folder: Path) -> float:
 
 
 def main(rounds: int = 5) -> None:
-    """Print the ratios: bodies alone, then bodies and keypoints."""
+    """Print the ratios for bodies only, then for bodies and keypoints."""
     model = read(Source.open(bundled_body()))
     with tempfile.TemporaryDirectory() as name:
         out = Path(name) / "out"

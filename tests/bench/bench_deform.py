@@ -1,4 +1,4 @@
-"""Deforming on the CPU in float64, against scipy's sparse product of weights and matrices."""
+"""Deformation on the CPU in float64, compared with scipy's product of weights and matrices."""
 
 from __future__ import annotations
 

@@ -1,9 +1,8 @@
-"""Frames of a moving figure, read into memory, against a minimal program that draws them.
-
-Both pose, skin, draw and read 1280 x 720 pixels with the same camera; ``references/least_frame.py``
-is the minimal program. Processor time of all threads of the process, which includes software
-drivers and does not depend on other programs. Uses the pig if its files exist, else the bundled
-figure.
+"""Frames of a moving figure read into memory, compared with a minimal program that draws them. Both
+pose, skin, draw and read 1280 x 720 pixels with the same camera; ``references/least_frame.py`` is
+the minimal program. Times are processor times of all threads of the process, which include software
+drivers and do not depend on other programs. The figure is PIG if its files exist, otherwise the
+bundled figure.
 """
 
 from __future__ import annotations
@@ -28,11 +27,11 @@ PIG = Path(__file__).resolve().parents[3] / "shared" / "data" / "pig" / "core_tx
 SIZE = 1280, 720
 PLAIN = DisplayOptions(grid=False, samples=1)
 CASES = (("4 samples, grid", DisplayOptions(), 4, 1.8), ("1 sample, no grid", PLAIN, 1, 1.6))
-FRAMES = 5  # per round
+FRAMES = 5  # frames per round
 
 
 def main(rounds: int = 25) -> None:
-    """Print the ratios, and the time of the parts of posing."""
+    """Print the ratios, and the times of the parts of posing."""
     scene = viewer.load(str(PIG)) if PIG.is_dir() else viewer.load()
     figure = scene.actors[0].figure
     mesh = figure.require_mesh()
@@ -48,7 +47,7 @@ def main(rounds: int = 25) -> None:
 def frames(
     scene: Scene, offscreen: Offscreen, other: Offscreen, options: DisplayOptions, samples: int
 ) -> dict[str, Callable[[], object]]:
-    """Return functions that draw ``FRAMES`` frames: the viewer's and the minimal program's."""
+    """Return functions that draw ``FRAMES`` frames by the viewer and by the minimal program."""
     actor, rng = scene.actors[0], np.random.default_rng(0)
     figure, pose = actor.figure, actor.pose
     assert pose is not None
@@ -78,7 +77,7 @@ def frames(
 
 
 def per_frame(times: Mapping[str, Sequence[float]]) -> dict[str, list[float]]:
-    """Return milliseconds of one frame of the rounds."""
+    """Return milliseconds per frame of the rounds."""
     return {name: [value / FRAMES for value in values] for name, values in times.items()}
 
 

@@ -1,4 +1,4 @@
-"""Reading and drawing large GLB files, against reading their bytes, JSON and images."""
+"""Reading and drawing of large GLB files, compared with reading their bytes, JSON and images."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def character(has_own_times: bool, has_images: bool = False) -> bytes:
     Parameters
     ----------
     has_own_times : bool
-        Whether each channel has an accessor of its own for its times, as some exporters write.
+        Whether each channel has a separate accessor for its times, as some exporters write.
     has_images : bool
         Whether its material has a base colour, roughness and normals as images.
     """
@@ -77,7 +77,8 @@ def character(has_own_times: bool, has_images: bool = False) -> bytes:
     positions = np.stack([x, y, 0 * x], axis=1).astype("<f4")
     corner = (np.arange(N_SIDE - 1)[:, None] * N_SIDE + np.arange(N_SIDE - 1)).ravel()
     square = corner[:, None] + [0, N_SIDE, 1, 1, N_SIDE, N_SIDE + 1]
-    # Neighbours follow the same joint, since triangles across the picture would measure the driver.
+    # Neighbours follow the same joint, because triangles across the picture would measure the
+    # driver.
     joints = np.zeros((len(x), 4), dtype="u1")
     joints[:, 0] = x * N_JOINTS // N_SIDE
     weights = np.zeros((len(x), 4), dtype="<f4")
@@ -149,7 +150,7 @@ def parsed(path: Path) -> object:
 
 
 def face() -> bytes:
-    """Return a grid with 50 morph targets, each of which moves one vertex in twenty."""
+    """Return a grid with 50 morph targets, each of which moves one in twenty vertices."""
     rng = np.random.default_rng(0)
     glb = Glb()
     mesh = grid(glb)

@@ -1,9 +1,8 @@
-"""A hundred posed bodies as instances, against as many static copies drawn the same way.
-
-Both are one instanced draw of the same triangles with the same fragment shader, 1280 x 720; the
-copies' vertex shader places them and does nothing else. Alternating, so that the machine cancels
-out. The processor's part (kinematics, correctives, upload) is printed too, and from how many actors
-on instancing pays off.
+"""A hundred posed bodies as instances, compared with as many static copies drawn the same way. Both
+are one instanced draw of the same triangles with the same fragment shader at 1280 x 720; the vertex
+shader of the copies only places them. Measurements alternate, so that the speed of the machine
+cancels out. The work on the CPU (kinematics, correctives, upload) is printed too, and the number of
+actors from which instancing pays off.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ void main() {
 
 
 def cast(figure: Figure, count: int) -> Scene:
-    """Return actors in rows of ten, each in its own pose."""
+    """Return actors in rows of ten with different poses."""
     rng, actors = np.random.default_rng(0), []
     for number in range(count):
         actor = Actor(figure)
@@ -85,7 +84,7 @@ def main(rounds: int = 15) -> None:
 
 
 def draws(figure: Figure, samples: int, rounds: int) -> None:
-    """Compare the draws alone: everything was uploaded before."""
+    """Compare only the draws, with all data uploaded before."""
     scene = cast(figure, COUNT)
     options = DisplayOptions(background="transparent", grid=False, samples=samples)
     with Offscreen() as offscreen, offscreen.context:
@@ -118,7 +117,7 @@ def posed_draw(
     view: View,
     options: DisplayOptions,
 ) -> Callable[[], None]:
-    """Return a function that draws the instances as the renderer does."""
+    """Return a function that draws the instances like the renderer."""
     return lambda: instance_pass.draw_instances(programs, instances, actors, view, options)
 
 
@@ -188,7 +187,7 @@ def processor(figure: Figure, rounds: int) -> None:
 
 
 def fewest(figure: Figure, rounds: int) -> None:
-    """Print whole frames as instances against one by one, while playing and for a moving camera."""
+    """Print frame times of instances relative to single actors, while playing or orbiting."""
     normal = instance_pass.FEWEST
     for count in (2, 4, 8, 16, 32):
         with Offscreen() as together, Offscreen() as single:

@@ -1,7 +1,6 @@
-"""Cost of checking: ``lint`` on the bundled body with 1,000 frames, against reading them.
-
-Reading is opening body and motion as ``viewer view`` does; the check starts from the open scene.
-Where its time goes is printed as well.
+"""Cost of checking the bundled body with 1,000 frames by ``lint``, compared with reading them.
+Reading means opening body and motion like ``viewer view``; the check starts from the open scene.
+The time of each check is printed as well.
 """
 
 from __future__ import annotations
@@ -22,16 +21,16 @@ from viewer.rig.scene import Scene
 
 GOAL = 4.0
 N_FRAMES, RATE = 1000, 60.0
-N_JOINTS, N_SHAPES = 52, 16  # of SMPL-H, as AMASS has them
+N_JOINTS, N_SHAPES = 52, 16  # joints of SMPL-H, as in AMASS
 
 
 def motion(path: Path) -> Path:
-    """Write a walk-like motion as AMASS does, its joints swinging at different speeds."""
+    """Write an AMASS file of a walk-like motion with joints that swing at different speeds."""
     rng = np.random.default_rng(0)
     seconds = np.arange(N_FRAMES)[:, None] / RATE
     swing = rng.uniform(0.0, 0.3, 3 * N_JOINTS)
     poses = swing * np.sin(2.0 * np.pi * rng.uniform(0.2, 1.0, 3 * N_JOINTS) * seconds)
-    # z up: the body is rotated upright, and walks along y.
+    # With z up, the body is rotated upright and walks along y.
     poses[:, :3] = np.pi / 2.0, 0.0, 0.0
     place = np.zeros((N_FRAMES, 3))
     place[:, 1], place[:, 2] = 0.8 * seconds[:, 0], 1.2
@@ -47,7 +46,7 @@ def motion(path: Path) -> Path:
 
 
 def main(rounds: int = 7) -> None:
-    """Print the time of checking relative to reading, and the fraction of each check."""
+    """Print the time of checking relative to reading, and the time of each check."""
     with tempfile.TemporaryDirectory(prefix="viewer-bench-") as folder:
         files = [bundled_body(), motion(Path(folder) / "walk.npz")]
         scene = viewer.load(*files)
@@ -65,7 +64,7 @@ def main(rounds: int = 7) -> None:
 
 
 def shares(scene: Scene, rounds: int = 5) -> dict[str, float]:
-    """Return milliseconds of each check, the median of some rounds."""
+    """Return the median milliseconds of each check over some rounds."""
     spent: dict[str, list[float]] = {}
     for _ in range(rounds):
         steps = steps_of(scene)

@@ -1,4 +1,4 @@
-"""Exporting 1,000 frames of the bundled body: the cost of reading the file back and comparing."""
+"""Export of 1,000 frames of the bundled body, and the cost of comparing the written file."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ FRAMES = 1000
 
 
 def walk() -> SampledAnimation:
-    """Return every joint swinging at its own rate, by half a radian at most."""
+    """Return a motion in which every joint swings at a different rate, by at most half a radian."""
     figure = viewer.load(bundled_body()).actors[0].figure
     assert figure.skeleton is not None
     rng, count = np.random.default_rng(0), figure.skeleton.n_joints

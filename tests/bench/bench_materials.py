@@ -1,7 +1,6 @@
-"""A figure of 60,000 vertices with 20 textured materials against the same with one.
-
-Frames in draft quality from a moving camera, with sorting of blended triangles against opaque ones,
-and the upload of the figure: 20 materials that share one image, and 20 with an image each.
+"""A figure of 60,000 vertices with 20 textured materials, compared with a single material. The
+frames have draft quality and a moving camera. Blended, sorted triangles are compared with opaque
+triangles, and the upload of 20 materials that share an image with that of 20 images.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ _ROWS, _COLUMNS = 346, 174  # 60,204 vertices
 
 
 def sheet(n_materials: int, images: list[np.ndarray], mode: str = "opaque") -> Figure:
-    """Return a wavy sheet with stripes of materials, each with one of the images in turn."""
+    """Return a wavy sheet with stripes of materials that use the images in turn."""
     v, u = np.meshgrid(np.linspace(0, 1, _ROWS), np.linspace(0, 1, _COLUMNS), indexing="ij")
     uvs = np.stack([u.ravel(), v.ravel()], axis=1)
     points = np.column_stack([uvs, 0.1 * np.sin(9.0 * u.ravel())])
@@ -47,7 +46,7 @@ def sheet(n_materials: int, images: list[np.ndarray], mode: str = "opaque") -> F
 def main(rounds: int = 15) -> None:
     """Print the ratios."""
     noise = np.random.default_rng(0).integers(0, 256, (MANY, 256, 256, 4), dtype=np.uint8)
-    noise.flags.writeable = False  # otherwise each texture has its own copy
+    noise.flags.writeable = False  # otherwise each texture would have a copy
     images = [*noise]
     with Offscreen() as offscreen, offscreen.context:
         figures = {
@@ -67,9 +66,8 @@ def main(rounds: int = 15) -> None:
 
 
 def _frames(offscreen: Offscreen, figures: dict[str, Figure]) -> dict[str, Callable[[], object]]:
-    """Return functions that draw one figure each from a camera that moves on.
-
-    All are in one scene, so that their buffers are kept.
+    """Return functions that draw one figure each with a moving camera. All figures are in one
+    scene, so that their buffers are kept.
     """
     scene = Scene([Actor(figure) for figure in figures.values()])
     options, target = DisplayOptions(), offscreen.target(SIZE, 1)

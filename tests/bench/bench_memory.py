@@ -1,4 +1,4 @@
-"""Peak memory of rendering the bundled figure, against a minimal program that draws a frame."""
+"""Peak memory of rendering the bundled figure, compared with a minimal program."""
 
 from __future__ import annotations
 

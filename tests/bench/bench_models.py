@@ -1,4 +1,4 @@
-"""Reading body models: PIG from text, pickle and .npz; large arrays, compressed or unused."""
+"""Reading of body models: PIG from text, pickle and .npz; large compressed or unused arrays."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def pig_arrays() -> dict[str, np.ndarray]:
     mesh, skeleton, skin = figure.mesh, figure.skeleton, figure.skin
     assert mesh is not None and skeleton is not None and skin is not None
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
-    # This format lists a joint once that a vertex lists twice.
+    # This format merges repeated joints of a vertex.
     entries = np.stack([skin.joints, owners], axis=1)
     unique, inverse = np.unique(entries, axis=0, return_inverse=True)
     weights = np.round(np.bincount(inverse.ravel(), skin.weights), 3)
@@ -41,7 +41,7 @@ def pig_arrays() -> dict[str, np.ndarray]:
 
 
 def write_text(folder: Path, arrays: dict[str, np.ndarray]) -> bytes:
-    """Write the tables as the model's authors do; return their total size in bytes."""
+    """Write the tables like the authors of the model; return their total size in bytes."""
     for name, array in arrays.items():
         is_whole = array.dtype.kind == "i"
         rows = array.reshape(len(array), -1).tolist()
@@ -96,7 +96,7 @@ def _archives(folder: Path, rounds: int) -> None:
 
 
 def _correctives(folder: Path) -> None:
-    """Read correctives of MHR's size per row, compressed: 500 of 3,000 rows, each mostly zero."""
+    """Read compressed correctives of MHR's row size: 500 of 3,000 rows, which are mostly zero."""
     generator = np.random.default_rng(0)
     offsets = np.zeros((500, 18_439, 3), np.float32)
     for row in offsets:
@@ -110,7 +110,7 @@ def _correctives(folder: Path) -> None:
 
 
 def numpy_alone(path: Path, raw: list[Path]) -> int:
-    """Read the same arrays with numpy: the same .npz, or one .npy each where there is a pickle."""
+    """Read the same arrays with numpy from the .npz, or from one .npy each instead of a pickle."""
     if path.suffix == ".npz":
         with np.load(path) as archive:
             return sum(archive[key].size for key in archive)
@@ -134,9 +134,8 @@ np.savez(sys.argv[2], **small)
 
 
 def _memory(folder: Path) -> None:
-    """Show the first frame of a model with 400 shape columns, in a process of its own.
-
-    The models are made in another process: a child's peak counts what its parent held.
+    """Draw the first frame of a model with 400 shape columns in a separate process. The models are
+    written in another process, because the peak of a child includes the memory of its parent.
     """
     few, many = str(folder / "few.npz"), str(folder / "many.npz")
     formats = Path(__file__).resolve().parents[1] / "formats"

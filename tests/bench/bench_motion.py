@@ -1,7 +1,6 @@
-"""Cost of playback: sampling, kinematics and upload of one 62-joint actor against its frame.
-
-The frame is 1280 x 720 with the default display. Of 500 played frames the growth of memory is
-printed as well: of what Python holds, and of the whole process.
+"""Cost of playback: sampling, kinematics and upload of one 62-joint actor, compared with its frame.
+The frame is 1280 x 720 with the default display. The growth of memory over 500 played frames is
+printed as well, for Python objects and for the whole process.
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ N_FRAMES, SECONDS = 300, 10.0
 
 
 def sampled() -> SampledClip:
-    """Return ten seconds of capture: every joint rotates a little, the figure walks."""
+    """Return ten seconds of capture, in which every joint rotates slightly and the figure walks."""
     rng = np.random.default_rng(0)
     turns = np.cumsum(rng.normal(0.0, 0.003, (N_FRAMES, N_JOINTS, 3)), axis=0)
     place = np.zeros((N_FRAMES, 3))
@@ -42,7 +41,7 @@ def sampled() -> SampledClip:
 
 
 def keyed() -> Clip:
-    """Return ten seconds of curves, 31 keys for each of the 186 DOFs."""
+    """Return ten seconds of curves with 31 keys for each of the 186 DOFs."""
     rng = np.random.default_rng(1)
     times = np.linspace(0.0, SECONDS, 31)
     channels = [
@@ -53,7 +52,7 @@ def keyed() -> Clip:
 
 
 def main(rounds: int = 150) -> None:
-    """Print the fraction of each motion in its drawn frame, and the growth in 500 frames."""
+    """Print the cost of each motion relative to its frame, and memory growth over 500 frames."""
     for clip in (sampled(), keyed()):
         with Offscreen() as offscreen, offscreen.context:
             frame, prepare = pieces(offscreen, Actor(synthetic(), clip=clip))
@@ -90,19 +89,19 @@ def pieces(offscreen: Offscreen, actor: Actor) -> tuple[Callable[[], object], Ca
 
 
 class Clock:
-    """Times in a looping clip, one per frame of a 60 Hz screen."""
+    """The times in a looping clip, one per frame of a 60 Hz screen."""
 
     def __init__(self, clip: Motion) -> None:
         self.clip, self.ticks = clip, 0
 
     def next(self) -> float:
-        """Return the next time; never a repeated one, so that no cached result is used."""
+        """Return the next time, which is never repeated, so that no cached result is used."""
         self.ticks += 1
         return (self.ticks / 60.0 + 1e-5 * self.ticks) % (self.clip.end - self.clip.start)
 
 
 def growth(frame: Callable[[], object]) -> tuple[float, float]:
-    """Return by how many kB Python's memory and the process grow over 500 frames."""
+    """Return the growth of Python's memory and of the process over 500 frames in kB."""
     for _ in range(100):
         frame()
     gc.collect()

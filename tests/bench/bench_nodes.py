@@ -1,4 +1,4 @@
-"""Making a figure of a long chain of nodes, against a chain half as long."""
+"""Creation of a figure from a long chain of nodes, compared with a chain of half the length."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from viewer.formats._nodes.figures import figure_group
 from viewer.formats._source import Source
 
 COUNT = 100_000
-# Quadratic time would be 4; larger arrays miss the caches more often.
+# Quadratic time would have a ratio of 4; larger arrays miss the caches more often.
 GOAL = 3.0
 
 
 def chain(count: int) -> NodeFile:
-    """Return nodes of which each is the parent of the next; every thousandth has a mesh."""
+    """Return a chain of nodes in which every thousandth has a mesh."""
     meshes = np.full(count, -1, dtype=np.int32)
     meshes[::1000] = 0
     none = np.full(count, -1, dtype=np.int32)

@@ -1,8 +1,7 @@
-"""Cost of observing edits in a large scene, as a ratio to posing its actors.
-
-300 actors play a motion. Every frame the history compares the scene with its last state and follows
-the clock, and a key tells whether the picture is out of date. Both must stay cheap compared with
-posing. The whole frame of the window is printed as well, 320 x 200 with all panels.
+"""Cost of observing edits in a large scene, relative to posing its actors. 300 actors play a
+motion. In every frame the history compares the scene with its last state and follows the clock, and
+a key determines whether the picture is out of date. Both must be cheap compared with posing. The
+whole frame of the window is printed as well, at 320 x 200 with all panels.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ GOAL = 0.2
 
 
 def instances(count: int) -> Scene:
-    """Return actors in rows of twenty that play the same motion, each from another time."""
+    """Return actors in rows of twenty that play the same motion with different start times."""
     figure = viewer.load(bundled_body()).actors[0].figure
     n_joints = figure.require_skeleton().n_joints
     rng = np.random.default_rng(0)

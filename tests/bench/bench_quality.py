@@ -1,10 +1,8 @@
-"""Cost of qualities, shadings and onion relative to plain drafts; and of drafts in older code.
-
-    python tests/bench/bench_quality.py [FOLDER|COMMIT]
-
-FOLDER is another checkout; COMMIT is checked out into a temporary worktree, without a name the
-commit before the tone curve. Both draw the same drafts in processes that take turns, and processor
-time counts, as software rendering uses all cores.
+"""Cost of qualities, shadings and onion skins relative to plain drafts, and of drafts in older
+code. python tests/bench/bench_quality.py [FOLDER|COMMIT] FOLDER is another checkout; COMMIT is
+checked out into a temporary worktree and defaults to the commit before the tone curve. Both draw
+the same drafts in alternating processes. Times are processor times, because software rendering uses
+all cores.
 """
 
 from __future__ import annotations
@@ -112,7 +110,7 @@ def _onion(rounds: int) -> None:
 
 
 def against(other: str, rounds: int = 5) -> None:
-    """Print processor time of drafts here and in another checkout, a folder or a commit."""
+    """Print the processor time of drafts in this and in another checkout, a folder or a commit."""
     if Path(other).is_dir():
         _against(Path(other), rounds)
         return

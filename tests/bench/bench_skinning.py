@@ -1,7 +1,6 @@
-"""A frame of a changed pose (kinematics, palette, skinning, drawing) against a static frame.
-
-Both draw 1280 x 720, one sample a pixel, all faces, with the same fragment shader; the static frame
-is the same mesh, posed before.
+"""A frame of a changed pose (kinematics, palette, skinning, drawing), compared with a static frame.
+Both draw all faces at 1280 x 720, one sample per pixel, with the same fragment shader; the static
+frame is the same mesh posed before.
 """
 
 from __future__ import annotations
@@ -26,7 +25,7 @@ N_VERTICES, N_JOINTS, MOST = 11_239, 62, 13
 
 
 def synthetic() -> Figure:
-    """Return a long ball of 11,239 vertices on a chain of 62 joints, 1 to 13 influences each."""
+    """Return a ball of 11,239 vertices with 1 to 13 influences each, on a chain of 62 joints."""
     rng = np.random.default_rng(0)
     rings = sides = 105
     p, a = np.meshgrid(
@@ -49,7 +48,7 @@ def synthetic() -> Figure:
         rest_dofs=np.zeros(3 * N_JOINTS),
         dof_limits=np.tile([-np.inf, np.inf], (3 * N_JOINTS, 1)),
     )
-    # Patches of 3 x 9 vertices have as many influences each, as on a painted figure.
+    # The vertices within a patch of 3 x 9 have equally many influences, as on a painted figure.
     patches = np.clip(1 + rng.poisson(2.46, (rings // 3 + 1, sides // 9 + 1)), 1, MOST)
     patches[5, 5] = MOST
     grid = patches[np.arange(rings + 1)[:, None] // 3, np.arange(sides + 1) // 9]

@@ -1,20 +1,20 @@
-"""Whole commands, from start to exit, against minimal programs that do the same.
+"""Whole commands from start to exit, compared with minimal programs that do the same.
 
-Processor time of the processes, which hardly depends on other programs and includes software
-drivers. The cache of parsed numbers is filled by a first round.
+Times are processor times of the processes, which hardly depend on other programs and include
+software drivers. A first round fills the cache of parsed numbers.
 
 Idle threads of OpenBLAS wait actively after numpy is imported; ``viewer`` shortens that time, the
-minimal programs do not. Hence each of them is also measured with the same setting, which shows what
-the rest of the program adds.
+minimal programs do not. So each of them is also measured with the same setting, which shows the
+cost of the rest of the program.
 
 Limits, in ms of processor time of the main thread on two 2.5 GHz cores:
 
-- ``viewer info``: 10 for Python, 67 for numpy, 16 for 78 modules of ours at 0.2 each, 10 for
-  argparse, signals and typing, 5 for the file. Modules are as fast as Python can load them.
-- ``viewer render``: 40 for 166 modules of ours, 7 for pyrr, 12 to read the files, 7 for the camera,
-  16 to upload the mesh and its texture, 9 to find out that the surface is closed (which saves as
-  much in drawing it), 12 to skin, 9 for background and grid. A minimal program has none of these;
-  Pillow instead of isal costs it 35.
+- ``viewer info``: 10 for Python, 67 for numpy, 16 for 78 modules of this project at 0.2 each, 10
+  for argparse, signals and typing, 5 for the file. Python cannot load these modules faster.
+- ``viewer render``: 40 for 166 modules of this project, 7 for pyrr, 12 to read the files, 7 for the
+  camera, 16 to upload the mesh and its texture, 9 to detect that the surface is closed (which saves
+  as much when it is drawn), 12 to skin, 9 for background and grid. A minimal program has none of
+  these; it spends 35 more because it uses Pillow instead of isal.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ FORBIDDEN = ("imgui_bundle", "glfw", "scipy")
 PIG = ROOT.parent / "shared" / "data" / "pig" / "core_txt_files"
 SKELETON = ROOT / "assets" / "samples" / "fox.skel"
 
-# Runs a script in a process whose idle threads of OpenBLAS sleep.
+# This program runs a script in a process in which idle threads of OpenBLAS sleep.
 ASLEEP = """
 import os, runpy, sys
 os.environ["OPENBLAS_THREAD_TIMEOUT"] = "20"
@@ -120,7 +120,7 @@ def compare(title: str, runs: Mapping[str, list[str]], rounds: int, goal: float 
 
 
 def encoding(picture: str, rounds: int) -> None:
-    """Print the time to write an image as PNG, against Pillow at its fastest level."""
+    """Print the time to write an image as PNG, compared with Pillow at its fastest level."""
     with Image.open(picture) as opened:
         pixels = np.array(opened.convert("RGBA"))
 

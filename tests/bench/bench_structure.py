@@ -1,7 +1,6 @@
-"""Skeletons in each style and outlines, against the same picture with boxes or without an outline.
-
-The bundled body with a new pose in each frame, 1280 x 720, one sample, drawn alternately, so that
-the machine cancels out.
+"""Skeleton styles and outlines, compared with the same picture with boxes or without an outline.
+The bundled body has a new pose in each frame, at 1280 x 720 with one sample. Frames alternate, so
+that the speed of the machine cancels out.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""Weights transferred by the default method, against those of the nearest vertex.
-
-Parts, by default all of them: ``aligned``, only the weights, with aligned template and target;
-``whole``, the complete pipeline including the alignment, for both methods; ``inverted``, the same
-with the template at rest, whatever the pose of the target; ``stretched``, targets with a different
-scale along each axis, without options and with ``--scale axes``; ``scans``, meshes as scanners
-leave them; ``time``, the time of each step.
+"""Weights transferred by the default method, compared with those of the nearest vertex. Parts, by
+default all of them: ``aligned``, only the weights, with aligned template and target; ``whole``, the
+complete pipeline including the alignment, for both methods; ``unposed``, the same with the template
+at rest for any pose of the target; ``stretched``, targets with a different scale along each axis,
+without options and with ``--scale axes``; ``scans``, meshes as produced by scanners; ``time``, the
+time of each step.
 """
 
 from __future__ import annotations
@@ -30,10 +29,11 @@ from viewer.autorig.weights.weight_transfer import (
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
 
-# A template in another pose, which the complete pipeline finds, is no test of the weights alone.
+# A template in a different pose, which the complete pipeline fits, does not test only the weights.
 UNFITTED = {"aligned": {"bent by 4 degrees"}}
-CLEAR = 0.1  # difference of the two largest weights, from which a dominant joint is clear
-SHARE, SAME = 0.5, 0.97  # goals: mean L1 against the other method's; same dominant joint
+CLEAR = 0.1  # minimum difference of the two largest weights for a clear dominant joint
+# Goals: mean L1 relative to the nearest vertex's, and fraction of equal dominant joints.
+SHARE, SAME = 0.5, 0.97
 
 
 def main() -> None:
@@ -132,7 +132,7 @@ def _skin(target: made.Target) -> Skin:
 
 
 def _times(figure) -> None:
-    """Print the time of each step for a target of some 50,000 vertices or more."""
+    """Print the time of each step for a target of 50,000 or more vertices."""
     target = made.fine(figure)
     count = len(target.positions)
     started = time.perf_counter()

@@ -1,6 +1,5 @@
-"""Cost of sampling keyed transforms: 70 joints with translation, rotation and scale, one time.
-
-The table of all channels is compared with a loop that evaluates one channel at a time with numpy.
+"""Cost of sampling keyed translation, rotation and scale of 70 joints at one time. The table of all
+channels is compared with a loop that evaluates one channel at a time with numpy.
 """
 
 from __future__ import annotations
@@ -17,7 +16,7 @@ GOAL = 0.1  # milliseconds for all channels at one time
 
 
 def clip(shares: bool, mode: str = "linear") -> TransformClip:
-    """Return 210 channels of 100 keys, with common or different times."""
+    """Return 210 channels of 100 keys with common or different times."""
     rng = np.random.default_rng(0)
     channels = []
     for joint in range(N_JOINTS):
@@ -53,7 +52,7 @@ def one_by_one(motion: TransformClip, time: float) -> list[np.ndarray]:
 
 
 def main(rounds: int = 30) -> None:
-    """Print the time of each kind of clip beside that of the loop."""
+    """Print the time of each kind of clip next to that of the loop."""
     for title, motion in (
         ("shared times", clip(shares=True)),
         ("times of their own", clip(shares=False)),

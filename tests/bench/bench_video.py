@@ -1,7 +1,6 @@
-"""Recording a video against only drawing and only encoding its frames.
-
-Drawing alone is the recorder with a sink that drops the frames; encoding alone is the video sink
-with frames that are there already. 1280 x 720, 4 samples a pixel, H.264 at the usual quality.
+"""Recording of a video, compared with only drawing and only encoding its frames. Drawing uses the
+recorder with a sink that drops the frames; encoding uses the video sink with stored frames. The
+video has 1280 x 720 pixels, 4 samples per pixel, and H.264 at the default quality.
 """
 
 from __future__ import annotations
@@ -47,7 +46,7 @@ class _Dropped:
 
 
 class _Kept(_Dropped):
-    """A sink that keeps the frames."""
+    """A sink that stores the frames."""
 
     def __init__(self) -> None:
         self.frames: list[Bytes] = []
@@ -57,7 +56,7 @@ class _Kept(_Dropped):
 
 
 def moving() -> Actor:
-    """Return the bundled fox, all of whose joints swing."""
+    """Return the bundled fox with a motion that swings all joints."""
     actor = viewer.load().actors[0]
     skeleton = actor.figure.skeleton
     assert skeleton is not None and actor.pose is not None
@@ -72,7 +71,7 @@ def moving() -> Actor:
 
 
 def main(rounds: int = 5) -> None:
-    """Print frames per second, and the ratio of recording to the slower of the two."""
+    """Print frames per second, and the ratio of recording to the slower of drawing and encoding."""
     scene = Scene([moving()])
     recording = Recording(scene, np.arange(N_FRAMES) / RATE, default_camera(scene, SIZE), SIZE)
     _, recording.box = frame_motion(recording)

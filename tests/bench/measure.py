@@ -12,9 +12,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-# Compiled modules, as an installed program has them; the first round fills it.
+# The cache of compiled modules, as in an installed program; the first round fills it.
 CACHE = tempfile.TemporaryDirectory(prefix="viewer-bench-")
-# Readers are measured without the cache of parsed numbers; child processes get their own cache.
+# Readers are measured without the cache of parsed numbers; child processes have a separate cache.
 os.environ["VIEWER_CACHE"] = "off"
 
 
@@ -23,13 +23,13 @@ def interleaved(
     rounds: int,
     clock: Callable[[], float] = time.perf_counter,
 ) -> dict[str, list[float]]:
-    """Time each function once per round, in turn; return milliseconds by name."""
+    """Time each function once per round in turn; return milliseconds by name."""
     times: dict[str, list[float]] = {name: [] for name in work}
     for number in range(rounds + 1):
         for name, run in work.items():
             started = clock()
             run()
-            if number:  # the first round warms caches
+            if number:  # the first round fills caches
                 times[name].append(1e3 * (clock() - started))
     return times
 
@@ -37,7 +37,7 @@ def interleaved(
 def report(
     title: str, times: Mapping[str, Sequence[float]], ratio: tuple[str, str], goal: float = 0.0
 ):
-    """Print medians with their spread, and the median of the ratios; a goal of 0 is none."""
+    """Print medians with their spread, and the median of the ratios; a goal of 0 means none."""
     print(title)
     for name, values in times.items():
         ordered = sorted(values)
@@ -57,8 +57,7 @@ def median_ratio(times: Mapping[str, Sequence[float]], first: str, second: str) 
 
 def run_process(arguments: Sequence[str], is_quiet: bool = False) -> tuple[float, float]:
     """Run Python with arguments; return its wall time in seconds and its peak memory in MB.
-
-    ``is_quiet``: whether its warnings are dropped.
+    ``is_quiet`` drops its warnings.
     """
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONPYCACHEPREFIX": CACHE.name}
     environment["VIEWER_CACHE"] = str(Path(CACHE.name) / "arrays")

@@ -1,4 +1,4 @@
-"""Run every benchmark, or those named: ``python tests/bench/run.py start skinning``."""
+"""Runner of all or the named benchmarks: ``python tests/bench/run.py start skinning``."""
 
 from __future__ import annotations
 

@@ -1,11 +1,8 @@
-"""Meshes as scanners and modellers leave them, made from the bundled figures: no rig, true weights.
-
-People unlike the bundled body, made with its blend shapes, in A- and T-pose, with noise, another
-tessellation, holes, clothes and hair as open shells, a missing foot, or in centimetres with z up;
-and an animal with other proportions than the fox. Run as a program, it writes them as .obj, and
-a walk for each template as .bvh:
-
-    python tests/bench/scan_targets.py FOLDER
+"""Scan-like meshes without a rig but with known weights, derived from the bundled figures. They are
+people of different shapes, in A- and T-pose, with noise, different tessellation, holes, clothes and
+hair as open shells, a missing foot, or in centimetres with z up; and an animal of different
+proportions than the fox. Run as a program, the module writes them as .obj, and a walk for each
+template as .bvh: python tests/bench/scan_targets.py FOLDER
 """
 
 from __future__ import annotations
@@ -28,27 +25,28 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
 FRAMES, RATE = 32, 30.0  # one stride
-Z_UP = 100.0 * np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # metres, y up: to centimetres
+# From metres with y up to centimetres.
+Z_UP = 100.0 * np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
 
 @dataclass(frozen=True)
 class Scan:
-    """A mesh without a rig, and the weights that it should get.
+    """A mesh without a rig, and its expected weights.
 
     Attributes
     ----------
     name : str
-        Also of its file.
+        Name of the mesh and its file.
     template : str
         ``"body"`` or ``"fox"``.
     positions : (W, 3)
-        In its own unit and axes.
+        Positions in the unit and axes of the scan.
     triangles : (T, 3)
         Vertex indices.
     weights : (W, J) sparse
-        Of the template's joints.
+        Weights of the template's joints.
     pose : Pose
-        Of the template, as the scan stands.
+        Pose of the template that matches the scan.
     """
 
     name: str
@@ -77,7 +75,7 @@ def scans() -> list[Scan]:
 
 
 def person(body: viewer.Figure, shape: dict[str, float], arms: float) -> made.Target:
-    """Return a person unlike the template, with the arms lowered by an angle in radians."""
+    """Return a person of a different shape, with the arms lowered by an angle in radians."""
     pose = viewer.rest_pose(body.skeleton)
     pose.shape_weights = np.array([shape.get(name, 0.0) for name in body.blend_shapes.names])
     names = list(body.skeleton.names)
@@ -91,7 +89,7 @@ def person(body: viewer.Figure, shape: dict[str, float], arms: float) -> made.Ta
 
 
 def other_animal(fox: viewer.Figure) -> made.Target:
-    """Return a heavier animal: longer legs, shorter, wider, a larger head, in another stance."""
+    """Return a heavier animal in a different stance, with longer legs and a larger head."""
     pose = made.bent_pose(fox, np.random.default_rng(11), np.radians(6.0))
     whole = made.posed("fox", fox, pose)
     names = fox.skeleton.names
@@ -106,14 +104,14 @@ def other_animal(fox: viewer.Figure) -> made.Target:
 
 
 def meshed(target: made.Target, share: float) -> made.Target:
-    """Return another tessellation, with edges scaled by a factor."""
+    """Return the scan with a different tessellation and with edges scaled by a factor."""
     fine = made.subdivided(made.subdivided(target))
     length = made.edge_length(target.positions, target.triangles)
     return made.clustered(fine, share * length)
 
 
 def noisy(target: made.Target, rng, name: str) -> Scan:
-    """Return a scan with a tenth of an edge of noise along x, y and z."""
+    """Return the scan with noise of a tenth of an edge along x, y and z."""
     template = "body" if "left_hip" in target.figure.skeleton.names else "fox"
     step = 0.1 * made.edge_length(target.positions, target.triangles)
     moved = target.positions + rng.normal(scale=step, size=target.positions.shape)
@@ -121,12 +119,12 @@ def noisy(target: made.Target, rng, name: str) -> Scan:
 
 
 def z_up(scan: Scan) -> Scan:
-    """Return the scan in centimetres, with z up, away from the origin."""
+    """Return the scan in centimetres with z up and away from the origin."""
     return replace(scan, positions=scan.positions @ Z_UP.T + [20.0, -35.0, 90.0])
 
 
 def holed(scan: Scan) -> Scan:
-    """Return the scan without the areas that scanners miss: armpits, crotch, soles, the crown."""
+    """Return the scan without the areas that scanners miss: armpits, crotch, soles and crown."""
     names = made.body().skeleton.names
     joints = viewer.joint_matrices(made.body(), scan.pose)[:, :3, 3]
     at = dict(zip(names, joints, strict=True))
@@ -144,7 +142,7 @@ def holed(scan: Scan) -> Scan:
 
 
 def without(scan: Scan, joints: list[str]) -> Scan:
-    """Return the scan without the parts that follow some joints most."""
+    """Return the scan without the parts dominated by some joints."""
     gone = np.isin(scan.weights.toarray().argmax(axis=1), joint_numbers(scan, joints))
     return kept(scan, ~gone[scan.triangles].any(axis=1))
 
@@ -164,7 +162,7 @@ def clothed(scan: Scan) -> Scan:
 
 
 def part(scan: Scan, joints: list[str], offset: float) -> Scan:
-    """Return the part that follows some joints most as a smooth shell away from the skin."""
+    """Return the part dominated by some joints as a smooth shell offset from the skin."""
     normals = smooth_normals(scan)
     strongest = scan.weights.toarray().argmax(axis=1)
     inside = np.isin(strongest, joint_numbers(scan, joints))
@@ -216,12 +214,12 @@ def mesh_of(scan: Scan) -> viewer.Mesh:
 
 
 def walk(figure: viewer.Figure, what: str) -> SampledClip:
-    """Return one stride as sine curves of the joints, in the template's own axes."""
+    """Return one stride as sine curves of the joints in the axes of the template."""
     turns = body_turns(figure) if what == "body" else fox_turns(figure)
     quaternions = turns_to_quaternions(turns)
     rest = viewer.rest_pose(figure.skeleton)
     if what == "body":
-        # The arms are first lowered, about z; then they swing.
+        # The arms are first lowered about z, then they swing.
         down = np.zeros((figure.skeleton.n_joints, 3))
         names = list(figure.skeleton.names)
         down[names.index("left_shoulder"), 2] = -1.2

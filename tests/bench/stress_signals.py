@@ -1,4 +1,4 @@
-"""Interrupt commands at random moments, and count the outcomes.
+"""Random interruption of commands, with counts of the outcomes.
 
     python tests/bench/stress_signals.py [--tries N] [--seed S] [WORK:SIGNAL ...]
 
@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 from children import listening  # noqa: E402
 
 OLD = b"the old file"
-# Arguments, and the output's name, "" for none.
+# The arguments, and the name of the output, "" for none.
 WORKS: dict[str, tuple[list[str], str]] = {
     "png": (["render", "--size", "320x240"], "x.png"),
     "mp4": (["render", "--size", "320x240", "--turntable", "2"], "x.mp4"),
@@ -77,7 +77,7 @@ class Trial:
         return process
 
     def once(self, delay: float) -> tuple[str, float]:
-        """Interrupt the command after some seconds; return how it ended and how long that took."""
+        """Interrupt the command after some seconds; return its outcome and remaining run time."""
         process = self.start()
         try:
             process.wait(delay)
@@ -124,7 +124,7 @@ def tried(work: str, kind: str, tries: int, mesh: Path) -> bool:
 
 
 def main() -> int:
-    """Run the named trials, or the usual ones."""
+    """Run the named trials, or the default ones."""
     parser = argparse.ArgumentParser(description="Interrupt commands at random moments.")
     parser.add_argument("trials", nargs="*", metavar="WORK:SIGNAL", default=USUAL)
     parser.add_argument("--tries", type=int, default=100)

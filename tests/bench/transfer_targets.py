@@ -1,7 +1,6 @@
-"""Meshes whose true skin weights are known, made from the bundled figures.
-
-Each target comes with the template in the place and pose where both fit, and with the matrix that
-took it there, so that weights can be judged with or without the search for an alignment.
+"""Meshes with known skin weights, derived from the bundled figures. Each target includes the
+template placed and posed to match it, and the matrix of that placement, so that weights can be
+compared with or without the search for an alignment.
 """
 
 from __future__ import annotations
@@ -23,12 +22,12 @@ TURN = np.radians(115.0)
 
 @dataclass(frozen=True)
 class Target:
-    """A mesh, its true weights, and the template that it was made from."""
+    """A mesh, its true weights, and the template from which it was derived."""
 
     name: str
     figure: viewer.Figure
-    pose: viewer.Pose  # of the template
-    template: np.ndarray  # (V, 3) its posed vertices, in the target's space
+    pose: viewer.Pose  # pose of the template
+    template: np.ndarray  # (V, 3) posed vertices of the template in the target's space
     template_triangles: np.ndarray
     template_weights: sp.csr_array  # (V, J)
     positions: np.ndarray  # (W, 3)
@@ -38,7 +37,7 @@ class Target:
 
 
 def weights_of(skin: viewer.Skin) -> sp.csr_array:
-    """Return weights as a matrix whose rows add up to 1."""
+    """Return weights as a matrix with rows that sum to 1."""
     matrix = sp.csr_array(
         (skin.weights, skin.joints, skin.starts), shape=(skin.n_vertices, skin.n_joints)
     )
@@ -54,7 +53,7 @@ def fox() -> viewer.Figure:
 
 
 def targets(figure: viewer.Figure, what: str) -> list[Target]:
-    """Return all targets of a figure; for the body also with clothes and with lowered arms."""
+    """Return all targets of a figure; those of the body include clothes and lowered arms."""
     rng = np.random.default_rng(20)
     plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
     bent = posed(what, figure, bent_pose(figure, rng, 0.25))
@@ -93,7 +92,7 @@ def without_pose(figure: viewer.Figure, what: str) -> list[Target]:
 
 
 def stretched(figure: viewer.Figure, what: str) -> list[Target]:
-    """Return targets with a different scale along each axis, which no pose or limb can explain."""
+    """Return targets with a different scale along each axis, which no pose can match."""
     rng = np.random.default_rng(22)
     plain = posed(what, figure, viewer.rest_pose(figure.skeleton))
     made = []
@@ -108,18 +107,19 @@ def stretched(figure: viewer.Figure, what: str) -> list[Target]:
 
 
 def fine(figure: viewer.Figure) -> Target:
-    """Return a target of more than 50,000 vertices, a part of which does not fit."""
+    """Return a target of more than 50,000 vertices, part of which does not match."""
     rest = posed("", figure, viewer.rest_pose(figure.skeleton))
     bent = _otherwise_bent(rest, figure, np.random.default_rng(3), remesh=False)
     return clustered(subdivided(subdivided(bent)), 0.3 * edge_length(*_surface(rest)))
 
 
 def template_figure(target: Target) -> viewer.Figure:
-    """Return the target's template as a figure, with weights that add up to 1."""
+    """Return the template of a target as a figure, with weights that sum to 1."""
     figure = target.figure
     if len(target.template) == figure.mesh.n_vertices:
         return figure
-    # A decimated template keeps some of the figure's vertices, here found by their rest positions.
+    # A decimated template keeps some vertices of the figure, which are found by their rest
+    # positions.
     rest = viewer.deform(figure, target.pose, viewer.Skinning(correctives=False))[0]
     kept = cKDTree(rest).query(target.template)[1]
     positions = figure.mesh.positions[kept]
@@ -137,7 +137,7 @@ def _surface(target: Target) -> tuple[np.ndarray, np.ndarray]:
 
 
 def posed(what, figure, pose) -> Target:
-    """Return a figure's own vertices in a pose."""
+    """Return the vertices of a figure in a pose."""
     positions, _ = viewer.deform(figure, pose, viewer.Skinning(correctives=False))
     weights, triangles = weights_of(figure.skin), figure.mesh.triangles
     return Target(
@@ -150,7 +150,7 @@ def _named(target: Target, name: str) -> Target:
 
 
 def bent_pose(figure, rng, angle: float) -> viewer.Pose:
-    """Rotate all joints except the root about random axes, by normally distributed angles."""
+    """Rotate all joints except the root about random axes by normally distributed angles."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = rng.normal(scale=angle / np.sqrt(3), size=(len(pose.rotations), 3))
     turns[0] = 0.0
@@ -159,7 +159,7 @@ def bent_pose(figure, rng, angle: float) -> viewer.Pose:
 
 
 def _arms_down(figure, angle: float = 1.35) -> viewer.Pose:
-    """Lower the arms of the body; by default until they lie on the torso."""
+    """Lower the arms of the body; by default until they touch the torso."""
     pose = viewer.rest_pose(figure.skeleton)
     turns = np.zeros((len(pose.rotations), 3))
     names = list(figure.skeleton.names)
@@ -198,7 +198,7 @@ def _perturbed(target: Target, rng) -> Target:
 
 
 def subdivided(target: Target) -> Target:
-    """Put a vertex in the middle of each edge, with the mean of its ends' weights."""
+    """Add a vertex at the middle of each edge, with the mean of the weights at its ends."""
     links, count = edges(target.triangles), len(target.positions)
     keys = links[:, 0].astype(np.int64) * count + links[:, 1]
     a, b, c = target.triangles.T.astype(np.int64)
@@ -250,14 +250,14 @@ def clustered(target: Target, cell: float) -> Target:
 
 
 def _remeshed(target: Target, rng) -> Target:
-    """Subdivide twice, keep about as many vertices as before in other positions; then perturb."""
+    """Subdivide twice, keep about as many vertices at different positions, then perturb."""
     fine = subdivided(subdivided(target))
     coarse = clustered(fine, 1.1 * edge_length(target.positions, target.triangles))
     return replace(_perturbed(coarse, rng), name="remeshed")
 
 
 def _coarse_template(target: Target) -> Target:
-    """Use a decimated template with its own weights in place of the figure."""
+    """Use a decimated template with its weights in place of the figure."""
     coarse = clustered(target, 2.0 * edge_length(target.positions, target.triangles))
     return replace(
         target,
@@ -288,14 +288,14 @@ def _placed(target: Target) -> Target:
 
 
 def _otherwise_bent(target: Target, figure, rng, remesh: bool = True) -> Target:
-    """Bend the target slightly, but not the template: an imperfect fit of the pose."""
+    """Bend the target slightly but not the template, as in an imperfect fit of the pose."""
     bent = posed("", figure, bent_pose(figure, rng, np.radians(4.0)))
     bent = _remeshed(bent, rng) if remesh else bent
     return replace(bent, name="bent by 4 degrees", template=target.template, pose=target.pose)
 
 
 def shell(target: Target, offset: float, joints: list[str] | None) -> Target:
-    """Offset the surface along its normals, only in the parts of given joints if there are any."""
+    """Offset the surface along its normals, only in the parts of the given joints if any."""
     normals = vertex_normals(target.positions, target.triangles)
     links = edges(target.triangles)
     both = np.concatenate([links, links[:, ::-1]])

@@ -11,15 +11,15 @@ from viewer.cli import run
 
 @pytest.fixture
 def walk(tmp_path) -> list[str]:
-    """Files of the tiny rig and a clip of 1 s: the root moves 4 along x, and the arm rotates."""
+    """Files of the tiny rig and a clip of 1 s that moves the root by 4 and bends the arm."""
     files = write_rig(tmp_path)
     clip = tmp_path / "walk.anim"
-    # Three translations, then x, y, z of the root and of the arm.
+    # The channels are three translations, then x, y, z of the root and of the arm.
     clip.write_text(anim_text(1.0, 9, {0: (0.0, 4.0), 8: (0.0, 1.5)}))
     return [str(path) for path in (*files, clip)]
 
 
-_DRAFT = ("--quality", "draft")  # the quickest
+_DRAFT = ("--quality", "draft")  # the fastest quality
 
 
 @pytest.fixture

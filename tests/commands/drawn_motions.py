@@ -7,7 +7,7 @@ from PIL import Image
 
 
 def anim_text(end: float, channels: int, moving: dict[int, tuple[float, float]]) -> str:
-    """Return a clip from 0 to ``end`` whose channels stay at 0, or go from one value to another."""
+    """Return a clip from 0 to ``end``, with channels of 0 or linear from one value to another."""
     lines = ["animation {", f"range 0 {end}", f"numchannels {channels}"]
     for channel in range(channels):
         low, high = moving.get(channel, (0.0, 0.0))

@@ -1,4 +1,4 @@
-"""--animation in the commands, on a file with two animations that move a cube's node."""
+"""The option --animation, tested on a file with two animations of a node."""
 
 import json
 
@@ -11,7 +11,7 @@ from viewer.cli import run
 
 @pytest.fixture
 def box(tmp_path) -> str:
-    """Path of a triangle that slides along x by 1 in a second, or along y by 2 from 1 to 3 s."""
+    """A file of a triangle that moves along x by 1 in a second, or along y by 2 from 1 to 3 s."""
     file = File(nodes=[{"mesh": 0, "name": "box"}])
     file.mesh()
     for name, times, end in (("Slide", [0.0, 1.0], [1, 0, 0]), ("Rise", [1.0, 3.0], [0, 2, 0])):
@@ -39,12 +39,12 @@ def test_info_lists_animations_and_plays_the_requested_one(capsys, box):
         assert found["clip"]["range"] == [1.0, 3.0]
         assert [one["plays"] for one in found["animations"]] == [False, True]
     assert "clip" not in info(capsys, box, "--animation", "none")
-    # Times are those of the file.
+    # The times are those of the file.
     low, high = info(capsys, box, "--animation", "rise", "--time", "2")["box"]
     np.testing.assert_allclose([low[1], high[1]], [1.0, 2.0], atol=1e-6)
 
 
-def test_an_unknown_animation_ends_with_2(capsys, box, tmp_path):
+def test_unknown_animation_ends_with_exit_code_2(capsys, box, tmp_path):
     out = str(tmp_path / "out.glb")
     for command in (["info"], ["convert", "-o", out], ["diff", box]):
         assert run([*command, box, "--animation", "Slice"]) == 2

@@ -1,4 +1,4 @@
-"""``viewer render --view`` and ``--cameras`` with the images of a capture's cameras."""
+"""``viewer render --view`` and ``--cameras`` with images of the cameras of a capture."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ def drawn(recording, out, *options):
     return np.array(Image.open(out).convert("RGB")).astype(int)
 
 
-def test_image_is_behind_the_scene_without_its_distortion(recording, tmp_path, capsys):
+def test_undistorted_image_is_drawn_behind_the_scene(recording, tmp_path, capsys):
     pixels = drawn(recording, tmp_path / "a.png", "--frame", "0")
     row = pixels[int(CENTER), :, 0]
-    # Dimmed to 60 %; the line is where a camera without distortion sees it.
+    # The image is dimmed to 60 %, and the line is at its position without distortion.
     assert row[2] == 60 and int(np.argmin(row[80:])) + 80 == 90
     error = capsys.readouterr().err
     assert "images/01: 1 of 3 frames have no image: 1\n" in error
@@ -44,7 +44,9 @@ def test_frame_without_image_has_the_background(recording, tmp_path):
     assert pixels[2, 2].tolist() == [255, 0, 0]
 
 
-def test_images_of_another_shape_are_said_and_not_drawn(recording, tmp_path, capsys):
+def test_images_with_a_different_aspect_ratio_are_reported_and_not_drawn(
+    recording, tmp_path, capsys
+):
     for path in (recording / "images" / "01").iterdir():
         Image.new("RGB", (60, 30), (9, 9, 9)).save(path)
     pixels = drawn(recording, tmp_path / "a.png", "--background", "#ff0000", "--frame", "0")
@@ -53,7 +55,7 @@ def test_images_of_another_shape_are_said_and_not_drawn(recording, tmp_path, cap
     assert "its images have 60 x 30 pixels, the calibration 101 x 101: they do not match" in error
 
 
-def test_images_come_from_another_folder(recording, tmp_path, capsys):
+def test_images_are_read_from_the_given_folder(recording, tmp_path, capsys):
     (recording / "images").rename(tmp_path / "elsewhere")
     elsewhere = ("--images", str(tmp_path / "elsewhere"))
     assert drawn(recording, tmp_path / "a.png", *elsewhere, "--frame", "0")[50, 2, 0] == 60
@@ -63,9 +65,10 @@ def test_images_come_from_another_folder(recording, tmp_path, capsys):
     assert capsys.readouterr().err.endswith(expected)
 
 
-def test_frustum_shows_the_image_where_the_camera_looks(recording, tmp_path):
+def test_frustum_shows_the_image_in_the_viewing_direction(recording, tmp_path):
     view = viewer.load(recording).views[0]
-    # At 2 in front of (0, -5, 0): half of 101 pixels at 100 a unit is 1.01, to the left and up.
+    # The frustum ends 2 in front of (0, -5, 0), where half of 101 pixels are 1.01 to the left and
+    # up.
     corners = frustum_corners(view, 2.0)
     np.testing.assert_allclose(corners[0], [-1.01, -3.0, 1.01], atol=1e-12)
     np.testing.assert_allclose(corners[2], [1.01, -3.0, -1.01], atol=1e-12)
@@ -75,10 +78,10 @@ def test_frustum_shows_the_image_where_the_camera_looks(recording, tmp_path):
         run(["render", str(recording), "-o", str(out), "--size", "480x360", *_QUICK, *options]) == 0
     )
     pixels = np.array(Image.open(out).convert("RGB")).astype(int)
-    assert (pixels == 200).all(axis=2).sum() > 20  # its image's grey
+    assert (pixels == 200).all(axis=2).sum() > 20  # the grey of the image
 
 
-def test_damaged_image_is_said_and_not_drawn(recording, tmp_path, capsys):
+def test_damaged_image_is_reported_and_not_drawn(recording, tmp_path, capsys):
     (recording / "images" / "01" / "000000.png").write_bytes(b"\x89PNG\r\n\x1a\n")
     drawn(recording, tmp_path / "a.png", "--frame", "0")
     assert "camera 01: its first image is not readable" in capsys.readouterr().err

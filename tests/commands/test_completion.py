@@ -1,4 +1,4 @@
-"""Shell completion, tried in a real bash."""
+"""Shell completion, tested in a real bash."""
 
 import shutil
 import subprocess
@@ -14,7 +14,7 @@ BASH = shutil.which("bash")
 
 @pytest.fixture(scope="module")
 def script(tmp_path_factory) -> str:
-    """The script that bash sources, in a file."""
+    """The file of the script that bash sources."""
     command = [sys.executable, "-m", "viewer", "completion", "bash"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=120)
     assert (done.returncode, done.stderr) == (0, "")
@@ -24,7 +24,7 @@ def script(tmp_path_factory) -> str:
 
 
 def completed(script: str, *words: str, cwd=None) -> list[str]:
-    """Return what bash offers for the last word."""
+    """Return the completions that bash offers for the last word."""
     listed = " ".join(f'"{word}"' for word in ("viewer", *words))
     code = (
         f'source "{script}"; COMP_WORDS=({listed}); COMP_CWORD={len(words)}; '
@@ -61,7 +61,7 @@ def test_bash_completes_choices_and_files(script, tmp_path):
 
 
 @pytest.mark.parametrize("shell", ["zsh", "tcsh"])
-def test_other_shells_get_a_script_that_names_all_commands(capsys, shell):
+def test_scripts_of_other_shells_list_all_commands(capsys, shell):
     assert run(["completion", shell]) == 0
     out = capsys.readouterr().out
     assert all(command in out for command in COMMANDS)

@@ -1,4 +1,4 @@
-"""--front and the first view: identical in images, images with panels, and the window."""
+"""The option --front and the first view, equal in images, images with panels, and the window."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ SIZE = (64, 48)
 
 @pytest.fixture
 def draw(tmp_path):
-    """A function that draws a figure that faces -z, with options."""
+    """A function that draws a figure facing -z with the given options."""
     skel, out = sided_skel(tmp_path / "turned.skel", "-z"), tmp_path / "out.png"
 
     def draw_with(*options):
         words = ["render", str(skel), "-o", str(out), "--force", "--size", "64x48", *options]
-        words += ["--quality", "normal"]  # as the library draws without options
+        words += ["--quality", "normal"]  # equal to the library without options
         assert run(words) == 0
         return np.array(Image.open(out).convert("RGBA"))
 
@@ -54,12 +54,12 @@ def test_front_is_overridden(draw, front, azimuth):
     assert (draw(f"--front={front}") == _seen_from(draw.scene, azimuth)).all()
 
 
-def test_azimuth_is_measured_from_the_axes_whatever_the_front(draw):
+def test_azimuth_is_measured_from_the_axes_for_any_front(draw):
     for front in ("+z", "-x"):
         assert (draw(f"--front={front}", "--azimuth", "20") == _seen_from(draw.scene, 20)).all()
 
 
-def test_the_up_axis_cannot_be_the_front(tmp_path, capsys):
+def test_up_axis_is_refused_as_the_front(tmp_path, capsys):
     skel, out = sided_skel(tmp_path / "a.skel", "+z"), tmp_path / "out.png"
     assert run(["render", str(skel), "-o", str(out), "--front=+y"]) == 2
     problem = capsys.readouterr().err
@@ -69,8 +69,8 @@ def test_the_up_axis_cannot_be_the_front(tmp_path, capsys):
     assert not out.exists()
 
 
-def test_window_gets_the_same_first_view(tmp_path):
-    """The first view passed to the window, and the reference of its named views."""
+def test_window_has_the_same_first_view(tmp_path):
+    """The first view and the front of the named views are passed to the window."""
     scene = viewer.load(sided_skel(tmp_path / "turned.skel", "-z"))
     parser = argparse.ArgumentParser()
     add_camera_arguments(parser)
@@ -83,8 +83,8 @@ def test_window_gets_the_same_first_view(tmp_path):
     assert (plain.front, plain.azimuth, plain.inclination) == (180.0, -145.0, 15.0)
 
 
-def test_image_with_panels_fits_the_whole_motion_between_them(tmp_path):
-    """In the image with panels the figure is not clipped, and no smaller than necessary."""
+def test_whole_motion_is_visible_between_the_panels_of_an_image(tmp_path):
+    """In the image with panels, the figure is not clipped and not smaller than necessary."""
     from app.captured import people
     from app.tiny import write_rig
 

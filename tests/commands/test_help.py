@@ -1,4 +1,4 @@
-"""Help: every option is explained, in groups that follow the order of work."""
+"""Help texts, with all options explained in groups that follow the order of work."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_option_groups_follow_the_order_of_work(command, titles):
 
 
 @pytest.mark.parametrize("command", ["render", "convert"])
-def test_usage_is_one_line(command, capsys):
+def test_usage_is_printed_in_one_line(command, capsys):
     with pytest.raises(SystemExit):
         run([command, "--help"])
     lines = capsys.readouterr().out.splitlines()

@@ -1,4 +1,4 @@
-"""``viewer help``: topics, pages as text and laid out, a command's options, unknown topics."""
+"""``viewer help``: topics, pages as text or formatted, options of a command, and unknown topics."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from viewer.manual import PAGES, page_text
 
 
 class Terminal(io.StringIO):
-    """Standard output that claims to be a terminal."""
+    """Standard output that appears to be a terminal."""
 
     def isatty(self) -> bool:
         return True
 
 
-def test_without_a_topic_it_lists_all_topics_and_commands(
+def test_help_without_a_topic_lists_all_topics_and_commands(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["help"]) == 0
@@ -28,12 +28,12 @@ def test_without_a_topic_it_lists_all_topics_and_commands(
     assert ", ".join(COMMANDS) in printed
 
 
-def test_pages_are_printed_verbatim_into_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
+def test_pages_are_written_verbatim_to_a_pipe(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["help", "keys"]) == 0
     assert capsys.readouterr().out == page_text("keys")
 
 
-def test_tables_are_laid_out_at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_tables_are_formatted_in_a_terminal(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr(sys, "stdout", terminal)
     monkeypatch.setenv("TERM", "xterm-256color")
@@ -41,7 +41,7 @@ def test_tables_are_laid_out_at_a_terminal(monkeypatch: pytest.MonkeyPatch) -> N
     assert run(["help", "keys"]) == 0
     printed = terminal.getvalue()
     assert "\x1b[" in printed, "no style"
-    assert "| R |" not in printed and "---" not in printed, "Markdown is left"
+    assert "| R |" not in printed and "---" not in printed, "Markdown remains"
     assert "reset the pose to the file's pose" in printed
 
 
@@ -50,7 +50,7 @@ def test_help_for_a_command_lists_its_options(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out.startswith("usage: viewer diff")
 
 
-def test_an_unknown_topic_suggests_the_nearest_in_one_line(
+def test_unknown_topic_suggests_the_nearest_in_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     assert run(["help", "captres"]) == 2

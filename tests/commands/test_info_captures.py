@@ -1,4 +1,4 @@
-"""``viewer info`` of captures and morphs: positions, up axis and missing frames."""
+"""``viewer info`` of captures and morphs: positions, up axis, and missing frames."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_up_axis_is_that_of_the_scene(info, tmp_path):
     assert found["actors"][0]["up"] == "z"
 
 
-def test_boxes_cover_only_present_people(info, tmp_path):
+def test_bounding_boxes_contain_only_present_people(info, tmp_path):
     frames = {3: [standing(0, 0.0)], 4: [standing(0, 0.0), standing(4, 2.0)]}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {**frames, 5: [standing(4, 2.0)]})
     lines, found, _ = info(folder)
@@ -57,10 +57,10 @@ def test_several_gaps_are_listed(info, tmp_path):
     assert lines[3] == "    4 frames are missing: 1, 3 to 4, 6"
 
 
-def test_unseen_keypoints_have_no_box(info, tmp_path):
+def test_undetected_keypoints_have_no_bounding_box(info, tmp_path):
     unseen = {"id": 0, "keypoints3d": [[0.0] * 4] * 25}
     folder = write_frames(tmp_path / "kp" / "keypoints3d", {0: [unseen], 1: [unseen]})
-    lines, found, err = info(folder)
+    lines, found, err = info(folder, "--fps", "30")
     assert lines[1] == "  box        none: nothing is visible, z up"
     assert found["actors"][0]["present"] and found["actors"][0]["box"] is None
     assert err == "note: kp: no keypoint of person 0 is ever visible: every confidence is 0\n"

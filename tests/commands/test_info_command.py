@@ -1,4 +1,4 @@
-"""``viewer info``: hand-counted values, as text and as JSON."""
+"""``viewer info``: hand-counted values as text and as JSON."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_text_output_matches_json(tmp_path, capsys):
         assert words in text
 
 
-def test_size_has_its_unit_if_the_file_has_one(tmp_path, capsys):
+def test_size_has_a_unit_if_the_file_states_one(tmp_path, capsys):
     rig = write_rig(tmp_path)
     assert run(["convert", *map(str, rig), "-o", str(tmp_path / "a.glb")]) == 0
     for path, unit in ((tmp_path / "a.glb", "m"), (rig[0], None)):
@@ -70,12 +70,12 @@ def test_size_has_its_unit_if_the_file_has_one(tmp_path, capsys):
         assert json.loads(capsys.readouterr().out)["actors"][0]["unit"] == unit
 
 
-def test_parts_alone_are_described(describe, tmp_path):
+def test_skeleton_and_skin_are_described_separately(describe, tmp_path):
     skel, skin = write_rig(tmp_path)
     assert set(describe(skel)["actors"][0]) >= {"skeleton"}
     assert "mesh" not in describe(skel)["actors"][0]
     assert "skeleton" not in describe(skin)["actors"][0]
-    # A lone skeleton reaches from the floor of its boxes to their top.
+    # The height of a skeleton without a skin is that of its boxes.
     assert describe(skel)["actors"][0]["size"] > 1.8
 
 
@@ -100,10 +100,10 @@ def test_names_are_printed_on_one_line(tmp_path, capsys):
     assert capsys.readouterr().out.splitlines()[0] == "two\\nlines"
 
 
-def test_skel_files_are_counted(describe, shared):
+def test_joints_and_dofs_of_skel_files_are_counted(describe, shared):
     (actor,) = describe(shared / "test.skel")["actors"]
     skeleton = actor["skeleton"]
-    # Six balljoints: 18 rotations and three translations of the root; knee_r has three limits.
+    # Six balljoints have 18 rotations and three translations of the root; knee_r has three limits.
     assert (skeleton["joints"], skeleton["dofs"]) == (6, 21)
     assert (skeleton["limited_dofs"], skeleton["locked_dofs"]) == (3, 2)
     values = {dof["name"]: dof["value"] for dof in skeleton["dof_table"]}
@@ -114,9 +114,11 @@ def test_skel_files_are_counted(describe, shared):
 @pytest.mark.parametrize(
     ("name", "joints", "vertices", "triangles"), [("tube", 2, 240, 456), ("wasp", 23, 694, 1236)]
 )
-def test_skel_and_skin_pairs_are_counted(describe, shared, name, joints, vertices, triangles):
+def test_vertices_and_bindings_of_skin_files_are_counted(
+    describe, shared, name, joints, vertices, triangles
+):
     (actor,) = describe(shared / f"{name}.skel", shared / f"{name}.skin")["actors"]
-    # The counts that the files declare.
+    # These are the counts declared in the files.
     assert actor["skeleton"]["joints"] == joints == actor["skin"]["bindings"]
     assert (actor["mesh"]["vertices"], actor["mesh"]["triangles"]) == (vertices, triangles)
     assert sum(actor["skin"]["influence_histogram"].values()) == vertices

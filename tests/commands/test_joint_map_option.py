@@ -24,7 +24,7 @@ def convert(walk, out, *options):
 
 
 @pytest.mark.slow
-def test_a_saved_map_is_edited_and_used_again(walk, tmp_path, capsys):
+def test_saved_map_can_be_edited_and_used_again(walk, tmp_path, capsys):
     saved = tmp_path / "map.txt"
     assert convert(walk, "own.bvh", "--save-joint-map", saved) == 0
     assert convert(walk, "same.bvh", "--joint-map", saved) == 0
@@ -39,7 +39,7 @@ def test_a_saved_map_is_edited_and_used_again(walk, tmp_path, capsys):
     assert "neck by head" in capsys.readouterr().err
 
 
-def test_errors_in_a_map_take_one_line(walk, tmp_path, capsys):
+def test_errors_in_a_map_are_reported_in_one_line(walk, tmp_path, capsys):
     bad = tmp_path / "bad.txt"
     bad.write_text("# test\nleft_kne = left_knee\n")
     assert convert(walk, "out.bvh", "--joint-map", bad) == 2

@@ -1,4 +1,4 @@
-"""--xray, --joint-names, --joint-axes, --bones: rendering and messages."""
+"""The options --xray, --joint-names, --joint-axes and --bones: rendering and messages."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def render(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("option", ["--xray", "--joint-names", "--joint-axes"])
-def test_option_changes_the_image(render, rig, option):
+def test_each_option_changes_the_image(render, rig, option):
     plain, _ = render(*rig)
     marked, said = render(*rig, option)
     assert (plain != marked).any() and said == ""
@@ -49,7 +49,7 @@ def test_omitted_names_are_reported(render, tmp_path):
     path = tmp_path / "heap.skel"
     path.write_text("balljoint a { " + "balljoint b { } " * 4 + "}")
     _, said = render(str(path), "--joint-names")
-    # Two names have room beside the place where all five joints are, two above and below it.
+    # All five joints are at one position; two names fit to its sides, and two above and below.
     assert said.endswith("warning: 1 of 5 joint names omitted: they would cover another\n")
 
 

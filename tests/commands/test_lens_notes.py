@@ -1,4 +1,4 @@
-"""``viewer render --view`` with lens distortion: ignored distortion is reported with its size."""
+"""``viewer render --view`` with lens distortion that is ignored and reported with its size."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from viewer.cli import run
 
 pytestmark = pytest.mark.slow
 
-# Cameras without a size: the middle of the picture is its principal point, so 1000 x 1000 pixels.
+# Cameras without a size have the principal point in the middle, so the picture is 1000 x 1000
+# pixels.
 _NAMES = "".join(
     f"""{key}_{name}: !!opencv-matrix
   rows: {rows}
@@ -65,8 +66,8 @@ def draw(recording, out, *options):
     )
 
 
-# The corner (0, 0) is seen at x = y = -1/2, r^2 = 1/2; k1 = 0.1 moves it by k1 r^2 of its way from
-# the middle: 0.1 * 0.5 * 500 sqrt(2) = 35.36 pixels.
+# The corner (0, 0) is at x = y = -1/2, so r^2 = 1/2; k1 = 0.1 moves it by k1 r^2 of its distance
+# from the middle, 0.1 * 0.5 * 500 sqrt(2) = 35.36 pixels.
 NOTE = "warning: camera 02: its lens distortion of up to 35.4 pixels is not drawn\n"
 
 

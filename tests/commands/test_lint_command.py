@@ -23,7 +23,7 @@ def rig(tmp_path: Path) -> list[str]:
     return [str(tmp_path / "a.skel"), str(tmp_path / "a.skin")]
 
 
-def test_a_finding_is_a_line_with_location_and_hint(rig, capsys) -> None:
+def test_finding_is_printed_as_a_line_with_location_and_hint(rig, capsys) -> None:
     assert run(["lint", *rig]) == 0
     lines = capsys.readouterr().out.splitlines()
     at = next(index for index, line in enumerate(lines) if " W001: " in line)
@@ -32,7 +32,7 @@ def test_a_finding_is_a_line_with_location_and_hint(rig, capsys) -> None:
         "an error of 0.25)"
     )
     assert lines[at + 1] == (
-        "    weights do not sum to 1: normalise them (--normalize shows the effect)"
+        "    weights do not sum to 1; remedy: normalise them (--normalize shows the effect)"
     )
     assert lines[-1].endswith("in 2 files")
 
@@ -40,11 +40,11 @@ def test_a_finding_is_a_line_with_location_and_hint(rig, capsys) -> None:
 @pytest.mark.parametrize(
     ("fail_on", "code"), [("error", 0), ("warning", 1), ("note", 1), ("never", 0)]
 )
-def test_fail_on_sets_the_exit_code(rig, capsys, fail_on: str, code: int) -> None:
+def test_option_fail_on_sets_the_exit_code(rig, capsys, fail_on: str, code: int) -> None:
     assert run(["lint", *rig, "--fail-on", fail_on]) == code
 
 
-def test_errors_fail_by_default_and_come_first(rig, tmp_path: Path, capsys) -> None:
+def test_errors_fail_by_default_and_are_listed_first(rig, tmp_path: Path, capsys) -> None:
     missing = str(tmp_path / "none.skel")
     assert run(["lint", *rig, missing]) == 1
     out = capsys.readouterr().out
@@ -70,7 +70,7 @@ def json_of(arguments: list[str], capsys) -> dict:
     return json.loads(capsys.readouterr().out)
 
 
-def test_json_holds_every_location(rig, capsys) -> None:
+def test_json_contains_every_location(rig, capsys) -> None:
     found = json_of(["lint", *rig], capsys)
     (weights,) = [f for f in found["findings"] if f["code"] == "W001"]
     assert (weights["file"], weights["line"], weights["actor"]) == (rig[1], 13, 0)
@@ -86,14 +86,14 @@ def test_codes_are_listed(capsys) -> None:
     assert lines[0] == "F001  error    unreadable file: check its path and permissions"
 
 
-def test_files_are_needed(capsys) -> None:
+def test_missing_files_argument_is_refused(capsys) -> None:
     assert run(["lint", "--fail-on", "never"]) == 2
     said = capsys.readouterr()
     assert "FILES" in said.err and said.err.count("\n") == 1 and not said.out
     assert run(["lint", "--body", "--fail-on", "never"]) == 0
 
 
-def test_the_bundled_figure_has_no_warnings(capsys) -> None:
+def test_bundled_figure_has_no_warnings(capsys) -> None:
     assert run(["lint", *map(str, bundled_files()), "--fail-on", "warning"]) == 0
     assert capsys.readouterr().out.endswith("0 errors, 0 warnings, 3 notes in 2 files\n")
 
@@ -102,14 +102,14 @@ def test_valid_rig_and_body_have_no_findings(tmp_path: Path, capsys) -> None:
     assert run(["lint", *map(str, write_rig(tmp_path)), "--body"]) == 0
 
 
-def test_the_largest_speed_is_an_option(shared: Path, capsys) -> None:
+def test_largest_speed_can_be_set(shared: Path, capsys) -> None:
     files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
     assert run(["lint", *files, "--fail-on", "warning"]) == 0
     assert run(["lint", *files, "--fail-on", "warning", "--max-speed", "0.01"]) == 1
     assert " C003: " in capsys.readouterr().out
 
 
-def test_a_size_limit_is_a_finding(rig, capsys) -> None:
+def test_exceeded_size_limit_is_a_finding(rig, capsys) -> None:
     assert run(["lint", *rig, "--max-size", "10"]) == 1
     assert "expected at most 10 bytes" in capsys.readouterr().out
     assert run(["lint", *rig, "--max-size", "ten"]) == 2
@@ -123,8 +123,8 @@ def test_people_in_one_file_are_distinguished(shared_data: Path, capsys) -> None
     assert lines == [f"{points}: note C012: easymocap body25 {person}: {what}" for person in (0, 1)]
 
 
-def test_the_ground_is_an_option(tmp_path: Path, capsys) -> None:
-    """A body 2 m above it is not below a ground, at rest on it, or below one at 2.5 m."""
+def test_ground_height_can_be_set(tmp_path: Path, capsys) -> None:
+    """A body at 2 m is not below the default ground, but below a ground at 2.5 m."""
     motion = tmp_path / "still.npz"
     rest = np.tile([0.0, 2.0, 0.0], (20, 1))
     np.savez(motion, poses=np.zeros((20, 72)), trans=rest, mocap_framerate=30.0, betas=np.zeros(10))
@@ -152,10 +152,10 @@ def test_keyed_frames_are_counted_by_fps(rig, tmp_path: Path, capsys) -> None:
     assert "1 of 49 frames: root moves" in out and "at frame 24, 1.014 s" in out
 
 
-def test_hints_suit_findings_without_a_line(tmp_path: Path, capsys) -> None:
+def test_hints_differ_for_findings_without_a_line(tmp_path: Path, capsys) -> None:
     (tmp_path / "empty.skel").write_text("")
     (tmp_path / "bad.skel").write_text("balljoint a { offset 1 }")
     run(["lint", str(tmp_path / "empty.skel"), str(tmp_path / "bad.skel")])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[1] == "    malformed file: export it again, or open another file"
-    assert lines[3] == "    malformed file: fix the line or export the file again"
+    assert lines[1] == "    malformed file; remedy: export it again, or open another file"
+    assert lines[3] == "    malformed file; remedy: fix the line or export the file again"

@@ -1,4 +1,4 @@
-"""``viewer info`` of body models: hand-calculated values, as text and as JSON."""
+"""``viewer info`` of body models: hand-calculated values as text and as JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from formats.synthetic_smpl import model
 from viewer.cli import run
 
 HALF_TURN, QUARTER_TURN = math.pi, math.pi / 2
-ACROSS = math.sqrt(5)  # of the box's corner (1, 2, 3) from the z axis
+ACROSS = math.sqrt(5)  # distance of the box's corner (1, 2, 3) from the z axis
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def describe(capsys):
 
 @pytest.fixture
 def lines(capsys):
-    """Return the lines of ``info``, heading and text."""
+    """Return the lines of ``info`` as headings and texts."""
 
     def info(*arguments):
         assert run(["info", *arguments]) == 0
@@ -52,20 +52,20 @@ def lines(capsys):
 
 
 def about_z(joint, angle):
-    """Return the option that rotates a joint of the box, below the root, about z."""
+    """Return the option that rotates a joint of the box below the root about z."""
     return ["--pose", pose_190(6, **{f"n{3 + 3 * joint + 2}": angle})]
 
 
 # The rest body
 
 
-def test_box_is_measured(describe, lines, box):
-    # 1 x 2 x 3 m with z up: 6 cubic metres, of 985 kg each.
+def test_box_has_its_height_volume_and_weight(describe, lines, box):
+    # 1 x 2 x 3 m with z up are 6 cubic metres of 985 kg each.
     assert describe(box)["rest"] == pytest.approx({"height": 3, "volume": 6, "mass": 5910})
     assert "rest       3.000 m high, 6000.00 litres, 5910.0 kg at 985 kg/m3" in lines(box)
 
 
-def test_inside_out_box_is_measured_the_same(describe, tmp_path):
+def test_inside_out_box_has_the_same_measurements(describe, tmp_path):
     rows = (write_box(tmp_path / "good") / "faces_vert.txt").read_text().splitlines()
     flipped = "\n".join(" ".join(row.split()[::-1]) for row in rows)
     rest = describe(str(write_box(tmp_path / "box", faces_vert=flipped)))["rest"]
@@ -73,7 +73,7 @@ def test_inside_out_box_is_measured_the_same(describe, tmp_path):
 
 
 def test_pose_does_not_change_the_rest_body(describe, box):
-    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # translated, rotated, twice as large
+    pose = pose_190(6, n0=5.0, n3=1.0, n21=2.0)  # translated, rotated, and twice as large
     assert describe(box, "--pose", pose)["rest"]["height"] == pytest.approx(3)
 
 
@@ -129,7 +129,7 @@ def test_parts_of_an_animal_are_counted(describe, lines, box):
     assert found["reduced"] == {"vertices": 4, "triangles": 4}
     assert (
         found["asymmetry"] == 2
-    )  # y is 0 and 2, so mirror counterparts miss the plane y = 0 by 1 each
+    )  # y is 0 and 2, so the mirror counterparts are off the plane y = 0 by 1 each
     told = lines(box)
     assert "parts      NOT_BODY 0, FEET 4, BACK 4" in told
     assert "reduced    4 vertices, 4 triangles" in told
@@ -151,9 +151,9 @@ def test_plain_rig_has_no_model_facts(describe, tmp_path):
 # Effects of skinning options
 
 
-def test_limit_of_six_influences_is_measured(describe, lines, box):
-    # Vertex 7 follows joint 4 by 0.15; with four influences joints 0 to 3 are left of it.
-    # Whole, its distance from the axis is 1 - 2 * 0.15 of the distance without the limit.
+def test_effect_of_an_influence_limit_is_measured(describe, lines, box):
+    # Vertex 7 follows joint 4 by 0.15; with four influences only joints 0 to 3 remain. With all
+    # influences, its distance from the axis is 1 - 2 * 0.15 of that with the limit.
     options = about_z(4, HALF_TURN)
     effects = describe(box, *options)["effects"]
     assert effects["pruned to 4 influences"] == pytest.approx(0.3 * ACROSS)
@@ -161,7 +161,7 @@ def test_limit_of_six_influences_is_measured(describe, lines, box):
     assert "effect     pruned to 4 influences: up to 671 mm in this pose" in lines(box, *options)
 
 
-def test_limit_of_ten_influences_is_measured_twice(describe, tmp_path):
+def test_ten_influences_are_measured_with_two_limits(describe, tmp_path):
     weights = [f"0 {vertex} 1" for vertex in range(7)] + [f"{joint} 7 0.1" for joint in range(10)]
     box = write_box(
         tmp_path / "box",
@@ -179,13 +179,13 @@ def test_limit_on_a_figure_at_rest_has_no_effect(describe, lines, box):
     assert not [line for line in lines(box) if line.startswith("effect")]
 
 
-def test_normalising_is_measured_in_millimetres(describe, lines, tmp_path):
+def test_effect_of_normalising_is_measured_in_millimetres(describe, lines, tmp_path):
     rows = [f"0 {vertex} 1" for vertex in range(6)]
     weights = "\n".join([*rows, "0 6 1.002", "0 7 0.6", "1 7 0.395"])
     box = str(write_box(tmp_path / "box", skinning_weights=weights))
-    # Vertex 7 is sqrt(14) m from the origin, its weights add up to 0.995; vertex 6 moves less.
+    # Vertex 7 is sqrt(14) m from the origin, and its weights sum to 0.995; vertex 6 moves less.
     moved = 0.005 * math.sqrt(14)
-    # Dual quaternions have a length of 1 for any weights: they are normalised too.
+    # Dual quaternions are normalised for any weights.
     expected = {"normalised weights": moved, "DQS against LBS": moved}
     assert describe(box)["effects"] == pytest.approx(expected)
     told = lines(box)
@@ -194,15 +194,16 @@ def test_normalising_is_measured_in_millimetres(describe, lines, tmp_path):
     assert "weights    raw; their sums are 0.995 to 1.002" in told
 
 
-def test_dual_quaternions_are_measured(describe, tmp_path):
+def test_effect_of_dual_quaternions_is_measured(describe, tmp_path):
     weights = "\n".join([*(f"0 {vertex} 1" for vertex in range(7)), "0 7 0.5", "1 7 0.5"])
     box = str(write_box(tmp_path / "box", skinning_weights=weights))
     effects = describe(box, *about_z(1, QUARTER_TURN))["effects"]
-    # Half of 90 degrees: LBS reduces the distance of vertex 7 to cos 45 of it, DQS keeps it.
+    # At half of 90 degrees, LBS reduces the distance of vertex 7 by a factor of cos 45, and DQS
+    # keeps it.
     assert effects == pytest.approx({"DQS against LBS": (1 - math.sqrt(0.5)) * ACROSS})
 
 
-def test_correctives_are_measured(describe, body):
+def test_effect_of_correctives_is_measured(describe, body):
     path, arrays = body
     pose = 0.3 * np.sin(np.arange(72.0))
     whole = smpl_forward(arrays, (), pose)[0]
@@ -213,12 +214,12 @@ def test_correctives_are_measured(describe, body):
 
 
 def test_scaled_figure_shows_scaled_effects(describe, box):
-    pose = pose_190(6, n17=HALF_TURN, n21=2.0)  # joint 4 about z; the whole figure doubled
+    pose = pose_190(6, n17=HALF_TURN, n21=2.0)  # joint 4 about z, and twice the figure's size
     effects = describe(box, "--pose", pose)["effects"]
     assert effects["pruned to 4 influences"] == pytest.approx(2 * 0.3 * ACROSS)
 
 
-def test_bundled_body_measures_as_an_adult(describe):
+def test_bundled_body_has_the_measurements_of_an_adult(describe):
     found = describe("--body")
     assert 1.5 < found["rest"]["height"] < 2.0 and 45 < found["rest"]["mass"] < 100
     assert len(found["shapes"]) == 10 and found["facts"]["correctives"] == "207 columns"
@@ -226,7 +227,7 @@ def test_bundled_body_measures_as_an_adult(describe):
 
 
 def test_rounding_is_not_an_effect(describe, tmp_path):
-    # The box rotates as one piece, by an angle whose sine is not a round number.
+    # The box rotates rigidly by an angle with a sine that is not a round number.
     box = str(write_box(tmp_path / "box", skinning_weights="\n".join(f"0 {v} 1" for v in range(8))))
     for angle in (0.1, 0.7, 2.0, 3.0):
         assert describe(box, "--pose", pose_190(6, n3=angle, n4=0.3))["effects"] == {}

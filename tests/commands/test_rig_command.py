@@ -1,4 +1,4 @@
-"""``viewer rig``: from a bare mesh to an animatable figure."""
+"""``viewer rig``, which turns a bare mesh into an animatable figure."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("quick_fits")]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A fox in centimetres, rotated by 90 degrees about y, and the fox's pose."""
+    """A fox in centimetres, rotated by 90 degrees about y, and the pose of the fox."""
     folder = tmp_path_factory.mktemp("rig")
     fox = viewer.load().actors[0]
     positions = 100.0 * viewer.deform(fox.figure, fox.pose)[0][:, [2, 1, 0]] * [1, 1, -1]
@@ -98,22 +98,23 @@ def test_skel_rig_opens_again_and_its_pose_matches_the_target(folder, tmp_path, 
     assert warning.endswith("texcoords without a texture: drawn untextured")
     posed = viewer.deform(scene.actors[0].figure, scene.actors[0].pose)[0]
     target = viewer.load(folder / "scan.obj").actors[0].figure.mesh.positions
-    # The fox's vertices are split along texture seams already: the .skin keeps their numbers.
+    # The vertices of the fox are already split along texture seams, so the .skin keeps their
+    # numbers.
     assert_allclose(posed, target, atol=1e-9)
     rest = viewer.load(tmp_path / "scan.obj").actors[0].figure.mesh
     assert rest.uvs is not None and rest.n_vertices == len(target)
     assert capsys.readouterr().out.splitlines()[-1].endswith("the target's pose")
 
 
-def test_template_is_posed_by_the_usual_options(folder, tmp_path, capsys):
-    # In its rest pose the template fits less well than in the pose of the target.
+def test_template_can_be_posed_by_the_pose_options(folder, tmp_path, capsys):
+    # The alignment is worse in the rest pose of the template than in the pose of the target.
     options = ["--pose", ",".join(["0"] * 114), "--method", "robust", "--no-fit"]
     out = tmp_path / "scan.npz"
     target = str(folder / "scan.obj")
     assert run(["rig", target, "--from", "fox", *options, "-o", str(out)]) == 0
     error = capsys.readouterr().out.splitlines()[1]
     assert error.startswith("alignment error: ")
-    assert float(error.split()[2]) > 0.05  # per cent; it is 0 in the right pose
+    assert float(error.split()[2]) > 0.05  # per cent; 0 in the pose of the target
 
 
 def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, monkeypatch):
@@ -184,7 +185,7 @@ def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
 
 
-def test_rigged_target_is_used_as_posed(tmp_path, monkeypatch, capsys):
+def test_rigged_target_is_used_in_its_pose(tmp_path, monkeypatch, capsys):
     seen = {}
 
     def instead(figure, pose, target, settings, report, name):
@@ -269,14 +270,14 @@ def test_invalid_combinations_are_refused_in_one_line(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_an_author_is_required_before_the_transfer(folder, tmp_path, monkeypatch, capsys):
+def test_author_is_required_before_the_transfer(folder, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(rig, "transfer", lambda *_, **__: pytest.fail("transferred"))
     target = str(next(folder.glob("*.obj")))
     assert run(["rig", target, "--from", "fox", "-o", str(tmp_path / "a.vrm")]) == 2
     assert "add --vrm-author NAME and --vrm-licence" in capsys.readouterr().err
 
 
-def test_the_target_is_never_replaced(folder, capsys):
+def test_target_is_never_replaced(folder, capsys):
     target = folder / "scan.obj"
     before = target.read_bytes()
     assert run(["rig", str(target), "-o", str(folder / "scan.skel"), "--force"]) == 5
@@ -284,7 +285,7 @@ def test_the_target_is_never_replaced(folder, capsys):
     assert target.read_bytes() == before
 
 
-def test_existing_files_are_kept_without_force(folder, tmp_path, capsys):
+def test_existing_files_are_not_replaced_without_force(folder, tmp_path, capsys):
     (tmp_path / "x.json").write_text("mine")
     assert run(["rig", str(folder / "scan.obj"), "-o", str(tmp_path / "x.skel")]) == 5
     assert capsys.readouterr().err == (
@@ -335,7 +336,7 @@ def test_landmarks_are_points_or_posed_joints(tmp_path):
             'expected a joint of fox, found "hed"; did you mean head?',
         ),
         (
-            "head 1 2 1_0\n",  # Python would parse it as 10
+            "head 1 2 1_0\n",  # Python would read it as 10
             1,
             'expected six numbers, or a joint and three numbers, found "head 1 2 1_0"',
         ),
@@ -366,7 +367,7 @@ def test_invalid_landmarks_are_reported_with_their_line(tmp_path, text, line, me
     assert str(problem.value) == f"{where}:{line}: {message}"
 
 
-def test_view_shows_the_result_over_the_hidden_target(folder, monkeypatch, capsys):
+def test_result_is_shown_in_the_place_of_the_hidden_target(folder, monkeypatch, capsys):
     shown = []
     import viewer.app.window
 

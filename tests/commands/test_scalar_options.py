@@ -1,4 +1,4 @@
-"""Scalar quantities on the command line: rendering, messages and refusals."""
+"""Scalar quantities on the command line: rendering, messages, and refusals."""
 
 from __future__ import annotations
 
@@ -63,8 +63,8 @@ def test_summary_line_describes_the_values(render, body):
 
 
 @pytest.mark.parametrize("arguments", [["--scalar", "weight"], ["--shading", "scalar"]])
-def test_view_without_a_joint_shows_the_one_with_the_most_influence(render, rig, arguments):
-    # The lowest and the highest square have one joint each, the one between has both equally.
+def test_view_without_a_joint_shows_the_joint_with_the_most_influence(render, rig, arguments):
+    # The lowest and the highest square follow one joint each, the middle square both equally.
     skin = rig[1].read_text().replace("2 0 0.5 1 0.5", "2 0 0.25 1 0.75")
     rig[1].write_text(skin)
     files = [str(path) for path in rig]
@@ -73,7 +73,7 @@ def test_view_without_a_joint_shows_the_one_with_the_most_influence(render, rig,
     np.testing.assert_array_equal(pixels, render(*files, "--scalar", "weight:arm")[0])
 
 
-def test_joint_by_index_is_the_joint_by_name(render, body):
+def test_joint_by_index_equals_joint_by_name(render, body):
     by_name, by_index, by_number = (
         render(body, "--scalar", f"weight:{joint}")[0] for joint in ("left_knee", "#4", "4")
     )
@@ -162,7 +162,7 @@ def test_figure_without_the_requested_data_is_drawn_with_a_note(render, name, no
     assert said.splitlines()[-1] == f"warning: {note}"
 
 
-def test_skeleton_alone_has_no_weights(render, tmp_path):
+def test_skeleton_without_a_skin_has_no_weights(render, tmp_path):
     from viewer.resources import resource
 
     skel = str(resource("assets", "samples", "fox.skel"))
@@ -183,7 +183,7 @@ def test_scalar_values_of_a_sequence_are_drawn_with_a_legend(body, tmp_path):
     half = changed.shape[1] // 2
     for cell in (changed[:, :half], changed[:, half:]):
         rows, columns = np.nonzero(cell)
-        # The second half begins with a part of the gutter.
+        # The second half starts with part of the gutter.
         assert rows.min() <= 3 and columns.min() <= 6 and columns.max() < 0.7 * half
 
 

@@ -19,14 +19,14 @@ def parsed(*words):
     return parser.parse_args(words).source_rest
 
 
-def test_source_rest_is_a_frame_or_a_word():
+def test_source_rest_is_a_frame_or_a_keyword():
     assert parsed() == parsed("--source-rest", "auto") == "auto"
     assert parsed("--source-rest", "zero") == "zero"
     assert parsed("--source-rest", "12") == 12
 
 
 @pytest.mark.parametrize("word", ["t-pose", "1.5", "", "auto "])
-def test_other_values_of_source_rest_are_refused(word):
+def test_invalid_values_of_source_rest_are_refused(word):
     with pytest.raises(argparse.ArgumentError, match="expected a frame number, zero or auto"):
         parsed("--source-rest", word)
 
@@ -42,19 +42,19 @@ def rest_notes(scene):
     return [key for key, _ in told(scene.diagnostics) if ".rest-" in key]
 
 
-def test_a_standing_zero_pose_is_kept_without_a_message(walk):
+def test_standing_zero_pose_is_used_without_a_message(walk):
     assert not rest_notes(load(walk, bundled_body()))
     assert not rest_notes(load(walk, motion=MotionSettings(model=bundled_body())))
 
 
-def test_the_chosen_frame_is_printed(walk):
+def test_chosen_frame_is_printed(walk):
     asked = MotionSettings(source_rest=1)
     assert rest_notes(load(walk, bundled_body(), motion=asked)) == ["F007.rest-asked"]
     asked = MotionSettings(source_rest=1, model=bundled_body())
     assert rest_notes(load(walk, motion=asked)) == ["F007.rest-asked"]
 
 
-def test_a_frame_beyond_the_motion_is_an_error_of_its_file(walk):
+def test_frame_beyond_the_motion_is_refused_with_its_file(walk):
     with pytest.raises(RigError) as problem:
         load(walk, bundled_body(), motion=MotionSettings(source_rest=-1))
     assert problem.value.diagnostic.path == walk

@@ -1,4 +1,4 @@
-"""Options of surfaces: the shading that is drawn, and refused values."""
+"""Options of surfaces: the drawn shading, and refused values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.cli import run
 @pytest.mark.parametrize(
     "options", [["--roughness", "1.5"], ["--metallic", "-1"], ["--matcap", "wood"]]
 )
-def test_impossible_surfaces_are_refused(tmp_path, capsys, options):
+def test_invalid_surface_options_are_refused(tmp_path, capsys, options):
     try:
         code = run(["render", "-o", str(tmp_path / "out.png"), *options])
     except SystemExit as stopped:  # argparse
@@ -23,8 +23,8 @@ def test_impossible_surfaces_are_refused(tmp_path, capsys, options):
 
 
 @pytest.mark.slow
-def test_files_with_metallic_materials_are_shaded_so(tmp_path):
-    """Pr in the .mtl is enough; without it, and with --shading phong, it is Blinn-Phong."""
+def test_files_with_metallic_materials_use_metallic_roughness_shading(tmp_path):
+    """Pr in the .mtl is sufficient; without it, or with --shading phong, shading is Blinn-Phong."""
     shape = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl a\nf 1 2 3\n"
     (tmp_path / "a.obj").write_text(shape)
 

@@ -1,4 +1,4 @@
-"""No output replaces an existing file without --force, and never an input."""
+"""Outputs of all commands, which replace existing files only with --force, and never inputs."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def folder(tmp_path):
 
 @pytest.fixture
 def refuse(capsys):
-    """Run a command that must refuse its output with one line, before anything is written."""
+    """Run a command that must refuse its output in one line before any file is written."""
 
     def run_it(command: list[str], *words: str) -> None:
         capsys.readouterr()
@@ -64,7 +64,7 @@ def written_by(command: list[str], folder: Path) -> list[str]:
 
 
 def check_command(command: list[str], inputs: Inputs, folder: Path, refuse) -> None:
-    """Check that each file that a command writes is protected if it exists already."""
+    """Check that each file written by a command is protected if it exists."""
     before = {path: path.read_bytes() for path in inputs.all}
     command = into(folder, command)
     for name in written_by(command, folder):
@@ -112,7 +112,7 @@ def test_rigged_mesh_files_are_checked(inputs, folder, refuse):
         refuse(command, f"{target}: already exists")
         assert contents(folder) == {target.name: b"precious"}
         target.unlink()
-        # The mesh's texture is an input, although the command does not name it.
+        # The texture of the mesh is an input, although the command line does not name it.
         for path in (*inputs.of_roof[:2], mesh.with_name("mesh_0.png")):
             target.symlink_to(path)
             refuse([*command, "--force"], f"{target}: input files are never overwritten")
@@ -139,14 +139,14 @@ def test_writing_one_file_twice_in_a_run_is_refused(inputs, folder, refuse):
     assert contents(folder) == {"m-0.bvh": b"precious", "m-7.bvh": b"precious"}
 
 
-def test_missing_folder_is_refused_before_anything(inputs, folder, refuse):
+def test_missing_folder_is_refused_before_any_work(inputs, folder, refuse):
     for case in ("a motion as w_{frame:03}.obj", "a pose as p.skel", "a motion as w.gltf"):
         command = [word.replace("OUT/", f"{folder}/no/") for word in converting(inputs)[case]]
         refuse(command, f"the folder {folder}/no does not exist")
     assert not contents(folder)
 
 
-def test_one_existing_frame_stops_the_whole_sequence(inputs, folder, refuse):
+def test_existing_frame_is_refused_before_the_whole_sequence(inputs, folder, refuse):
     (folder / "w_002.obj").write_bytes(b"precious")
     command = into(folder, converting(inputs)["a motion as w_{frame:03}.obj"])
     refuse(command, f"{folder}/w_002.obj: already exists")
@@ -178,8 +178,8 @@ def test_folder_of_frames_is_an_input(inputs, folder, refuse):
     refuse([*command, f"{folder}/new"], f"{folder}/new/smpl: already exists")
 
 
-def test_other_textures_of_a_skin_are_kept(inputs, folder, refuse):
-    """Texture names of a ``.skin`` are fixed: a different existing file is an error."""
+def test_different_textures_of_a_skin_are_not_replaced(inputs, folder, refuse):
+    """Texture names in a ``.skin`` are fixed, so a different existing file is an error."""
     (folder / "cloth1.png").write_bytes(b"precious")
     for more in ([], ["--force"]):
         refuse(

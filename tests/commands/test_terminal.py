@@ -1,4 +1,4 @@
-"""Progress, tables and colours at a terminal and in a pipe."""
+"""Progress, tables and colours in a terminal and in a pipe."""
 
 import io
 import re
@@ -12,7 +12,7 @@ from viewer.progress import report
 
 
 class Terminal(io.StringIO):
-    """A stream that claims to be a terminal."""
+    """A stream that appears to be a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -64,7 +64,7 @@ def test_progress_is_silent_in_pipes_and_for_short_jobs(terminal, monkeypatch):
     assert terminal.getvalue() == ""
 
 
-def test_lines_are_coloured_only_at_a_terminal(monkeypatch):
+def test_lines_are_coloured_only_in_a_terminal(monkeypatch):
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
     monkeypatch.setattr("sys.stdout", pipe := io.StringIO())
@@ -74,7 +74,7 @@ def test_lines_are_coloured_only_at_a_terminal(monkeypatch):
     assert screen.getvalue() == "\x1b[31mmissing \x1b[0m[x] " + 200 * "a" + "\n"
 
 
-def test_tables_are_as_wide_as_their_cells_without_trailing_blanks():
+def test_tables_are_as_wide_as_their_cells_without_trailing_spaces():
     rows = [["", "joints", "result"], ["a" * 150, "1 mm", ""], ["[red]b", "-", "DIFFERS"]]
     assert table_lines(rows, right=[1]) == [
         f"{'':150}  joints  result",

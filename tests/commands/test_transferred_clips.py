@@ -1,4 +1,4 @@
-"""``viewer rig --clip``: transfer of the template's motions to the rigged mesh."""
+"""``viewer rig --clip``, which transfers motions of the template to the rigged mesh."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_template_path_is_scaled_with_the_figure(folder, tmp_path, capsys):
         pose_actor(actor, time)
         pose_actor(fox, time)
         found = viewer.deform(actor.figure, actor.pose)[0]
-        # At rest the new figure has the template's axes.
+        # The rest pose of the new figure has the axes of the template.
         wanted = 100.0 * viewer.deform(fox.figure, fox.pose)[0]
         assert_allclose(found, wanted, atol=1e-5 * 118.0)
 

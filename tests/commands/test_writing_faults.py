@@ -1,4 +1,4 @@
-"""Every output format on a full disk: failure at each write and at each fill level."""
+"""Every output format on a full disk, with failures at each write and each fill level."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ def command_of(inputs: Inputs, case: str, folder: Path) -> list[str]:
 
 
 class FullDisk:
-    """Writes half of the n-th write's bytes; the disk is full from then on."""
+    """A disk that is full from the n-th write on, half of which is written."""
 
     def __init__(self, monkeypatch, number: int) -> None:
         self.calls, self.number = 0, number
         opened, write_text = os.fdopen, Path.write_text
         monkeypatch.setattr(saving.os, "fdopen", lambda *a: _Stream(opened(*a), self))
 
-        def written(path, text, **settings):  # frames in a folder, written without a rename
+        def written(path, text, **settings):  # frames in a folder are written without a rename
             self.meet(lambda half: write_text(path, half, **settings), text)
             return write_text(path, text, **settings)
 
@@ -91,7 +91,7 @@ def refused(code: int, capsys, folder: Path) -> None:
 
 @pytest.mark.parametrize("is_there", [False, True], ids=["new", "replaced"])
 @pytest.mark.parametrize("case", CONVERTING + PICTURES)
-def test_failure_at_any_write_changes_nothing(
+def test_failure_at_any_write_changes_no_file(
     inputs, tmp_path, monkeypatch, capsys, case, is_there
 ):
     folder = tmp_path / "out"
@@ -100,7 +100,7 @@ def test_failure_at_any_write_changes_nothing(
     if is_there:
         assert run(command) == 0
         for name in contents(folder):
-            if Path(name).suffix not in (".png", ".mtl"):  # whose names describe their contents
+            if Path(name).suffix not in (".png", ".mtl"):  # these names depend on their contents
                 (folder / name).write_bytes(f"precious {name}".encode())
     before = contents(folder)
     for number in count(1):
@@ -113,7 +113,7 @@ def test_failure_at_any_write_changes_nothing(
         refused(code, capsys, folder)
         found = contents(folder)
         if case.startswith("f_"):
-            # Finished numbered images are kept; none is ever incomplete.
+            # Finished numbered images are kept, and no image is incomplete.
             found = {name: before.get(name, data) for name, data in found.items()}
             assert {name for name in found if name.startswith(".")} == set()
             found = {name: data for name, data in found.items() if name in before}
@@ -140,5 +140,5 @@ def test_every_disk_fill_level_keeps_existing_files(inputs, tiny_disk, capsys, c
             path.rmdir() if path.is_dir() else path.unlink()
         folder.rmdir()
         (tiny_disk / "fill").unlink()
-    # A run never succeeds with less space than one that failed.
+    # No run succeeds with less space than a failed run.
     assert codes == sorted(codes) and codes[16] == 5

@@ -16,7 +16,7 @@ from viewer.export import export
 REMARKS = ("warning: ", "note: ")
 """Beginnings of lines about a command that goes on."""
 FREE = (".mtl", ".png")
-"""Suffixes of companions: an ``.obj``'s take a name that no file has."""
+"""Suffixes of companion files; those of an ``.obj`` get unused names."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,9 +42,8 @@ class Inputs:
 
 
 def write_inputs(folder: Path) -> Inputs:
-    """Write a rig with textures, one with a clip, and a capture of two people and its model.
-
-    Person 0 is in frames 20 to 23, person 7 in all of them but 22.
+    """Write a rig with textures, one with a clip, and a capture of two people with its model.
+    Person 0 is in frames 20 to 23, person 7 in all except 22.
     """
     mesh = seamed_mesh(pictures=(PICTURE, OTHER_PICTURE), of_triangle=np.array([0, 0, 1]))
     export(seamed_actor(mesh=mesh), folder / "roof.skel")
@@ -67,7 +66,7 @@ def write_inputs(folder: Path) -> Inputs:
 
 
 def converting(inputs: Inputs) -> dict[str, list[str]]:
-    """Return fast commands without OpenGL, by their output; ``OUT/`` stands for the folder."""
+    """Return fast commands without OpenGL by their output; ``OUT/`` stands for the folder."""
     poses = {
         f"a pose as {name}": ["convert", *inputs.roof, "-o", f"OUT/{name}"]
         for name in ("p.obj", "p.ply", "p.npz", "p.json", "p.skel", "p.glb", "p.gltf")

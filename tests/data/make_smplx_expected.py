@@ -1,6 +1,5 @@
-"""Write ``smplx_expected.npz``: results of the package smplx for the synthetic models.
-
-How to run, in an environment of its own, from anywhere::
+"""Generator of ``smplx_expected.npz``, the results of the package smplx for the synthetic models.
+Run it in a separate environment from any folder::
 
     pip install numpy scipy torch smplx==0.1.28
     python tests/data/make_smplx_expected.py
@@ -41,7 +40,7 @@ TOLERANCE = 1e-7
 
 Inputs = dict[str, Any]
 
-# How many numbers each pose vector has (hands without PCA), in the order of the joints.
+# The length of each pose vector (hands without PCA) in the order of the joints.
 POSE_PARTS = {
     "smpl": {"global_orient": 3, "body_pose": 69},
     "smplh": {"global_orient": 3, "body_pose": 63, "left_hand_pose": 45, "right_hand_pose": 45},
@@ -73,7 +72,7 @@ def wave(seed: float, count: int, size: float) -> np.ndarray:
 
 
 def turns(seed: float, count: int, size: float = 0.5) -> np.ndarray:
-    """Return a pose vector; the fourth to seventh joint rotate by 0, pi, 1e-9 and 4.2."""
+    """Return a pose vector in which the fourth to seventh joints rotate by 0, pi, 1e-9 and 4.2."""
     pose = wave(seed, count, size).reshape(-1, 3)
     if len(pose) > 6:
         pose[3] = 0.0
@@ -84,7 +83,7 @@ def turns(seed: float, count: int, size: float = 0.5) -> np.ndarray:
 
 
 def all_cases() -> dict[str, Inputs]:
-    """Return the inputs of every case, with the settings among them."""
+    """Return the inputs of every case, including the settings."""
     transl = np.array([0.75, -1.5, 2.25])
     root = np.array([0.4, -1.9, 0.7])
     shape = wave(0.1, 10, 2.0)
@@ -121,7 +120,7 @@ def all_cases() -> dict[str, Inputs]:
         posed = {"use_pca": True}
         for count in (6, 12, 45):
             if kind == "mano" and count == 45:
-                continue  # smplx takes 45 coefficients of this one kind for angles
+                continue  # smplx interprets 45 coefficients of MANO as angles
             hands = {side: wave(0.5 + n, count, 1.2) for n, side in enumerate(sides)}
             add(kind, f"pca{count}_mean", **posed, **hands, flat_hand_mean=False)
             if count < 45:
@@ -178,7 +177,7 @@ def smplx_result(
     if hand is not None:
         options |= {name: bool(inputs[name]) for name in ("use_pca", "flat_hand_mean")}
         options["num_pca_comps"] = len(inputs.get(hand, np.zeros(6))) if inputs["use_pca"] else 6
-    if kind == "smplx":  # these two only read files
+    if kind == "smplx":  # these two models can only be read from files
         np.savez(folder / "SMPLX_NEUTRAL.npz", **model)
         body = smplx.SMPLX(str(folder / "SMPLX_NEUTRAL.npz"), ext="npz", **options)
     elif kind == "flame":
@@ -189,7 +188,7 @@ def smplx_result(
     else:
         makers = {"smpl": smplx.SMPL, "smplh": smplx.SMPLH, "mano": smplx.MANO}
         body = makers[kind]("", data_struct=Struct(**model), **options)
-    # Vertices of the published meshes that count as joints: these small models have none.
+    # Some vertices of the published meshes are extra joints; these small models have none.
     body.vertex_joint_selector.extra_joints_idxs = torch.zeros(0, dtype=torch.long)
     vectors = {
         name: torch.tensor(np.array(value), dtype=torch.float64)[None]
@@ -218,7 +217,7 @@ def rotation(vector: np.ndarray) -> np.ndarray:
 
 
 def plain_pose(model: Mapping[str, np.ndarray], inputs: Inputs) -> np.ndarray:
-    """Return the axis-angle vectors of all joints (J,3)."""
+    """Return the axis-angle vectors of all joints, (J, 3)."""
     vectors = []
     for part, count in POSE_PARTS[inputs["kind"]].items():
         vector = inputs.get(part)

@@ -1,6 +1,5 @@
-"""Writes the tiny torch and joblib files in this folder, with torch 2.13 and joblib 1.6.
-
-The tests read them without either package. Run in an environment that has both.
+"""Generator of the tiny torch and joblib files in this folder with torch 2.13 and joblib 1.6. The
+tests read them without these packages. Run it in an environment that has both.
 """
 
 import collections

@@ -1,4 +1,4 @@
-"""Diagnostics as JSON."""
+"""Description of diagnostics as JSON."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase, described
 
 
-def test_a_diagnostic_describes_all_its_data() -> None:
+def test_description_contains_all_data_of_a_diagnostic() -> None:
     values = {"n": np.int64(2), "joint": "hip", "weight": np.float32(-0.5), "vertex": 7}
     places = np.array([3, 7], dtype=np.int32)
     found = Diagnostic(
@@ -34,7 +34,7 @@ def test_a_diagnostic_describes_all_its_data() -> None:
     }
 
 
-def test_every_kind_of_value_can_be_written_as_json() -> None:
+def test_values_of_every_kind_can_be_written_as_json() -> None:
     inner = Diagnostic("F001.no-file", values={"found": "a folder"})
     values = {
         "found": b"up\xff\n",
@@ -61,7 +61,7 @@ def test_long_location_lists_are_truncated_but_counted() -> None:
     assert told["places"] == list(range(100)) and told["n_places"] == 300
 
 
-def test_a_json_pointer_is_the_place_of_a_diagnostic() -> None:
+def test_json_pointer_is_the_location_of_a_diagnostic() -> None:
     found = Diagnostic("F002.unknown-folder", Path("a.glb"), pointer="/skins/0/joints/3")
     assert found.place == "a.glb#/skins/0/joints/3"
     assert described(found)["pointer"] == "/skins/0/joints/3"

@@ -1,4 +1,4 @@
-"""Every message can be formatted, and every call supplies the values of its template."""
+"""Formatting of all messages, and the values that calls supply for their templates."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def sample(spec: str) -> Any:
     if re.fullmatch(r"[+,z.\d]*[efg%]", spec):
         return 1.5
     if spec in ("text", "name", "quoted") or spec.startswith("+"):
-        return "x\ny"  # may come from a file
+        return "x\ny"  # the value may come from a file
     return 3 if spec == "d" else "x"
 
 
@@ -70,7 +70,7 @@ def calls() -> list[tuple[str, str, set[str]]]:
             if name not in CALLS or not isinstance(first, ast.Constant):
                 continue
             if not isinstance(first.value, str) or any(word.arg is None for word in node.keywords):
-                continue  # values are passed on
+                continue  # the values are forwarded
             known = PHRASES if name == "Phrase" else MESSAGES
             if first.value in known:
                 names = {word.arg for word in node.keywords if word.arg} - CALLS[name]
@@ -87,13 +87,13 @@ def test_every_call_supplies_the_values_of_its_template() -> None:
     assert wrong == []
 
 
-def test_no_key_is_in_two_tables() -> None:
+def test_every_key_is_in_only_one_table() -> None:
     for name in ("CODES", "MESSAGES", "PHRASES"):
         keys = [key for table in wording.TABLES for key in getattr(table, name, ())]
         assert len(keys) == len(set(keys)) > 0
 
 
-def test_a_sign_is_not_a_condition() -> None:
+def test_sign_in_a_format_is_not_a_condition() -> None:
     assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 4.0, "more": ""}) == "+4 %"
     assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 0.0, "more": "a"}) == "+0 %; a"
 

@@ -1,4 +1,4 @@
-"""Animations for BVH exports, and joint positions by an independent reader."""
+"""Animations for BVH exports, and comparison of joint positions with an independent reader."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 
-TENTH = 1e-5  # metres: 0.01 mm
+TENTH = 1e-5  # in metres, 0.01 mm
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 
@@ -60,7 +60,7 @@ def write(animation: SampledAnimation, folder: Path, **options) -> tuple[PlainBv
 
 
 def joints_of(animation: SampledAnimation) -> np.ndarray:
-    """Return the animation's joint positions: (F, J, 3)."""
+    """Return the joint positions of the animation, (F, J, 3)."""
     return world_frames(animation.figure, animation.frames)[..., :3, 3]
 
 

@@ -15,13 +15,13 @@ from viewer.rig.smpl_family import FAMILY
 
 
 def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
-    """Return values from -0.5 to 0.5, all different."""
+    """Return distinct values from -0.5 to 0.5."""
     count = int(np.prod(shape))
     return 0.5 * np.sin(seed + 1.7 * np.arange(1, count + 1) ** 1.3).reshape(shape)
 
 
 def family_motion(count: int, frames: int = 4, rows=None, first_frame: int = 0, **words):
-    """Return a motion of all joints with large root rotations, about the model's origin."""
+    """Return a motion of all joints with large root rotations about the origin of the model."""
     vectors = waves(frames, count, 3, seed=0.1 * frames)
     vectors[:, 0] += [1.2, -0.4, 0.9]
     words = {"shape": waves(1, 10, seed=2.0), "about_origin": True, **words}
@@ -44,12 +44,12 @@ def clip_animation(figure: Figure, clip: SampledClip) -> SampledAnimation:
 
 
 def vertices_about_origin(arrays, vectors, root, move, shape=()) -> np.ndarray:
-    """Return V = R X + T, where ``vectors`` rotate all joints but the root."""
+    """Return V = R X + T, for ``vectors`` that rotate all joints except the root."""
     pose = np.array(vectors)
     pose[0] = 0.0
     return smpl_forward(arrays, shape, pose)[0] @ rotation(root).T + move
 
 
 def vertices_about_pelvis(arrays, vectors, move, shape=()) -> np.ndarray:
-    """Return smplx's vertices for poses and trans: the whole body is posed, then translated."""
+    """Return the vertices of smplx for poses and trans: the body is posed, then translated."""
     return smpl_forward(arrays, shape, vectors)[0] + move

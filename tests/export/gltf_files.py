@@ -1,4 +1,4 @@
-"""Write glTF files, and compare the rendered result with the float64 reference."""
+"""Functions that write glTF files and compare the rendered result with the float64 reference."""
 
 import faults
 import numpy as np
@@ -10,8 +10,8 @@ from viewer.export import export
 from viewer.rig.figure import Figure
 from viewer.rig.skinning import Skinning, deform
 
-SINGLE = 2e-6  # relative to the size: single precision through a chain of matrices
-EXACT = 1e-6  # small figures of size 1 or so
+SINGLE = 2e-6  # relative to the size, for single precision through a chain of matrices
+EXACT = 1e-6  # for figures of a size of about 1
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # (x, y, z) -> (x, z, -y)
 AS_IS = np.eye(3)
 
@@ -22,7 +22,7 @@ def write(folder, actor, name="out.glb", **skinning) -> tuple[Gltf, list[str]]:
 
 
 def corners(gltf: Gltf, values: np.ndarray) -> np.ndarray:
-    """Return the attribute values at the triangle corners, primitive by primitive."""
+    """Return the attribute values at triangle corners, primitive by primitive."""
     rows = [values[gltf.triangles(number)] for number in range(len(gltf.primitives))]
     return np.concatenate(rows)
 

@@ -1,7 +1,6 @@
-"""A second BVH reader, strict and slow: line by line, with lists and loops, sharing no code with
-the viewer.
-
-It requires the line layout that Blender's importer expects: "{" alone, then OFFSET, then CHANNELS.
+"""A strict and slow BVH reader that works line by line and shares no code with the viewer. It
+requires the line layout expected by Blender's importer: "{" on its own line, then OFFSET, then
+CHANNELS.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from pathlib import Path
 
 
 class PlainBvh:
-    """Names, parents, offsets, channels and frames of a file, as written."""
+    """Names, parents, offsets, channels and frames as written in a file."""
 
     def __init__(self, path: Path) -> None:
         self.text = path.read_bytes().decode("ascii")
@@ -99,7 +98,7 @@ class PlainBvh:
 
 
 def about(axis: int, angle: float) -> list[list[float]]:
-    """Return the rotation about one axis, from the textbook."""
+    """Return the textbook rotation about one axis."""
     c, s = math.cos(angle), math.sin(angle)
     return [
         [[1, 0, 0], [0, c, -s], [0, s, c]],

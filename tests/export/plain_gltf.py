@@ -1,5 +1,7 @@
-"""A small glTF 2.0 reader that shares no code with the viewer: the rules of the specification, and
-the vertices and joints that a program draws, in double precision."""
+"""A small glTF 2.0 reader that shares no code with the viewer.
+
+It checks the rules of the specification and evaluates vertices and joints in double precision.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +20,7 @@ SIDES = {"POSITION": "VEC3", "NORMAL": "VEC3", "TEXCOORD_0": "VEC2", "TEXCOORD_1
 
 
 class Gltf:
-    """One file; every rule is checked when it is opened."""
+    """A file that is checked against every rule when it is opened."""
 
     def __init__(self, path: Path) -> None:
         data = path.read_bytes()
@@ -49,10 +51,10 @@ class Gltf:
             assert "uri" not in declared and 0 <= size - declared["byteLength"] <= 3
         return text
 
-    # File contents
+    # Contents of the file
 
     def accessor(self, index: int) -> np.ndarray:
-        """Return an array: (N,) of scalars, else (N, components)."""
+        """Return an array: (N,) for scalars, otherwise (N, components)."""
         item = self.root["accessors"][index]
         view = self.root["bufferViews"][item["bufferView"]]
         dtype, size = FORMATS[item["componentType"]]
@@ -100,7 +102,7 @@ class Gltf:
     # Posing and skinning
 
     def transforms(self, time: float | None = None) -> list[dict]:
-        """Return every node's local transform, animated if a time is given."""
+        """Return the local transform of every node, animated if a time is given."""
         nodes = [dict(node) for node in self.nodes]
         for channel in self.root["animations"][0]["channels"] if time is not None else ():
             sampler = self.root["animations"][0]["samplers"][channel["sampler"]]
@@ -113,7 +115,7 @@ class Gltf:
         return nodes
 
     def world(self, time: float | None = None) -> np.ndarray:
-        """Return every node's world matrix: (N, 4, 4)."""
+        """Return the world matrix of every node, (N, 4, 4)."""
         nodes = self.transforms(time)
         local = [matrix(node) for node in nodes]
         result = []
@@ -241,7 +243,8 @@ class Gltf:
             assert item["count"] == count and item["type"] == SIDES.get(name, "VEC4")
             views.append(item["bufferView"])
             assert self.root["bufferViews"][item["bufferView"]]["target"] == 34962
-        assert len(set(views)) == len(views)  # without a stride a buffer view holds one attribute
+        # A buffer view without a stride has a single attribute.
+        assert len(set(views)) == len(views)
         item = self.root["accessors"][mesh["primitives"][0]["attributes"]["POSITION"]]
         assert len(item["min"]) == len(item["max"]) == 3
         lengths = np.linalg.norm(self.attribute("NORMAL").astype(float), axis=1)
@@ -266,7 +269,7 @@ class Gltf:
         assert np.abs(weights.sum(axis=1) - 1.0).max() < 1e-7 * weights.shape[1]
         assert (joints[weights == 0.0] == 0).all()
         own = np.where(weights > 0.0, joints, -1 - np.arange(joints.shape[1]))
-        assert (np.diff(np.sort(own, axis=1), axis=1) != 0).all()  # no joint twice
+        assert (np.diff(np.sort(own, axis=1), axis=1) != 0).all()  # each joint occurs once
 
     def _check_animation(self, animation: dict) -> None:
         targets = [(c["target"]["node"], c["target"]["path"]) for c in animation["channels"]]
@@ -286,7 +289,7 @@ class Gltf:
 
 
 def line(times: np.ndarray, values: np.ndarray, time: float, turns: bool) -> list[float]:
-    """Interpolate a curve between its keys: rotations by slerp, all else linearly."""
+    """Interpolate a curve between its keys, rotations by slerp and other values linearly."""
     if time <= times[0] or time >= times[-1]:
         return values[0 if time <= times[0] else -1].tolist()
     row = int(np.searchsorted(times, time, side="right")) - 1
@@ -304,7 +307,7 @@ def line(times: np.ndarray, values: np.ndarray, time: float, turns: bool) -> lis
 
 
 def matrix(node: dict) -> np.ndarray:
-    """Return T R S."""
+    """Return the matrix T R S."""
     x, y, z, w = np.array(node.get("rotation", [0, 0, 0, 1]), float)
     length = math.sqrt(x * x + y * y + z * z + w * w)
     x, y, z, w = x / length, y / length, z / length, w / length

@@ -12,7 +12,7 @@ import numpy as np
 def read_obj(path: Path) -> SimpleNamespace:
     """Return ``v``, ``vt``, ``vn`` and the faces of an ``.obj``; an unknown keyword is an error.
 
-    ``faces`` holds one (material, ((v, vt, vn), …)) for each triangle, indices as written.
+    ``faces`` contains one (material, ((v, vt, vn), …)) per triangle, with indices as written.
     """
     found = SimpleNamespace(v=[], vt=[], vn=[], faces=[], objects=[], libraries=[], comments=[])
     material = None
@@ -27,7 +27,8 @@ def read_obj(path: Path) -> SimpleNamespace:
         elif keyword == "usemtl":
             material = rest
         elif keyword == "mtllib":
-            found.libraries += rest.split(" ")  # the format allows several, separated by spaces
+            # The format allows several names separated by spaces.
+            found.libraries += rest.split(" ")
         elif keyword == "o":
             found.objects += rest.split(" ")
         else:
@@ -92,5 +93,5 @@ def read_ply(path: Path) -> SimpleNamespace:
 
 
 def columns(rows: list[dict], *names: str) -> np.ndarray:
-    """Return properties of an element as columns of one array."""
+    """Return the properties of an element as columns of one array."""
     return np.array([[row[name] for name in names] for row in rows])

@@ -8,7 +8,7 @@ import numpy as np
 
 
 def rotation(vector: np.ndarray) -> np.ndarray:
-    """Return Rodrigues' formula, exp of the cross-product matrix."""
+    """Return the exponential of the cross-product matrix by Rodrigues' formula."""
     angle = math.sqrt(sum(n * n for n in vector))
     if angle == 0.0:
         return np.eye(3)
@@ -25,9 +25,9 @@ def smpl_forward(
     Parameters
     ----------
     arrays
-        As ``synthetic_smpl.model`` makes them.
+        Arrays as returned by ``synthetic_smpl.model``.
     shape
-        Weights of the first columns of ``shapedirs``, or of those in ``columns``.
+        Weights of the first columns of ``shapedirs``, or of the given ``columns``.
     pose
         (J, 3) rotation vectors.
     columns

@@ -12,7 +12,7 @@ from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import skin_from_lists
 
-# A roof of three triangles; vertex 1 is on the seam, vertex 4 in no triangle.
+# A roof of three triangles; vertex 1 is on the seam, and vertex 4 is in no triangle.
 POSITIONS = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [1, 2, 1], [3, 3, 3]], dtype=float)
 NORMALS = np.tile([0.0, 0.0, 1.0], (5, 1))
 TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [0, 3, 1]])
@@ -31,7 +31,7 @@ def materials(*pictures: np.ndarray | None) -> tuple[Material, ...]:
 
 
 def seamed_mesh(uvs=True, pictures=(), of_triangle=None) -> Mesh:
-    """Return the roof; its normals have any nonzero length."""
+    """Return the roof, with normals of any nonzero length."""
     return Mesh(
         positions=POSITIONS,
         normals=np.array([[0, 0, 2], [0, 3, 4], [1, 0, 0], [0, 0, -0.5], [0, 1, 0]]),

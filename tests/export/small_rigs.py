@@ -6,7 +6,7 @@ from pathlib import Path
 
 from formats.pig_text import write as write_pig
 
-# A root at the origin with an arm on either side, each with a hand; x is across.
+# A root at the origin has an arm on either side with a hand each; x points sideways.
 ARMS_SKEL = """
 balljoint root {
     offset 0 0 0
@@ -18,7 +18,7 @@ balljoint root {
 """
 LOPSIDED_SKEL = ARMS_SKEL.replace("offset -1 0 0\n", "offset -2 0 0\n")
 
-# Vertex 1 belongs half to each joint; the second rotates about y, the line through both.
+# Vertex 1 has equal weights of both joints; the second rotates about y, the line through both.
 TWIST_SKEL = "balljoint low { balljoint high { offset 0 1 0 } }"
 TWIST_SKIN = """
 positions 3 { 1 0 0  1 1 0  1 2 0 }
@@ -33,7 +33,7 @@ bindings 2 {
 
 
 def clip_text(start: float = 0.0) -> str:
-    """Return a clip of two seconds for ``TWIST_SKEL``: the root moves along x by 2 a second."""
+    """Return a clip of two seconds for ``TWIST_SKEL``; the root moves along x by 2 per second."""
     still = "channel { extrapolate constant constant keys 1 { 0 0 flat flat } }\n"
     keys = f"keys 2 {{ {start} 0 linear linear {start + 2} 4 linear linear }}"
     moving = f"channel {{ extrapolate constant constant {keys} }}\n"
@@ -47,16 +47,16 @@ def write_twist(folder: Path, name: str = "twist") -> list[str]:
     return [str(folder / f"{name}.skel"), str(folder / f"{name}.skin")]
 
 
-# A box 1 x 2 x 3, counter-clockwise from outside; z is up.
+# A box of 1 x 2 x 3, counter-clockwise from outside, with z up.
 BOX_VERTICES = [(x, y, z) for z in (0, 3) for y in (0, 2) for x in (0, 1)]
 _SIDES = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
 BOX_TRIANGLES = [t for a, b, c, d in _SIDES for t in ((a, b, c), (a, c, d))]
-# Vertex 7, the corner (1, 2, 3), follows all six joints; its weights add up to 1.
+# Vertex 7, the corner (1, 2, 3), follows all six joints; its weights sum to 1.
 SHARES = (0.25, 0.2, 0.2, 0.15, 0.15, 0.05)
 
 
 def write_box(folder: Path, **changes: str | bytes | None) -> Path:
-    """Write a box as a PIG model: six joints at the origin, five of them below the root."""
+    """Write a box as a PIG model with a root and five children at the origin."""
     weights = [f"0 {vertex} 1" for vertex in range(7)]
     weights += [f"{joint} 7 {share}" for joint, share in enumerate(SHARES)]
     core = {
@@ -69,7 +69,7 @@ def write_box(folder: Path, **changes: str | bytes | None) -> Path:
         "faces_tex.txt": "0 1 2\n" * 12,
         "body_parts.txt": "1\n1\n1\n1\n2\n2\n2\n2\n",
         "body_part_defs.txt": "NOT_BODY\nFEET\nBACK",
-        # Across y: 0 and 2, 1 and 3, 4 and 6, 5 and 7.
+        # Mirrored across y are 0 and 2, 1 and 3, 4 and 6, 5 and 7.
         "sym.txt": "2\n3\n0\n1\n6\n7\n4\n5\n",
         "reduced_ids.txt": "0\n1\n2\n4\n",
         "reduced_faces.txt": "0 2 1\n0 1 3\n1 2 3\n0 3 2\n",
@@ -82,7 +82,7 @@ def _table(rows: list[tuple[int, ...]]) -> str:
 
 
 def pose_190(n_joints: int, **numbers: float) -> str:
-    """Return a PIG pose: 3 values of translation, 3 per joint, scale; set as ``n5=0.5``."""
+    """Return a PIG pose: 3 translations, 3 values per joint, scale; ``n5=0.5`` sets a value."""
     values = [0.0] * (3 + 3 * n_joints) + [1.0]
     for name, value in numbers.items():
         values[int(name[1:])] = value

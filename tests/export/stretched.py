@@ -1,4 +1,4 @@
-"""A chain of joints whose bones and mesh grow with a blend shape, by known lengths."""
+"""A chain of joints with bones and a mesh that grow with a blend shape by known lengths."""
 
 from __future__ import annotations
 
@@ -21,14 +21,13 @@ POSITIONS = np.array([[0.0, 0, 0], [0, 1, 0], [0, 2, 0], [0, 3, 0]])
 GROWTH = np.array([[0.0, 0, 0], [0, 0.1, 0], [0, 0.2, 0], [0, 0.5, 0]])
 WEIGHTS = np.array([0.0, 0.5, -0.25, 1.0, 0.75])
 WORST = 3
-"""The frame whose shape is farthest from that of the first."""
+"""The frame with the largest difference in shape from the first frame."""
 
 
 def chain(unit: str = "m") -> Figure:
-    """Return three joints stacked a metre apart; each bone grows by 0.1 m per unit of weight.
-
-    One vertex lies at each joint and follows it; the last lies a metre above the highest joint,
-    follows that joint, and moves by 0.5 m per unit of weight.
+    """Return three joints stacked a metre apart, with bones that grow by 0.1 m per unit of weight.
+    One vertex is at each joint and follows it; the last is a metre above the highest joint, follows
+    that joint, and moves by 0.5 m per unit of weight.
     """
     every = np.arange(3, dtype=np.int32)
     rows = [[(0, 1.0)], [(1, 1.0)], [(2, 1.0)], [(2, 1.0)]]
@@ -44,7 +43,7 @@ def chain(unit: str = "m") -> Figure:
 
 
 def chain_animation(unit: str = "m", weights=WEIGHTS, **tracks) -> SampledAnimation:
-    """Return the chain with its root rotated by 90 degrees about z in all frames."""
+    """Return the chain with the root rotated by 90 degrees about z in all frames."""
     count = len(weights)
     turns = np.zeros((count, 3, 4))
     turns[..., 3] = 1.0

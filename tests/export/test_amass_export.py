@@ -1,4 +1,4 @@
-"""AMASS export: smplx reproduces the motion of the figure."""
+"""AMASS export, from which smplx must reproduce the motion of the figure."""
 
 import faults
 import numpy as np
@@ -24,7 +24,7 @@ from viewer.rig.motion.body_motion import BodyMotion, body_clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
-# Metres and radians: angles are recovered with an arctangent of values near 1.
+# In metres and radians, for angles recovered by an arctangent of values near 1.
 ATOL = 1e-13
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}
 GAPS = np.array([-1, 0, 1, -1, -1, 2, 3])  # frames 0, 3 and 4 are missing
@@ -55,7 +55,7 @@ def test_suffix_finds_the_exporter():
 
 
 @pytest.mark.parametrize("kind", COUNTS)
-def test_file_poses_the_model_as_it_was(family, tmp_path, kind):
+def test_file_reproduces_the_poses_of_the_model(family, tmp_path, kind):
     motion = family_motion(COUNTS[kind])
     path = tmp_path / "walk.npz"
     arrays, notes = written(family_animation(family(kind), motion), path, world_up="z")
@@ -122,7 +122,7 @@ def test_large_angles_keep_their_rotation(family, tmp_path):
     assert_allclose(found[2], [0, 0, 1e-9], rtol=1e-12, atol=0)
 
 
-def test_other_up_axis_rotates_the_world(family, tmp_path):
+def test_different_up_axis_rotates_the_world(family, tmp_path):
     motion = family_motion(24)
     animation = family_animation(family("smpl"), motion)
     plain, _ = written(animation, tmp_path / "y.npz", world_up="y")
@@ -160,7 +160,7 @@ def test_changing_shapes_have_a_row_per_frame(family, tmp_path):
 # Gaps
 
 
-def test_gaps_are_held_and_marked(family, tmp_path):
+def test_pose_is_held_in_gaps_and_marked(family, tmp_path):
     motion = family_motion(24, rows=GAPS, first_frame=10)
     arrays, notes = written(family_animation(family("smpl"), motion), tmp_path / "a.npz")
     assert arrays["present"].tolist() == [False, True, True, False, False, True, True]
@@ -174,7 +174,7 @@ def test_gaps_are_held_and_marked(family, tmp_path):
     assert (back.timing.rows >= 0).tolist() == arrays["present"].tolist()
 
 
-def test_gaps_are_bridged(family, tmp_path):
+def test_gaps_are_interpolated(family, tmp_path):
     vectors = np.zeros((2, 24, 3))
     vectors[:, 0, 1] = 0.0, 0.9
     moves = np.array([[0.0, 0, 0], [3.0, 0, 0]])
@@ -216,7 +216,7 @@ def test_losses_are_reported(family, tmp_path):
     clip = SampledClip("a", Timing(30.0, np.arange(2)), rotations, moved,
                        np.array([[0.5, 0, 0]] * 2), np.array([1.0, 1.5]))  # fmt: skip
     arrays, notes = written(clip_animation(figure, clip), tmp_path / "a.npz")
-    # A root that moves within the figure moves the whole body.
+    # A root that moves relative to the figure moves the whole body.
     assert_array_equal(arrays["trans"], [[1.5, 2.0, 3.0]] * 2)
     assert notes[1].startswith(f"{tmp_path}/a.npz: joints differ from the motion by up to ")
     assert notes[2:] == [
@@ -225,7 +225,7 @@ def test_losses_are_reported(family, tmp_path):
     ]
 
 
-def test_bundled_body_export_names_the_model_of_its_shape(tmp_path):
+def test_export_of_the_bundled_body_states_the_model_of_its_shape(tmp_path):
     from viewer.loading.bundled import bundled_body
 
     figure = viewer.load(bundled_body()).actors[0].figure

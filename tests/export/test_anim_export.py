@@ -1,4 +1,4 @@
-""".anim export: the clip's own keys, or one key per frame with a measured error."""
+"""Export to .anim with the keys of the clip, or with one key per frame and a measured error."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ TINY = 1e-12
 
 
 def rig(limits=()):
-    """Two joints, one above the other."""
+    """Return two joints, one above the other."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, kind, 0.0, *dict(limits).get(kind, ())) for kind in "xyz"]
     return Figure(
@@ -38,7 +38,7 @@ def rig(limits=()):
 
 
 def keyed(end=1.0):
-    """The root moves from 0 to 3 along x, and rotates about z from -0.5 to 0.5."""
+    """Return a clip that moves the root along x from 0 to 3 and rotates it from -0.5 to 0.5."""
     moves = Channel(0, np.array([0.0, 1.0]), np.array([0.0, 3.0]), (("flat", "flat"),) * 2)
     turns = Channel(
         5,
@@ -53,7 +53,7 @@ def keyed(end=1.0):
 
 
 def turning(angles, rate=2.0, rows=None, **more):
-    """A sampled clip in which the second joint rotates about z by these angles."""
+    """Return a sampled clip in which the second joint rotates about z by these angles."""
     turns = np.zeros((len(angles), 2, 4))
     turns[:, :, 3] = 1.0
     turns[:, 1, 2] = np.sin(np.asarray(angles) / 2)
@@ -82,7 +82,7 @@ def test_clip_is_written_unchanged(tmp_path):
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_walk_is_written_unchanged(tmp_path):
+def test_clip_of_a_real_walk_is_written_unchanged(tmp_path):
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     actor = scene.actors[0]
     again, _ = written(actor, tmp_path / "walk.anim")
@@ -90,7 +90,7 @@ def test_walk_is_written_unchanged(tmp_path):
     assert_array_equal(evaluate_all(again, times)[1], evaluate_all(actor.clip, times)[1])
 
 
-def test_part_of_a_clip_becomes_keys_on_its_frames(tmp_path):
+def test_part_of_a_clip_is_written_as_keys_on_its_frames(tmp_path):
     path, clip = tmp_path / "a.anim", keyed()
     again, notes = written(Actor(rig(), clip=clip), path, rate=10.0, frames=(2, 8))
     times = np.arange(2, 8) / 10
@@ -104,7 +104,7 @@ def test_part_of_a_clip_becomes_keys_on_its_frames(tmp_path):
 
 
 def test_error_between_frames_matches_hand_calculation(tmp_path):
-    """Frames at 0 and 1: with the slope of the span, a straight line; the clip is at 1.5."""
+    """Frames at 0 and 1 with the slope of the span are a straight line; the clip is at 1.5."""
     clip = Clip(
         "bump",
         (
@@ -128,15 +128,15 @@ def test_sampled_angles_are_unwrapped_beyond_180_degrees(tmp_path):
     again, notes = written(Actor(rig(), clip=turning(angles)), tmp_path / "a.anim")
     assert_allclose(again.channels[8].values, angles, atol=1e-9)
     assert_array_equal(again.channels[8].times, np.arange(12) / 2)
-    # Straight lines between angles about one axis are the shorter arc.
+    # Linear interpolation of angles about one axis follows the shorter arc.
     assert notes[0].endswith(", linear tangents") and len(notes) == 1
 
 
-def test_angles_of_limited_joints_stay_within_limits(tmp_path):
+def test_angles_of_limited_joints_are_within_the_limits(tmp_path):
     figure = rig(limits={"z": (-1.0, 1.0)})
     again, notes = written(Actor(figure, clip=turning([0.5, 2.0])), tmp_path / "a.anim")
     assert_allclose(again.channels[8].values, [0.5, 1.0], atol=1e-12)
-    # The joint itself does not move: only its rotation is wrong.
+    # The position of the joint is unchanged; only its rotation differs.
     assert len(notes) == 1
 
 
@@ -167,7 +167,7 @@ def test_gaps_split_into_files(tmp_path):
     assert not (tmp_path / "a.anim").exists()
 
 
-def test_placement_moves_the_root_and_leftovers_are_reported(tmp_path):
+def test_placement_moves_the_root_and_omitted_values_are_reported(tmp_path):
     places = np.array([[1.0, 2.0, 3.0], [2.0, 4.0, 6.0]])
     inner = np.zeros((2, 2, 3))
     inner[:, 1, 0] = 0.5
@@ -181,8 +181,8 @@ def test_placement_moves_the_root_and_leftovers_are_reported(tmp_path):
         ".anim translates only the root: translations of other joints, up to 0.5 "
         "units, are omitted",
     ]
-    # The figure in the file has a scale of 1 about the root's position, half of the scale here, and
-    # its second joint is at rest.
+    # The figure in the file has a scale of 1 about the root's position, half of the original scale,
+    # and its second joint is at rest.
     skeleton = rig().skeleton
     assert_array_equal(skeleton.parents, [-1, 0])
     root, offset = skeleton.rest_translations
@@ -234,7 +234,7 @@ def test_exporter_is_found_by_its_suffix():
 
 
 def test_written_clip_reproduces_the_poses_of_the_frames(tmp_path):
-    """All three axes, against explicit products of rotations."""
+    """All three axes are compared with explicit products of rotations."""
     rng = np.random.default_rng(4)
     angles = rng.uniform(-1.4, 1.4, (6, 3))
     turns = np.array([

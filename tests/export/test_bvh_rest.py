@@ -1,4 +1,4 @@
-"""BVH exports of figures with several parts or a rotated or scaled rest pose, and their angles."""
+"""BVH exports of figures with several roots or a rotated or scaled rest pose, and their angles."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_scales_at_rest_are_baked(tmp_path: Path) -> None:
     assert all(len(channels) == 3 for channels in found.channels[1:]) and len(notes) == 1
 
 
-def test_uneven_scales_give_position_channels(tmp_path: Path) -> None:
+def test_non_uniform_scales_are_written_as_position_channels(tmp_path: Path) -> None:
     skeleton = replace(chain(4), rest_scales=np.array([[2.0, 1.0, 0.5], *[[1.0] * 3] * 3]))
     animation = rig_animation(skeleton)
     found, notes = write(animation, tmp_path)
@@ -63,7 +63,7 @@ def test_uneven_scales_give_position_channels(tmp_path: Path) -> None:
     assert notes[1] == ("2 joints below the root translate and have position channels: c, d")
 
 
-def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_path: Path) -> None:
+def test_moving_joints_get_position_channels_and_shifted_joints_an_offset(tmp_path: Path) -> None:
     shifts = np.zeros((6, 4, 3))
     shifts[:, 1] = 0.25, 0.5, -1.0
     shifts[3:, 3, 0] = 2.0
@@ -75,7 +75,7 @@ def test_joints_that_move_get_position_channels_and_shifted_ones_an_offset(tmp_p
     assert notes[1] == ("1 joint below the root translates and has position channels: d")
 
 
-def test_scaled_figures(tmp_path: Path) -> None:
+def test_constant_scale_is_exact_and_changing_scale_is_reported(tmp_path: Path) -> None:
     animation = rig_animation(
         chain(), figure_scales=np.full(6, 2.5), figure_translations=np.ones((6, 3))
     )
@@ -116,7 +116,7 @@ def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path: Path) -> None
     assert notes[1] == "lengths are unchanged: the unit of rig is unknown"
 
 
-def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -> None:
+def test_end_sites_are_half_the_last_bone_or_end_at_the_skin(tmp_path: Path) -> None:
     found, _ = write(rig_animation(chain()), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.5, 0.25])
     boxes = np.zeros((3, 2, 3))
@@ -124,15 +124,15 @@ def test_end_sites_are_half_the_last_bone_or_reach_to_the_skin(tmp_path: Path) -
     found, _ = write(rig_animation(replace(chain(), boxes=boxes)), tmp_path)
     np.testing.assert_allclose(found.ends[2], [0, 0.75, 0])
     found, _ = write(rig_animation(chain(1)), tmp_path)
-    np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone gives its direction
+    np.testing.assert_allclose(found.ends[0], [0, 0.5, 0])  # no bone determines the direction
 
 
-def test_end_sites_of_the_bundled_body_lie_on_its_skin(tmp_path: Path) -> None:
+def test_end_sites_of_the_bundled_body_are_on_its_skin(tmp_path: Path) -> None:
     figure = viewer.load(bundled_body()).actors[0].figure
     found, _ = write(body_animation(figure, 2), tmp_path, unit="m")
     head = found.ends[found.names.index("head")]
     top = figure.mesh.positions[:, 1].max() - viewer.rig.shape.rest_joints(figure)[15, 1]
-    # Shape and slant of the neck move it by a few centimetres.
+    # Shape and slant of the neck move the end site by a few centimetres.
     assert head[1] == pytest.approx(top, abs=0.06)
 
 
@@ -162,7 +162,7 @@ def test_angles_reproduce_rotations_even_at_gimbal_lock(order: str, rows: list) 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
 @pytest.mark.parametrize("which", [0, 1, 2])
 def test_angles_are_unwrapped(order: str, which: int) -> None:
-    # One axis makes several full turns, and the middle angle passes 90 degrees.
+    # One axis rotates by several revolutions, and the middle angle passes 90 degrees.
     wanted = np.tile([0.3, 0.2, -0.4], (400, 1))
     wanted[:, which] += np.linspace(0, 15, 400)
     turns = np.array([angle_product(order, row) for row in wanted])
@@ -170,12 +170,12 @@ def test_angles_are_unwrapped(order: str, which: int) -> None:
     np.testing.assert_allclose(np.diff(found, axis=0), np.diff(wanted, axis=0), atol=1e-9)
 
 
-def test_a_gimbal_locked_frame_keeps_the_previous_angles() -> None:
+def test_gimbal_locked_frame_keeps_the_previous_angles() -> None:
     wanted = np.array([[1.0, 1.2, 0.5], [1.0, np.pi / 2, 0.5], [1.0, 1.3, 0.5]])
     for order in ROTATION_ORDERS:
         turns = np.array([angle_product(order, row) for row in wanted])
         np.testing.assert_allclose(unrolled(euler_angles(turns, order), order), wanted, atol=1e-8)
 
 
-def test_all_orders_are_offered() -> None:
+def test_all_rotation_orders_are_supported() -> None:
     assert sorted(ROTATION_ORDERS) == sorted("".join(p) for p in itertools.permutations("xyz"))

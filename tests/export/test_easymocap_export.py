@@ -1,4 +1,4 @@
-"""EasyMocap export: formulas, round trips through AMASS, gaps, people, errors."""
+"""EasyMocap export: formulas, round trips through AMASS, gaps, people, and errors."""
 
 import json
 from dataclasses import replace
@@ -18,7 +18,7 @@ from viewer.formats import Source, read
 from viewer.rig.motion.body_motion import body_clip
 from viewer.rig.motion.sampled_clip import joined
 
-ATOL = 1e-6  # metres and radians: seven decimals, summed along an arm
+ATOL = 1e-6  # in metres and radians, for seven decimals summed along an arm
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55, "mano": 16}
 
 
@@ -47,7 +47,7 @@ def written(animation, path, **options):
 
 
 def clip_of(path, figure, person=0):
-    """Return the clip of one person in a folder, all parts joined."""
+    """Return the clip of one person in a folder with all parts joined."""
     parts = [part.bodies[person] for part in read(Source.open(path)).parts() if part.bodies]
     clips = [body_clip(motion, figure)[0] for motion in parts]
     rows, shift = clips[0].timing.rows.copy(), clips[0].n_rows
@@ -62,7 +62,7 @@ def test_folder_finds_the_exporter():
 
 
 @pytest.mark.parametrize("kind", COUNTS)
-def test_records_place_the_body_by_the_formula(family, tmp_path, kind):
+def test_placement_in_records_follows_the_formula(family, tmp_path, kind):
     shape = waves(1, family(kind).blend_shapes.groups.count("shape"), seed=2.0)
     motion = family_motion(COUNTS[kind], shape=shape)
     frames, notes = written(family_animation(family(kind), motion), tmp_path / "out", world_up="z")
@@ -101,7 +101,7 @@ def test_text_matches_easymocap_output(family, tmp_path):
 
 
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
-def test_round_trip_through_amass(family, tmp_path, kind):
+def test_motion_round_trips_through_amass(family, tmp_path, kind):
     figure, motion = family(kind), family_motion(COUNTS[kind])
     written(family_animation(figure, motion), tmp_path / "a")
     there = animation_of_clip(figure, clip_of(tmp_path / "a", figure))
@@ -145,7 +145,7 @@ def test_recording_round_trips(shared_data, tmp_path):
                 assert_allclose(other[key], record[key], rtol=0, atol=ATOL)
 
 
-def test_people_and_gaps_end_up_in_the_same_files(family, tmp_path):
+def test_people_and_gaps_are_written_to_common_files(family, tmp_path):
     figure = family("smpl")
     first = family_animation(figure, family_motion(24, rows=np.array([0, -1, 1]), first_frame=5))
     second = family_animation(
@@ -172,7 +172,7 @@ def test_expression_is_written(family, tmp_path):
     assert_allclose(found, waves(4, 10, seed=5.0), rtol=0, atol=1e-7)
 
 
-def test_other_up_axis_rotates_rh_and_th(family, tmp_path):
+def test_different_up_axis_rotates_rh_and_th(family, tmp_path):
     animation = family_animation(family("smpl"), family_motion(24))
     frames, notes = written(animation, tmp_path / "out", up="z")
     quarter = rotation([np.pi / 2, 0, 0])
@@ -210,7 +210,7 @@ def test_other_files_are_never_deleted(family, tmp_path):
     assert [path.name for path in tmp_path.rglob("*")] == ["smpl", "000000.jpg"]
 
 
-def test_file_in_the_way_is_refused(family, tmp_path):
+def test_file_in_place_of_the_folder_is_refused(family, tmp_path):
     path = tmp_path / "out"
     path.write_text("mine")
     with pytest.raises(OutputError, match=r"out: expected a folder, found a file$"):
@@ -220,7 +220,7 @@ def test_file_in_the_way_is_refused(family, tmp_path):
 
 @pytest.mark.parametrize("problem", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 @pytest.mark.parametrize("exists", [False, True])
-def test_interrupted_export_leaves_what_was_there(family, tmp_path, monkeypatch, exists, problem):
+def test_interrupted_export_keeps_existing_files(family, tmp_path, monkeypatch, exists, problem):
     animation = family_animation(family("smpl"), family_motion(24))
     path = tmp_path / "out"
     if exists:
@@ -255,7 +255,11 @@ def test_people_must_be_compatible(family, tmp_path):
         ([], [], "expected at least one person to write, found none"),
         ([animation, animation], [1, 1], "expected a number for each of 2 people, found [1, 1]"),
         ([animation, other], None, "expected one frame rate for all people, found 25, 50"),
-        ([replace(animation, first_frame=-2)], None, "walk: expected frames from 0 on, found -2"),
+        (
+            [replace(animation, first_frame=-2)],
+            None,
+            "walk: expected frame numbers from 0, found -2",
+        ),
     ):
         with pytest.raises(RigError) as caught:
             easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)
@@ -266,7 +270,7 @@ def test_people_must_be_compatible(family, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_other_figures_are_refused(tmp_path):
+def test_figures_of_other_families_are_refused(tmp_path):
     import viewer
 
     scene = viewer.load()

@@ -1,4 +1,4 @@
-"""The BVH writer against an independent reader, for bodies, .skel-style rigs and other figures."""
+"""The BVH writer, compared with an independent reader for bodies, .skel-style rigs and others."""
 
 from __future__ import annotations
 
@@ -54,10 +54,10 @@ def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -
     assert notes[0] == (
         "PATH: 24 joints, 12 frames (0 to 11) at 30 fps, centimetres, y up, channels ZYX"
     )
-    assert len(notes) == 1  # nothing is lost, so nothing is reported
+    assert len(notes) == 1  # no loss is reported
 
 
-def test_the_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
+def test_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
     found, _ = write(body_animation(body), tmp_path)  # the second reader checks the grammar
     assert found.offsets[0] == [0.0, 0.0, 0.0]
     positions = ["Xposition", "Yposition", "Zposition"]
@@ -72,7 +72,7 @@ def test_the_file_uses_the_common_syntax(body: Figure, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("order", ROTATION_ORDERS)
-def test_every_rotation_order(body: Figure, order: str, tmp_path: Path) -> None:
+def test_every_rotation_order_is_written(body: Figure, order: str, tmp_path: Path) -> None:
     animation = body_animation(body, seed=3)
     found, notes = write(animation, tmp_path, rotation_order=order)
     assert_places(found, animation, 100.0)
@@ -82,7 +82,9 @@ def test_every_rotation_order(body: Figure, order: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("unit", "factor"), [("m", 1.0), ("cm", 100.0), ("mm", 1000.0)])
 @pytest.mark.parametrize("kind", ["smpl", "smplx"])
-def test_units_and_hands_and_face(kind: str, unit: str, factor: float, tmp_path: Path) -> None:
+def test_units_hands_and_face_are_written(
+    kind: str, unit: str, factor: float, tmp_path: Path
+) -> None:
     figure = family_figure(kind, tmp_path)
     animation = body_animation(figure)
     found, notes = write(animation, tmp_path, unit=unit)
@@ -101,17 +103,19 @@ def test_units_and_hands_and_face(kind: str, unit: str, factor: float, tmp_path:
         ("z", "", TO_Y),
     ],
 )
-def test_up_axes(body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: Path) -> None:
+def test_up_axis_of_the_file_rotates_the_motion(
+    body: Figure, world: str, up: str, turn: np.ndarray, tmp_path: Path
+) -> None:
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, world_up=world, up=up)
     assert_places(found, animation, 100.0, turn)
-    # With all channels 0 the rest pose is upright along the file's up axis.
+    # With channels of 0, the rest pose is upright along the up axis of the file.
     height = np.array(found.offsets[found.names.index("left_knee")])
     assert np.abs(height).argmax() == (2 if up == "z" else 1)
     assert f" {up or 'y'} up," in notes[0]
 
 
-def test_a_figure_with_z_up_rests_upright_in_a_y_up_file(tmp_path: Path) -> None:
+def test_figure_with_z_up_is_upright_at_rest_in_a_y_up_file(tmp_path: Path) -> None:
     animation = rig_animation(chain())
     animation = replace(animation, figure=replace(animation.figure, up="z"))
     found, _ = write(animation, tmp_path, world_up="z")
@@ -128,7 +132,7 @@ def test_frame_time_is_exact(body: Figure, rate: float, tmp_path: Path) -> None:
     assert again.clip.timing.frame_rate == pytest.approx(rate, rel=1e-8)
 
 
-def test_rest_frame_comes_first(body: Figure, tmp_path: Path) -> None:
+def test_rest_frame_is_first(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     found, notes = write(animation, tmp_path, rest_frame=True)
     assert_places(found, animation, 100.0, skip=1)
@@ -145,7 +149,7 @@ def test_offsets_are_those_of_the_shape(body: Figure, tmp_path: Path) -> None:
         np.testing.assert_allclose(offset, 100 * shaped.rest_translations[joint], atol=1e-6)
 
 
-def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
+def test_error_of_a_changing_shape_is_reported(tmp_path: Path) -> None:
     figure = family_figure("smpl", tmp_path)
     animation = body_animation(figure)
     weights = np.repeat(animation.frames.shape_weights, 12, axis=0)
@@ -169,10 +173,10 @@ def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
     )
     assert said and said[2] == found_names[joint]
     assert float(said[1]) == pytest.approx(10 * off.max(), rel=5e-3)  # three digits are printed
-    # Calculated without the exporter: the skin in the shape of frame 0, on the joints of frame 7.
+    # The expected error is that of the skin in the shape of frame 0 on the joints of frame 7.
     assert float(said[3]) > float(said[1])
     assert notes[2] == "the shape changes over time: bone lengths are those of frame 0"
-    # The root is unchanged; the others follow it in the first frame's shape.
+    # The root is unchanged; other joints follow it in the shape of the first frame.
     np.testing.assert_allclose(
         found.places(7)["pelvis"], 100 * joints_of(changing)[7, 0], atol=1e-5
     )
@@ -181,7 +185,7 @@ def test_a_changing_shape_is_reported_with_its_size(tmp_path: Path) -> None:
 GAPS = [0, 1, -1, -1, 2, 3, -1, 4, -1]
 
 
-def test_gaps_hold_the_last_pose(body: Figure, tmp_path: Path) -> None:
+def test_last_pose_is_held_in_gaps(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body, 5, GAPS)
     found, notes = write(animation, tmp_path)
     assert_places(found, animation, 100.0)
@@ -191,7 +195,7 @@ def test_gaps_hold_the_last_pose(body: Figure, tmp_path: Path) -> None:
     assert len(notes) == 2
 
 
-def test_a_gap_at_the_start_holds_the_first_pose(body: Figure, tmp_path: Path) -> None:
+def test_first_pose_is_held_in_a_gap_at_the_start(body: Figure, tmp_path: Path) -> None:
     found, notes = write(body_animation(body, 2, [-1, -1, 0, 1]), tmp_path)
     assert found.frames[0] == found.frames[1] == found.frames[2] != found.frames[3]
     assert notes[1] == "missing frames 0 to 1: the last pose is held"
@@ -226,7 +230,7 @@ def test_gaps_split_into_files(body: Figure, tmp_path: Path) -> None:
     assert notes[-1] == "missing frames 2 to 3, 6, 8: one file for each run of frames"
 
 
-def test_one_failing_file_of_several_leaves_none(body: Figure, tmp_path: Path) -> None:
+def test_failure_of_one_file_removes_all_files(body: Figure, tmp_path: Path) -> None:
     (tmp_path / "out-1.bvh").write_text("old")
     (tmp_path / "out-3.bvh").mkdir()
     with pytest.raises(OutputError):
@@ -238,14 +242,14 @@ def test_one_failing_file_of_several_leaves_none(body: Figure, tmp_path: Path) -
 
 
 @pytest.mark.parametrize("unit", ["m", "cm"])
-def test_the_bundled_body_is_exact(unit: str, tmp_path: Path) -> None:
+def test_bundled_body_is_exact(unit: str, tmp_path: Path) -> None:
     animation = body_animation(viewer.load(bundled_body()).actors[0].figure, 20, seed=7)
     found, notes = write(animation, tmp_path, unit=unit)
     assert_places(found, animation, {"m": 1.0, "cm": 100.0}[unit])
     assert len(notes) == 1
 
 
-def test_the_wasp_walks_in_and_out(shared: Path, tmp_path: Path) -> None:
+def test_motion_of_the_wasp_round_trips(shared: Path, tmp_path: Path) -> None:
     actor = viewer.load(shared / "wasp.skel", shared / "wasp_walk.anim").actors[0]
     animation = sample_animation(actor)
     found, _ = write(animation, tmp_path)
@@ -256,7 +260,7 @@ def test_the_wasp_walks_in_and_out(shared: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(joints_of(again), joints_of(animation), atol=1e-6)
 
 
-def test_a_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
+def test_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
     first, _ = write(rig_animation(chain(4)), tmp_path)
     motion = bvh.read(Source.open(tmp_path / "out.bvh"))
     animation = sample_animation(Actor(motion.figure, clip=motion.clip))
@@ -266,7 +270,7 @@ def test_a_bvh_round_trips_with_its_end_sites(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_keyed_clips_with_root_translation(tmp_path: Path) -> None:
+def test_keyed_clips_with_root_translation_are_written(tmp_path: Path) -> None:
     figure = viewer.load().actors[0].figure
     rng = np.random.default_rng(2)
     channels = tuple(
@@ -295,7 +299,7 @@ def test_fewer_digits_lose_precision_with_a_note(body: Figure, tmp_path: Path) -
     assert said > 0.01
 
 
-def test_a_file_moves_the_body_it_was_made_from(body: Figure, tmp_path: Path) -> None:
+def test_file_drives_the_body_from_which_it_was_written(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     flat = replace(animation.frames, shape_weights=np.zeros((1, body.n_shapes)))
     animation = replace(animation, frames=flat)

@@ -1,4 +1,4 @@
-"""Posed arrays as ``.npz``: contents for programs other than the viewer."""
+"""Posed arrays as ``.npz`` for other programs."""
 
 import zipfile
 
@@ -24,13 +24,13 @@ EXACT = 1e-12  # metres; sums of a few dozen values below 2
 
 
 def write(tmp_path, actor, name="out.npz"):
-    """Write and return the arrays; object arrays are refused."""
+    """Write and return the arrays without allowing object arrays."""
     export(actor, tmp_path / name)
     with np.load(tmp_path / name, allow_pickle=False) as archive:
         return dict(archive)
 
 
-def test_every_part_is_named(tmp_path):
+def test_every_part_has_its_key(tmp_path):
     arrays = write(tmp_path, seamed_actor(up="z", unit="m"))
     assert (str(arrays["name"]), str(arrays["up"]), str(arrays["unit"])) == ("roof", "z", "m")
     assert_array_equal(arrays["vertices"], POSITIONS)
@@ -42,15 +42,15 @@ def test_every_part_is_named(tmp_path):
     assert arrays["parents"].tolist() == [-1, 0]
     assert_array_equal(arrays["joints"], [[0, 0, 0], [1, 0, 0]])
     assert arrays["vertices"].dtype == arrays["world"].dtype == np.float64
-    assert arrays["own_numbers"].tolist() == [0] * 6  # DOFs, if there are no other values
+    assert arrays["own_numbers"].tolist() == [0] * 6  # without a pose layout, these are the DOFs
 
 
-def test_world_matrices_hold_the_joints(tmp_path):
+def test_world_matrices_are_those_of_the_joints(tmp_path):
     actor = seamed_actor()
     actor.pose.dofs[:] = 0, 0, np.pi / 2, 0, np.pi / 2, 0  # root about z, tip about y
     actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [0, 0, 3]
     arrays = write(tmp_path, actor)
-    # The tip is at (1, 0, 0), rotated to (0, 1, 0), scaled by 2, and moved up by 3.
+    # The tip at (1, 0, 0) is rotated to (0, 1, 0), scaled by 2, and moved up by 3.
     assert_allclose(arrays["joints"], [[0, 0, 3], [0, 2, 3]], rtol=0, atol=EXACT)
     assert_array_equal(arrays["world"][:, :3, 3], arrays["joints"])
     about_z = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
@@ -78,34 +78,34 @@ def test_body_model_writes_raw_pose_values(tmp_path):
     assert "uvs" not in arrays and str(arrays["unit"]) == "m"
 
 
-def test_animal_gives_translation_rotations_and_scale(tmp_path):
+def test_animal_has_translation_rotations_and_scale(tmp_path):
     actor = viewer.load(write_pig(tmp_path / "pig")).actors[0]
     actor.pose.dofs[:3] = 0.1, 0.2, 0.3
     actor.pose.dofs[6] = 0.5  # joint 2 about x
     actor.pose.figure_scale, actor.pose.figure_translation[:] = 1.25, [1, 2, 3]
-    numbers = [1, 2, 3, 0.3, 0.2, 0.1, 0, 0, 0, 0.5, 0, 0, 1.25]  # the root's angles about z, y, x
+    numbers = [1, 2, 3, 0.3, 0.2, 0.1, 0, 0, 0, 0.5, 0, 0, 1.25]  # angles of the root about z, y, x
     arrays = write(tmp_path, actor)
     assert_allclose(arrays["own_numbers"], numbers, rtol=0, atol=EXACT)
 
 
-def test_skeleton_alone_has_joints_and_no_mesh(tmp_path):
+def test_skeleton_without_mesh_has_only_joints(tmp_path):
     joints = ball_skeleton(("root",), np.array([-1]), np.array([[1.0, 2, 3]]))
     arrays = write(tmp_path, Actor(Figure("bones", skeleton=joints)))
     assert not {"vertices", "normals", "triangles", "uvs"} & set(arrays)
     assert_array_equal(arrays["joints"], [[1, 2, 3]])
 
 
-def test_mesh_alone_has_no_joints(tmp_path):
+def test_mesh_without_skeleton_has_no_joints(tmp_path):
     arrays = write(tmp_path, Actor(Figure("roof", seamed_mesh(uvs=False))))
     assert set(arrays) == {"name", "up", "unit", "vertices", "normals", "triangles"}
 
 
 @pytest.mark.parametrize("name", ["é 文", "two\nlines", "a\udcffb", ""])
-def test_odd_names_are_kept(tmp_path, name):
+def test_unusual_names_are_kept(tmp_path, name):
     assert str(write(tmp_path, seamed_actor(name))["name"]) == name
 
 
-def test_same_pose_gives_the_same_bytes(tmp_path):
+def test_equal_poses_are_written_as_equal_bytes(tmp_path):
     write(tmp_path, seamed_actor(), "a.npz")
     write(tmp_path, seamed_actor(), "b.npz")
     assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
@@ -134,7 +134,7 @@ def sampled_points(present=(True, False)):
     return SampledPoints("two 4", LAYOUT, 10.0, 7, times, np.array(present), points, confidences)
 
 
-def test_points_of_all_frames(tmp_path):
+def test_points_of_all_frames_are_written(tmp_path):
     path = tmp_path / "two.npz"
     (note,) = export_points(sampled_points(), path, MotionOptions(world_up="z"))
     assert str(note) == (
@@ -169,14 +169,14 @@ def test_unsupported_point_options_are_refused(tmp_path, options, present, messa
     assert str(caught.value) == message and not any(tmp_path.iterdir())
 
 
-def test_points_at_one_time(tmp_path):
+def test_points_at_one_time_are_written(tmp_path):
     points = np.array([[1.0, 2.0, 3.0, 0.5], [9.0, 9.0, 9.0, 0.0]])
     arrays = write(tmp_path, Actor(Figure("two", points=LAYOUT, up="z"), points=points))
     assert str(arrays["up"]) == "z" and arrays["confidences"].tolist() == [0.5, 0.0]
     assert_array_equal(arrays["points"], [[1.0, 2.0, 3.0], [np.nan] * 3])
 
 
-def test_points_are_rotated_to_another_up_axis(tmp_path):
+def test_points_are_rotated_to_a_different_up_axis(tmp_path):
     layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), np.zeros(2))
     rows = np.array([[[1.0, 2.0, 3.0], [np.nan] * 3]])
     animation = SampledPoints(
@@ -185,6 +185,6 @@ def test_points_are_rotated_to_another_up_axis(tmp_path):
     export_points(animation, tmp_path / "p.npz", MotionOptions(up="z", world_up="y"))
     with np.load(tmp_path / "p.npz") as arrays:
         assert str(arrays["up"]) == "z"
-        # y, which points up, becomes z: (x, y, z) to (x, -z, y).
+        # The up axis y becomes z: (x, y, z) to (x, -z, y).
         assert_array_equal(arrays["points"][0, 0], [1.0, -3.0, 2.0])
         assert np.isnan(arrays["points"][0, 1]).all()

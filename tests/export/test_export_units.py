@@ -1,4 +1,4 @@
-"""Figures in centimetres and other units, through every writer that handles units."""
+"""Figures in centimetres and other units, written by every exporter that handles units."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.smpl_family import FAMILY
 
 GUESS = "centimetres assumed (skeleton 170 high); --unit overrides it"
-TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # y up to z up
+TO_Z = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up to z up
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def bvh_places(path, frame=1):
         (["--to-unit", "in"], 1 / 0.0254, "inches"),
     ],
 )
-def test_a_guessed_unit_is_used_for_bvh_and_reported_once(
+def test_estimated_unit_is_used_for_bvh_and_reported_once(
     walk, tmp_path, capsys, options, factor, word
 ):
     out = tmp_path / "out.bvh"
@@ -73,7 +73,7 @@ def test_a_guessed_unit_is_used_for_bvh_and_reported_once(
 @pytest.mark.parametrize(
     ("unit", "metres"), [("m", 1), ("cm", 0.01), ("mm", 0.001), ("in", 0.0254)]
 )
-def test_a_requested_unit_is_used_without_a_note(walk, tmp_path, capsys, unit, metres):
+def test_requested_unit_is_used_without_a_note(walk, tmp_path, capsys, unit, metres):
     out = tmp_path / "out.bvh"
     assert run(["convert", str(walk), "--unit", unit, "--to-unit", "m", "-o", str(out)]) == 0
     wanted = 100.0 * metres * np.array(PERSON_TURNED)
@@ -82,8 +82,8 @@ def test_a_requested_unit_is_used_without_a_note(walk, tmp_path, capsys, unit, m
     assert error == "" and "differ" not in text
 
 
-def test_the_error_in_millimetres_uses_the_unit_of_the_file(tmp_path):
-    # Rounding removes 0.04 cm from each coordinate that has it: 0.4 mm along each axis.
+def test_error_in_millimetres_uses_the_unit_of_the_file(tmp_path):
+    # Rounding removes the 0.04 cm of each coordinate, 0.4 mm along each axis.
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.array([[0, 0, 0], [0, 100.0, 0]]))
     turns = np.tile([0.0, 0, 0, 1], (1, 2, 1))
     shifts = np.array([[[7.04, 0.0, 0.0], [0.0, 0.0, 0.0]]])
@@ -138,7 +138,7 @@ ROOT = np.array([1.0, 95.0, 2.0])  # centimetres: J0
 
 
 def smpl_animation(unit="cm", n_frames=3):
-    """Return a bare skeleton with SMPL's joints, its joint positions and its root rotations."""
+    """Return a bare skeleton with the joints of SMPL, joint positions and root rotations."""
     names = FAMILY[24].names
     joints = ROOT + np.arange(24)[:, None] * [0.0, 3.0, 0.5]
     parents = np.arange(24) - 1
@@ -153,7 +153,7 @@ def smpl_animation(unit="cm", n_frames=3):
 
 
 @pytest.mark.parametrize("up", ["", "z"])
-def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
+def test_amass_of_a_skeleton_is_in_metres_relative_to_its_root(tmp_path, up):
     animation, vectors, places = smpl_animation()
     notes = faults.lines(
         export_animation(animation, tmp_path / "a.npz", "amass", MotionOptions(up=up))
@@ -161,7 +161,7 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     turn = TO_Z if up else np.eye(3)
     with np.load(tmp_path / "a.npz") as arrays:
         for frame in range(3):
-            # V = R (X - J0) + J0 + transl, of the pelvis X = J0, is where the pelvis is.
+            # For the pelvis X = J0, V = R (X - J0) + J0 + transl is its position.
             found = 0.01 * ROOT + arrays["trans"][frame]
             assert_allclose(found, 0.01 * turn @ places[frame], rtol=0, atol=1e-12)
             poses = arrays["poses"][frame].reshape(24, 3)
@@ -171,7 +171,8 @@ def test_amass_of_a_skeleton_is_in_metres_from_its_own_root(tmp_path, up):
     assert notes[1:] == [
         "lengths were converted from centimetres to metres",
         "translations are relative to the skeleton's root at rest, (0.01, 0.95, 0.02) m: a model "
-        "with another rest root is offset by the difference (use --model for exact translations)",
+        "with a different root position at rest is offset by the difference (use --model for exact "
+        "translations)",
     ]
 
 
@@ -182,7 +183,7 @@ def test_easymocap_of_a_skeleton_rotates_about_the_origin(tmp_path):
     )
     for frame in range(3):
         (record,) = json.loads((tmp_path / "out" / "smpl" / f"{frame:06}.json").read_text())
-        # V = R X + T, of the pelvis X = J0.
+        # For the pelvis X = J0, the position is V = R X + T.
         found = rotation(np.array(record["Rh"][0])) @ (0.01 * ROOT) + record["Th"][0]
         assert_allclose(found, 0.01 * places[frame], rtol=0, atol=1e-6)
         assert_allclose(record["Rh"][0], vectors[frame, 0], rtol=0, atol=1e-6)
@@ -204,7 +205,7 @@ def test_skeletons_of_unknown_unit_are_refused(tmp_path, kind, what):
 
 
 @pytest.mark.parametrize(("kind", "title"), [("amass", "AMASS"), ("easymocap", "EasyMocap")])
-def test_other_units_than_metres_are_refused_for_the_family(tmp_path, kind, title):
+def test_units_other_than_metres_are_refused_for_the_smpl_family(tmp_path, kind, title):
     animation, _, _ = smpl_animation("m")
     with pytest.raises(RigError) as caught:
         export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="cm"))
@@ -213,7 +214,7 @@ def test_other_units_than_metres_are_refused_for_the_family(tmp_path, kind, titl
     assert export_animation(animation, tmp_path / "out.npz", kind, MotionOptions(unit="m"))
 
 
-def test_obj_says_its_unit(tmp_path):
+def test_obj_states_its_unit(tmp_path):
     actor = seamed_actor(unit="cm")
     export(actor, tmp_path / "a.obj")
     assert (tmp_path / "a.obj").read_text().startswith("# roof: y up, centimetres\n")
@@ -221,7 +222,7 @@ def test_obj_says_its_unit(tmp_path):
     assert (tmp_path / "a.obj").read_text().startswith("# roof: y up\n")
 
 
-def test_end_sites_without_bones_have_one_length_in_any_unit(tmp_path):
+def test_end_sites_without_bones_have_equal_length_in_any_unit(tmp_path):
     skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))
     turns = np.tile([0.0, 0, 0, 1], (1, 1, 1))
     clip = SampledClip("a", Timing(30.0, np.arange(1)), turns)

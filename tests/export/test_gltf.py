@@ -58,9 +58,10 @@ def test_roof_round_trips(tmp_path):
 
 def test_two_bent_joints_match_hand_calculation(tmp_path):
     actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
-    actor.pose.dofs[:] = 0, 0, 0, 0, 0, np.pi / 2  # the tip, at (1, 0, 0), about z
+    actor.pose.dofs[:] = 0, 0, 0, 0, 0, np.pi / 2  # the tip at (1, 0, 0), about z
     gltf, _ = write(tmp_path, actor)
-    # Vertex 3 belongs half to each: (1, 2, 1) stays, or goes to (1, 0, 0) + (-2, 0, 1).
+    # Vertex 3 has equal weights: (1, 2, 1) stays for one joint and moves to (1, 0, 0) + (-2, 0, 1)
+    # for the other.
     wanted = [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 1, 1], [3, 3, 3]]
     assert_allclose(gltf.vertices()[0], wanted, rtol=0, atol=EXACT)
     tip = gltf.nodes[gltf.named("tip")]
@@ -114,19 +115,19 @@ def test_body_is_baked_in_shape_and_pose(tmp_path):
         "not stored in glTF: 10 blend shapes (baked into the mesh), pose correctives, "
         "the symmetry map, the joint regressor",
     ]
-    # The placement is a node above the skeleton, and moves nothing else.
+    # The placement is a node above the skeleton and has no other effect.
     node = gltf.nodes[gltf.named(actor.figure.name)]
     assert node["translation"] == [0.5, -1, 2] and node["scale"] == [1.25] * 3
 
 
-def test_shaped_body_agrees_with_the_plain_formula(tmp_path):
+def test_shaped_body_matches_the_plain_formula(tmp_path):
     arrays = model("smpl", 48)
     figure = family_figure("smpl", tmp_path, 48)
     actor = Actor(figure)
     vectors = np.zeros((24, 3))
     vectors[1], vectors[16] = [0, 0, 0.5], [0.3, 0, 0]
     actor.pose.shape_weights[:2] = 1.5, -2
-    actor.pose.dofs[:] = vectors.ravel()  # one axis each: angles are rotation vectors
+    actor.pose.dofs[:] = vectors.ravel()  # with one axis each, angles are rotation vectors
     gltf, _ = write(tmp_path, actor)
     wanted, joints = smpl_forward(arrays, [1.5, -2], vectors, correct=False)
     assert_allclose(gltf.vertices()[0], wanted, rtol=0, atol=5e-6)
@@ -140,7 +141,7 @@ def test_skel_and_skin_rig_is_exported(tmp_path):
     turn = np.flatnonzero(
         (actor.figure.skeleton.dof_joints == knee) & (actor.figure.skeleton.dof_kinds == 4)
     )
-    actor.pose.dofs[turn] = np.pi / 2  # about y: (1, y, 0) goes to (0, y, -1)
+    actor.pose.dofs[turn] = np.pi / 2  # about y, (1, y, 0) moves to (0, y, -1)
     gltf, _ = write(tmp_path, actor)
     assert_allclose(gltf.vertices()[0], [[1, 0, 0], [0.5, 1, -0.5], [0, 2, -1]], rtol=0, atol=EXACT)
 
@@ -155,7 +156,7 @@ def test_z_up_is_rotated_by_a_node(tmp_path):
     assert notes[1:] == ["z is up: a node above the figure rotates it by -90 degrees about x"]
 
 
-def test_materials_become_primitives_with_textures(tmp_path):
+def test_materials_are_written_as_primitives_with_textures(tmp_path):
     pictures = (PICTURE, None, OTHER_PICTURE, PICTURE)
     mesh = seamed_mesh(pictures=pictures, of_triangle=np.array([2, -1, 0]))
     actor = seamed_actor(mesh=mesh, unit="m")
@@ -170,7 +171,7 @@ def test_materials_become_primitives_with_textures(tmp_path):
         source = gltf.root["textures"][texture]["source"]
         with Image.open(io.BytesIO(gltf.picture(source))) as picture:
             assert_array_equal(picture.convert("RGBA"), wanted)
-    assert gltf.root["samplers"][0]["wrapS"] == 33071  # clamped at the edges, as the viewer does
+    assert gltf.root["samplers"][0]["wrapS"] == 33071  # clamped at the edges as in the viewer
 
 
 def test_shared_texture_is_written_once(tmp_path):
@@ -186,7 +187,7 @@ def test_texture_without_coordinates_is_omitted(tmp_path):
     assert "textures" not in gltf.root and "TEXCOORD_0" not in gltf.primitives[0]["attributes"]
 
 
-def test_morphs_are_targets(tmp_path):
+def test_morphs_are_written_as_morph_targets(tmp_path):
     figure = seamed_actor(mesh=seamed_mesh(uvs=False), unit="m").figure
     targets = [
         MorphTarget("lift", [1, 3], [[1, 0, 2], [1, 2, 5]], [[0, 0, 1], [1, 0, 0]]),
@@ -207,7 +208,7 @@ def test_morphs_are_targets(tmp_path):
     assert notes[1:] == ["2 blend shapes are morph targets", "not stored in glTF: 1 blend shape"]
 
 
-def test_too_many_morphs_are_baked_in(tmp_path):
+def test_too_many_morphs_are_baked_into_the_mesh(tmp_path):
     figure = seamed_actor(unit="m").figure
     targets = [MorphTarget(f"t{k}", [0], [[0, 0, k]]) for k in range(1, 66)]
     actor = Actor(with_morphs(figure, targets))
@@ -219,7 +220,7 @@ def test_too_many_morphs_are_baked_in(tmp_path):
     assert notes[2] == "not stored in glTF: 65 blend shapes (baked into the mesh)"
 
 
-def test_skeleton_alone(tmp_path):
+def test_skeleton_without_mesh_is_written(tmp_path):
     skeleton = ball_skeleton(("a", "a", ""), np.array([-1, 0, -1]), np.eye(3))
     gltf, notes = write(tmp_path, Actor(Figure("bare", skeleton=skeleton, unit="m")))
     assert "meshes" not in gltf.root and "buffers" not in gltf.root
@@ -230,7 +231,7 @@ def test_skeleton_alone(tmp_path):
     assert notes == [f"{tmp_path / 'out.glb'}: 3 joints, {size} bytes"]
 
 
-def test_mesh_alone_and_mesh_that_is_not_bound(tmp_path):
+def test_mesh_without_skeleton_and_unbound_mesh_are_written(tmp_path):
     gltf, notes = write(tmp_path, Actor(Figure("stone", seamed_mesh(), up="z", unit="m")))
     assert_allclose(corners(gltf, gltf.vertices()[0]), POSITIONS[TRIANGLES] @ TO_Y.T, atol=EXACT)
     assert "skins" not in gltf.root and "3 triangles, " in notes[0]
@@ -240,11 +241,11 @@ def test_mesh_alone_and_mesh_that_is_not_bound(tmp_path):
     assert_allclose(corners(gltf, gltf.vertices()[0])[..., 1], POSITIONS[TRIANGLES][..., 1] + 7)
 
 
-def test_points_without_triangles_and_empty_figures(tmp_path):
+def test_points_without_triangles_and_empty_figures_are_written(tmp_path):
     actor = seamed_actor(mesh=Mesh(POSITIONS, np.zeros((5, 3)), np.zeros((0, 3))), unit="m")
     gltf, _ = write(tmp_path, actor)
     assert_allclose(gltf.vertices()[0], POSITIONS, rtol=0, atol=0)
-    assert gltf.vertices()[1].tolist() == [[0, 1, 0]] * 5  # where no vertex has a normal
+    assert gltf.vertices()[1].tolist() == [[0, 1, 0]] * 5  # no vertex has a normal here
     mesh = Mesh(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)))
     skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))
     skin = skin_from_lists([], np.eye(4)[None])
@@ -265,7 +266,7 @@ def test_gltf_and_bin_files_are_written_together(tmp_path):
     assert files_written("x.gltf")[1].name == "x.bin" and len(files_written("x.glb")) == 1
 
 
-def test_both_files_are_written_or_none(tmp_path):
+def test_either_both_files_are_written_or_none(tmp_path):
     (tmp_path / "roof.gltf").write_text("before")
     (tmp_path / "roof.bin").mkdir()
     with pytest.raises(OutputError, match=r"roof\.bin: is a folder"):

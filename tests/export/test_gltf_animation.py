@@ -29,7 +29,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skinning import Skinning, deform
 
 LIMIT = "not stored in glTF"
-ROOM = 3e-5  # metres: keys in single precision, accumulated along a body's longest chain
+ROOM = 3e-5  # in metres, for keys in single precision accumulated along the longest chain of a body
 
 
 def quaternions(vectors) -> np.ndarray:
@@ -39,12 +39,12 @@ def quaternions(vectors) -> np.ndarray:
 
 
 def roof_animation(rows=None, count=4, rate=10.0, **tracks) -> SampledAnimation:
-    """Return the roof's joints rotating ever further about z, with quaternions of either sign."""
+    """Return the roof with joints that rotate about z, and quaternions of either sign."""
     vectors = np.zeros((count, 2, 3))
     vectors[:, 0, 2] = 0.5 * np.arange(count)
     vectors[:, 1, 2] = -0.25 * np.arange(count)
     rotations = quaternions(vectors)
-    rotations[1::2] *= -1.0  # the same rotations
+    rotations[1::2] *= -1.0  # the same rotations with other signs
     timing = Timing(rate, np.arange(count) if rows is None else rows, 7)
     figure = tracks.pop("figure", None) or seamed_actor(unit="m").figure
     clip = SampledClip("bend", timing, rotations, **tracks)
@@ -74,7 +74,7 @@ def test_frames_are_keys(tmp_path):
     assert [channel["target"]["path"] for channel in played["channels"]] == ["rotation"] * 2
     times = gltf.accessor(played["samplers"][0]["input"])
     assert_allclose(times, [0, 0.1, 0.2, 0.3], rtol=1e-7)
-    # Half-way between two frames, on the shorter arc: the root has turned by 0.75.
+    # Half-way between two frames on the shorter arc, the root has rotated by 0.75.
     node = gltf.transforms(0.15)[gltf.named("root")]
     wanted = np.array([0, 0, np.sin(0.375), np.cos(0.375)])
     assert_allclose(np.abs(node["rotation"]), wanted, rtol=0, atol=EXACT)
@@ -83,14 +83,14 @@ def test_frames_are_keys(tmp_path):
         f"{tmp_path / 'out.glb'}: 7 vertices (5 before they were split along texture seams), "
         f"3 triangles, 2 joints, 4 frames (7 to 10) at 10 fps, {size} bytes"
     ]
-    # Programs that do not play it show the rest pose.
+    # Programs that do not play animations show the rest pose.
     assert_drawn(gltf, animation.figure, Actor(animation.figure).pose)
 
 
-def test_moving_rows_get_channels(tmp_path):
+def test_moving_joints_get_channels(tmp_path):
     moves = np.zeros((4, 2, 3))
     moves[:, 0, 0] = [0, 1, 2, 3]
-    moves[:, 1] = 0, 0, 4  # shifted, but still
+    moves[:, 1] = 0, 0, 4  # shifted but constant
     places = np.arange(12.0).reshape(4, 3)
     scales = np.array([1.0, 2, 2, 3])
     animation = roof_animation(translations=moves, figure_translations=places, figure_scales=scales)
@@ -125,7 +125,7 @@ def test_constant_placement_gets_no_channel(tmp_path):
         ("interpolate", [0, 0, 0.5, 5 / 6, 7 / 6, 1.5, 1.5], "interpolated, held at both ends"),
     ],
 )
-def test_gaps_are_closed(tmp_path, gaps, angles, text):
+def test_poses_in_gaps_are_held_or_interpolated(tmp_path, gaps, angles, text):
     animation = roof_animation(rows=[-1, 0, 1, -1, -1, 3, -1])
     gltf, notes = write(tmp_path, animation, gaps=gaps)
     for frame, angle in enumerate(angles):
@@ -169,20 +169,20 @@ def test_keyed_clip_is_sampled(tmp_path):
     gltf, notes = write(tmp_path, animation)
     assert "11 frames (0 to 10) at 5 fps" in notes[0]
     rest = gltf.vertices()[0]
-    # 2 units per second along x, also between frames.
+    # The root moves by 2 units per second along x, also between frames.
     for time in (0.0, 0.6, 1.1, 2.0):
         found = gltf.vertices(time)[0] - rest
         assert_allclose(found, [[2 * time, 0, 0]] * 3, rtol=0, atol=EXACT)
 
 
-def test_fox_moves(tmp_path):
+def test_animated_fox_matches_its_frames(tmp_path):
     figure = viewer.load().actors[0].figure
     rotations = quaternions(waves(6, figure.skeleton.n_joints, 3))
     clip = SampledClip("wave", Timing(24.0, np.arange(6)), rotations)
     animation = sample_animation(Actor(figure, clip=clip))
     gltf, _ = write(tmp_path, animation)
     played = 6 - 1
-    # As in the frames: the fox's joint limits are not applied to a motion.
+    # The joint limits of the fox are not applied to a motion, as in the frames.
     skin = figure.skin
     palette = world_frames(figure, animation.frames)[played] @ skin.inverse_bind
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
@@ -197,7 +197,7 @@ def test_fox_moves(tmp_path):
 
 
 @pytest.mark.slow
-def test_body_with_correctives_and_shape(tmp_path):
+def test_error_of_a_body_with_correctives_and_shape_is_reported(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
     animation = family_animation(figure, family_motion(24, frames=40))
     gltf, notes = write(tmp_path, animation)
@@ -257,14 +257,14 @@ def test_changing_morphs_are_animated(tmp_path):
     assert gltf.root["meshes"][0]["weights"] == [0.5]
 
 
-def test_up_axis_is_taken_from_the_frames(tmp_path):
+def test_up_axis_is_that_of_the_frames(tmp_path):
     animation = roof_animation(figure_translations=np.arange(12.0).reshape(4, 3))
     gltf, notes = write(tmp_path, animation, world_up="z")
     assert_played(gltf, animation, TO_Y)
     assert notes[1:] == ["z is up: a node above the figure rotates it by -90 degrees about x"]
 
 
-def test_skeleton_alone_moves(tmp_path):
+def test_skeleton_without_mesh_is_animated(tmp_path):
     joints = np.array([[0, 1, 0], [0, 2, 0]], dtype=float)
     skeleton = ball_skeleton(("low", "high"), np.array([-1, 0]), joints)
     animation = roof_animation(figure=Figure("bare", skeleton=skeleton, unit="m"))
@@ -291,8 +291,8 @@ def test_other_skinning_is_the_reference_for_losses(tmp_path):
     )
 
 
-def test_long_animations_stay_small_and_exact(tmp_path):
-    """Ten thousand frames: every key has its exact time and value."""
+def test_long_animations_are_small_and_exact(tmp_path):
+    """All keys of ten thousand frames have exact times and values."""
     count = 10_000
     skeleton = ball_skeleton(("a", "b"), np.array([-1, 0]), np.eye(3)[:2])
     animation = roof_animation(count=count, rate=120.0, figure=Figure("bare", skeleton=skeleton))
@@ -329,7 +329,7 @@ def test_invalid_animations_are_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_registry_offers_motion_and_pose(tmp_path):
+def test_registry_lists_motion_and_pose(tmp_path):
     kind = EXPORTERS["gltf"]
     assert kind.suffixes == (".glb", ".gltf") and kind.writes_pose and kind.writes_motion
     gltf, _ = write(tmp_path, roof_animation(), "x.GLTF")

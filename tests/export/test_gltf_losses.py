@@ -47,7 +47,8 @@ def test_all_thirteen_influences_are_written(tmp_path):
     assert_drawn(gltf, actor.figure, actor.pose)
     sets = gltf.influence_sets()
     assert len(sets) == 4
-    # The strongest first: joint 12 with 13/91, then 11, and so on; unused slots are 0.
+    # The strongest influences are first: joint 12 with 13/91, then 11, and so on; unused slots are
+    # 0.
     assert np.concatenate([j[1] for j, _ in sets]).tolist() == [*range(12, -1, -1), 0, 0, 0]
     weights = np.concatenate([w[1] for _, w in sets])
     assert_allclose(weights[:13], shares[::-1], rtol=1e-6)
@@ -56,12 +57,13 @@ def test_all_thirteen_influences_are_written(tmp_path):
 
 
 def test_weights_are_normalised_and_the_largest_displacement_is_reported(tmp_path):
-    # Vertex 1 at (1, 0, 0) weighs 0.5: as stored it is drawn at (0.5, 0, 0), half a metre away.
-    # Vertex 3 at (1, 2, 1) weighs 1.1: drawn at (1.1, 2.2, 1.1), 0.1 sqrt(6) away.
+    # Vertex 1 at (1, 0, 0) has a weight sum of 0.5, so it is drawn at (0.5, 0, 0), half a metre
+    # away. Vertex 3 at (1, 2, 1) has a sum of 1.1 and is drawn at (1.1, 2.2, 1.1), 0.1 sqrt(6)
+    # away.
     rows = ((1.0, 0.0), (0.0, 0.5), (1.0, 0.0), (0.6, 0.5), (1.0, 0.0))
     actor = seamed_actor(weights=rows, unit="m")
     gltf, notes = write(tmp_path, actor)
-    # A weight of 6/11 is rounded.
+    # The weight of 6/11 is rounded.
     assert_allclose(corners(gltf, gltf.vertices()[0]), POSITIONS[TRIANGLES], rtol=0, atol=EXACT)
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to 500 mm (vertex 1): weights of "
@@ -83,14 +85,15 @@ def test_vertices_without_influence_are_bound_to_a_static_node(tmp_path):
     ]
 
 
-def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
+def test_negative_and_repeated_weights_are_changed_to_comply_with_gltf(tmp_path):
     actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
     rows = [[(0, 1.5), (1, -0.5)], [(0, 0.25), (1, 0.5), (0, 0.25)], [(1, 1)], [(1, 1)], [(1, 1)]]
     skin = skin_from_lists(rows, actor.figure.skin.inverse_bind)
     actor = Actor(replace(actor.figure, skin=skin))
-    actor.pose.dofs[5] = np.pi  # the tip, at (1, 0, 0), about z
+    actor.pose.dofs[5] = np.pi  # the tip at (1, 0, 0), about z
     gltf, notes = write(tmp_path, actor)
-    # Vertex 0: as stored 1.5 (0, 0, 0) - 0.5 (2, 0, 0), as written the origin. Vertex 1 is the tip.
+    # Vertex 0 is 1.5 (0, 0, 0) - 0.5 (2, 0, 0) as stored and the origin as written. Vertex 1 is the
+    # tip.
     assert_allclose(gltf.vertices()[0][:2], [[0, 0, 0], [1, 0, 0]], rtol=0, atol=EXACT)
     assert gltf.influence_sets()[0][1][1].tolist() == [0.5, 0.5, 0, 0]
     assert notes[1] == (
@@ -99,8 +102,9 @@ def test_negative_and_repeated_weights_become_what_gltf_allows(tmp_path):
     )
 
 
-def test_other_skinning_is_reported(tmp_path):
-    # Half and half, 180 degrees apart about z: LBS collapses to the axis, DQS keeps the distance.
+def test_loss_of_other_skinning_methods_is_reported(tmp_path):
+    # With equal weights and joints 180 degrees apart about z, LBS collapses to the axis, and DQS
+    # keeps the distance.
     actor = seamed_actor(unit="m", mesh=seamed_mesh(uvs=False))
     actor.pose.dofs[5] = np.pi
     linear, dual = (deform(actor.figure, actor.pose, how)[0] for how in ("lbs", "dqs"))
@@ -130,7 +134,7 @@ def test_several_losses_are_summarised(tmp_path):
     )
 
 
-def test_raw_weights_of_an_animal_model(tmp_path):
+def test_loss_of_raw_weights_of_an_animal_model_is_reported(tmp_path):
     figure = viewer.load(write_pig(tmp_path / "pig")).actors[0].figure
     actor = Actor(figure)
     gltf, _ = write(tmp_path, actor)
@@ -162,5 +166,5 @@ def test_large_meshes_and_skeletons_get_wider_indices(tmp_path):
     kinds = [gltf.root["accessors"][gltf.primitives[0]["indices"]]["componentType"]]
     attributes = gltf.primitives[0]["attributes"]
     kinds.append(gltf.root["accessors"][attributes["JOINTS_0"]]["componentType"])
-    assert kinds == [5125, 5123]  # 32 and 16 bits
+    assert kinds == [5125, 5123]  # these are 32 and 16 bits
     assert gltf.attribute("JOINTS_0")[[299, 300], 0].tolist() == [299, 0]

@@ -1,4 +1,4 @@
-"""Missing frames in formats that can leave them out: they stay missing unless filled on request."""
+"""Missing frames in formats that can omit them, which stay missing unless requested otherwise."""
 
 import json
 
@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor
 
-ATOL = 1e-8  # lengths of 1 to 10: nine digits
+ATOL = 1e-8  # for lengths of 1 to 10 with nine digits
 FILLED = {
     "hold": "missing frames 8 to 9: the last pose is held",
     "interpolate": "missing frames 8 to 9: interpolated, held at both ends",
@@ -27,7 +27,7 @@ FILLED = {
 
 
 def moving_roof():
-    """Frames 7 and 10 of a mesh that moves from x = 0 to x = 3; those between are missing."""
+    """Frames 7 and 10 of a mesh that moves from x = 0 to x = 3; the frames between are missing."""
     figure = seamed_actor(unit="m").figure
     clip = SampledClip(
         "go",
@@ -47,7 +47,7 @@ def moving_roof():
         ("interpolate", {7: 0.0, 8: 1.0, 9: 2.0, 10: 3.0}),
     ],
 )
-def test_numbered_meshes(tmp_path, gaps, places):
+def test_gaps_of_numbered_meshes_are_kept_or_interpolated(tmp_path, gaps, places):
     name = tmp_path / "m_{frame:02}.obj"
     notes = faults.lines(export_animation(moving_roof(), name, "obj", MotionOptions(gaps=gaps)))
     files = {int(path.stem[2:]): read_obj(path).v for path in tmp_path.iterdir()}
@@ -65,7 +65,7 @@ def test_numbered_meshes(tmp_path, gaps, places):
     ("gaps", "x"),
     [("", [0, np.nan, np.nan, 3]), ("hold", [0, 0, 0, 3]), ("interpolate", [0, 1, 2, 3])],
 )
-def test_arrays(tmp_path, gaps, x):
+def test_gaps_of_arrays_are_kept_or_interpolated(tmp_path, gaps, x):
     path = tmp_path / "a.npz"
     notes = faults.lines(export_animation(moving_roof(), path, "npz", MotionOptions(gaps=gaps)))
     with np.load(path) as arrays:
@@ -90,7 +90,7 @@ def test_arrays_are_not_split(tmp_path):
         ("hold", [0, 0, 2], "missing frame 6: the last pose is held"),
     ],
 )
-def test_folders(tmp_path, gaps, rows, note):
+def test_gaps_of_folders_are_kept_or_interpolated(tmp_path, gaps, rows, note):
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     out = tmp_path / "out"
@@ -103,8 +103,8 @@ def test_folders(tmp_path, gaps, rows, note):
             assert_allclose(people[0]["Th"][0], motion.translations[row], atol=1e-6)
 
 
-def test_folders_of_interpolated_frames(tmp_path):
-    # Half-way between two unit quaternions is their normalised sum.
+def test_interpolated_frames_of_folders_are_written(tmp_path):
+    # The rotation half-way between two unit quaternions is their normalised sum.
     motion = family_motion(24, rows=np.array([0, -1, 2]), first_frame=5)
     animation = family_animation(family_figure("smpl", tmp_path), motion)
     export_animation(animation, tmp_path / "out", "easymocap", MotionOptions(gaps="interpolate"))
@@ -134,7 +134,7 @@ def test_unknown_gap_modes_are_refused(tmp_path, key):
 
 
 @pytest.mark.parametrize(("fills", "x"), [(False, [1, 1, 1, 3]), (True, [1, 5 / 3, 7 / 3, 3])])
-def test_scales_of_joints_in_gaps(fills, x):
+def test_scales_of_joints_are_interpolated_in_gaps(fills, x):
     figure = seamed_actor(unit="m").figure
     scales = np.ones((2, figure.skeleton.n_joints, 3))
     scales[1, 0, 0] = 3.0

@@ -1,4 +1,4 @@
-"""Reported export losses: the true maximum over all frames, joints and vertices, or nothing."""
+"""Reported export losses, which are the true maximum over all frames, joints and vertices."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.units import METRES
 
-TOLD = 5e-3  # messages give three digits
+TOLD = 5e-3  # messages have three digits
 
 
 def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
-    """Return the only measured error: of joints and vertices, its size in mm and location."""
+    """Return size in mm and location of the only measured error of joints and vertices."""
     measured = errors(notes)
     assert len(measured) <= 1
     found = {}
@@ -57,7 +57,7 @@ def said(notes: list[Diagnostic]) -> dict[str, tuple[float, str]]:
 
 
 def errors(notes: list[Diagnostic]) -> list[Diagnostic]:
-    """Return the measured errors that apply to whole files."""
+    """Return the measured errors of whole files."""
     keys = ("X002.joints", "X002.vertices", "X002.both")
     return [note for note in notes if note.key in keys]
 
@@ -68,11 +68,11 @@ def write(
     return export_animation(animation, folder / name, kind, MotionOptions(**options))
 
 
-# A shape that changes
+# Changing shapes
 
 
 @pytest.mark.parametrize("unit", ["m", "cm", "in"])
-def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
+def test_bvh_reports_joint_and_skin_errors_of_stretched_bones(tmp_path, unit):
     """Each bone grows by 0.1, so the highest joint is off by 0.2, and its vertex by 0.5."""
     animation = chain_animation(unit)
     found = said(write(animation, tmp_path, "bvh", "a.bvh", digits=9))
@@ -81,7 +81,8 @@ def test_bvh_reports_joint_and_skin_error_where_bones_stretch(tmp_path, unit):
         "joints": (pytest.approx(200 * metres, rel=TOLD), f"high, frame {WORST}"),
         "vertices": (pytest.approx(500 * metres, rel=TOLD), f"vertex 3, frame {WORST}"),
     }
-    # Verified by a second reader: the file has the first frame's bones, rotated by 90 degrees.
+    # A second reader verifies that the file has the bones of the first frame, rotated by 90
+    # degrees.
     file = PlainBvh(tmp_path / "a.bvh")
     scale = metres / 0.01
     for joint, name in enumerate(NAMES):
@@ -97,12 +98,12 @@ def test_missing_frames_are_not_compared(tmp_path):
     animation = sample_animation(Actor(whole.figure, clip=clip))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb")):
         found = said(write(animation, tmp_path, kind, name))
-        # The next one has three quarters of the weight.
+        # The next frame has three quarters of the weight.
         assert found["joints"] == (pytest.approx(150, rel=TOLD), "high, frame 4")
         assert found["vertices"] == (pytest.approx(375, rel=TOLD), "vertex 3, frame 4")
 
 
-def test_each_part_file_reports_its_own_losses(tmp_path):
+def test_each_part_file_reports_its_losses(tmp_path):
     rows = np.array([0, 1, -1, 3, 4])
     whole = chain_animation()
     clip = replace(whole.motion, timing=Timing(10.0, rows))
@@ -123,13 +124,13 @@ def test_gltf_reports_the_same_loss_for_the_baked_shape(tmp_path):
     }
     gltf = Gltf(tmp_path / "a.glb")
     drawn = gltf.vertices(WORST / 10)[0]
-    wanted = (POSITIONS + GROWTH)[:, [1, 0, 2]] * [-1, 1, 1]  # turned by a right angle about z
+    wanted = (POSITIONS + GROWTH)[:, [1, 0, 2]] * [-1, 1, 1]  # rotated by 90 degrees about z
     assert_allclose(np.linalg.norm(drawn - wanted, axis=1), [0, 0.1, 0.2, 0.5], rtol=0, atol=1e-6)
 
 
 @pytest.mark.slow
 def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
-    """SMPL-X with expressions: the error of a skin on the file's joints, by plain formulas."""
+    """The error of a skin on the joints in the file is calculated by plain formulas for SMPL-X."""
     figure = replace(family_figure("smplx", tmp_path), correctives=None)
     motion = family_motion(55, frames=12, expression=4.0 * waves(12, 10, seed=5.0))
     animation = family_animation(figure, motion)
@@ -163,7 +164,7 @@ def test_expressions_are_reported_as_lost_in_bvh(tmp_path):
 
 
 def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
-    """Return one point at the origin of each joint; the last joint jumps aside in one frame."""
+    """Return one point at the origin of each joint; the last joint moves aside in one frame."""
     n_joints = len(weights[0])
     joints = np.zeros((n_joints, 3))
     points = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1]])
@@ -182,9 +183,8 @@ def weighted(weights, count: int, peak: int, far: float) -> SampledAnimation:
 
 @pytest.mark.parametrize("peak", [0, 7, 50, 101, 119])
 def test_raw_weights_report_the_normalisation_error_in_the_worst_frame(tmp_path, peak):
-    """Vertex 2 is at (0, 0, 1), half on each joint, with a sum of 0.998.
-
-    Scaled, it goes to (1.5, 0, 1) where the second joint is at x = 3; as stored, to 0.998 of that.
+    """Vertex 2 is at (0, 0, 1) with equal weights and a sum of 0.998. With normalised weights it is
+    at (1.5, 0, 1) when the second joint is at x = 3; with stored weights at 0.998 of that.
     """
     weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
     notes = write(weighted(weights, 120, peak, 3.0), tmp_path, "gltf", "a.glb")
@@ -196,7 +196,7 @@ def test_raw_weights_report_the_normalisation_error_in_the_worst_frame(tmp_path,
     assert note.values["causes"] == [Phrase("weights-unnormalized", n=1, negative=0)]
 
 
-def test_explicitly_normalised_weights_lose_nothing(tmp_path):
+def test_explicitly_normalised_weights_have_no_loss(tmp_path):
     weights = [(1.0, 0.0), (1.0, 0.0), (0.499, 0.499)]
     animation = weighted(weights, 5, 2, 3.0)
     assert (
@@ -206,7 +206,7 @@ def test_explicitly_normalised_weights_lose_nothing(tmp_path):
 
 @pytest.mark.parametrize("peak", [13, 77])
 def test_four_influence_error_is_reported_for_the_worst_frame(tmp_path, peak):
-    """The weakest of five influences, 0.05, is cut; its joint jumps by 2 m."""
+    """The weakest of five influences, 0.05, is cut; its joint moves by 2 m."""
     row = (0.3, 0.3, 0.2, 0.15, 0.05)
     animation = weighted([row, (1.0, 0, 0, 0, 0), (1.0, 0, 0, 0, 0)], 100, peak, 2.0)
     notes = write(animation, tmp_path, "gltf", "a.glb")
@@ -219,10 +219,9 @@ def test_four_influence_error_is_reported_for_the_worst_frame(tmp_path, peak):
 
 
 def test_four_influence_error_is_measured_over_the_motion(tmp_path):
-    """Weights that add up to 0.95, the joint of the weakest, 0.05, 2 m along x in one frame.
-
-    As the figure moves it, vertex 1 goes from (0, 1, 0) to (0.1, 0.95, 0); the other four weights,
-    scaled, leave it where it was. All five, scaled, would take it to (0.1 / 0.95, 1, 0).
+    """The weights sum to 0.95, and the joint of the weakest, 0.05, moves by 2 m along x in one
+    frame. In the figure, vertex 1 moves from (0, 1, 0) to (0.1, 0.95, 0); with four normalised
+    weights it does not move. With five normalised weights it would move to (0.1 / 0.95, 1, 0).
     """
     row = (0.3, 0.3, 0.2, 0.1, 0.05)
     animation = weighted([row, row, (1.0, 0, 0, 0, 0)], 20, 7, 2.0)
@@ -241,7 +240,7 @@ def test_negligible_influences_are_reported_without_an_error(tmp_path):
 
 
 def test_amass_and_easymocap_report_omissions(tmp_path):
-    """A knee translated by 0.25 m, with all joints below it, is not in the file."""
+    """The translation of the knee by 0.25 m, and of all joints below it, is not in the file."""
     figure = family_figure("smpl", tmp_path)
     knee = figure.skeleton.names.index("left_knee")
     rotations = np.tile([0.0, 0, 0, 1], (40, 24, 1))
@@ -255,8 +254,8 @@ def test_amass_and_easymocap_report_omissions(tmp_path):
         assert found["vertices"][0] <= 250 * (1 + TOLD)
 
 
-def test_anim_reports_the_mesh_error_too(tmp_path):
-    """A tip a metre long, rotated by 1 radian where its limit is 0.5: off by 2 sin 0.25."""
+def test_anim_reports_the_mesh_error(tmp_path):
+    """A tip of a metre is rotated by 1 radian with a limit of 0.5, an error of 2 sin 0.25."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, "x", 0.0), (1, "y", 0.0), (1, "z", 0.0, -0.5, 0.5)]
     offsets = np.array([[0.0] * 3, [0.0, 1.0, 0.0]])
@@ -279,7 +278,7 @@ def test_anim_reports_the_mesh_error_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_lossless_exports_report_nothing(tmp_path):
+def test_lossless_exports_report_no_error(tmp_path):
     figure = replace(family_figure("smpl", tmp_path), correctives=None)
     animation = family_animation(figure, family_motion(24, frames=30))
     for kind, name in (("bvh", "a.bvh"), ("gltf", "a.glb"), ("amass", "a.npz"), ("easymocap", "e")):
@@ -292,8 +291,8 @@ def test_lossless_exports_report_nothing(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", ["glb", "gltf", "skel"])
-def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
-    """Correctives add nothing at rest, so no error is reported, not even 0 mm."""
+def test_static_bodies_with_a_different_shape_have_no_loss(tmp_path, suffix):
+    """Correctives are zero at rest, so no error is reported, not even 0 mm."""
     np.savez(tmp_path / "body.npz", **model("smplx"))
     actor = viewer.load(tmp_path / "body.npz").actors[0]
     actor.pose.shape_weights[:3] = 2.0, -1.0, 0.5
@@ -304,7 +303,7 @@ def test_still_bodies_in_another_shape_lose_nothing(tmp_path, suffix):
 
 
 def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
-    """More frames than one batch, compared with a slow evaluation of every frame."""
+    """The frames exceed one batch and are compared with a slow evaluation of every frame."""
     figure = family_figure("smpl", tmp_path)
     animation = family_animation(figure, family_motion(24, frames=150))
     notes = write(animation, tmp_path, "gltf", "a.glb")
@@ -318,11 +317,11 @@ def test_corrective_loss_is_taken_from_the_worst_frame(tmp_path):
     assert said(notes) == {"vertices": (size, f"vertex {vertex}, frame {frame}")}
 
 
-# Between frames
+# Losses between frames
 
 
 def spike(at: float) -> SampledAnimation:
-    """Return the chain moved along x, by 3 m at one key and back, at one frame per second."""
+    """Return the chain moved along x by 3 m at one key and back, at one frame per second."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     skeleton = hand_made.skeleton([-1], rows, None, [[0.0] * 3])
     mesh = Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]]))
@@ -335,8 +334,8 @@ def spike(at: float) -> SampledAnimation:
 
 
 @pytest.mark.parametrize("at", [1.25, 2.5])
-def test_a_peak_between_frames_is_reported(tmp_path, at):
-    """The frames around the peak lie on its flanks; a straight line between them is lower."""
+def test_peak_between_frames_is_reported(tmp_path, at):
+    """The frames around the peak are on its flanks; a straight line between them is lower."""
     animation = spike(at)
     before, after = np.floor(at), np.ceil(at)
     ends = 3.0 * before / at, 3.0 * (4.0 - after) / (4.0 - at)
@@ -351,8 +350,8 @@ def test_a_peak_between_frames_is_reported(tmp_path, at):
         assert found["joints"][0] == size and found["vertices"][0] == size
 
 
-def test_captures_at_another_rate_report_dropped_frames(tmp_path):
-    """Every second frame is written; in the one between, the figure stands 2 m aside."""
+def test_captures_at_a_different_rate_report_dropped_frames(tmp_path):
+    """Every second frame is written; in the frame between, the figure is 2 m aside."""
     moves = np.zeros((7, 3))
     moves[3, 0] = 2.0
     figure = chain_animation().figure
@@ -367,7 +366,7 @@ def test_captures_at_another_rate_report_dropped_frames(tmp_path):
 
 
 def test_upside_down_motions_are_compared_as_written(tmp_path):
-    """Upside down, a resampled capture still differs only by the frames that it leaves out."""
+    """A resampled upside-down capture differs only by the omitted frames."""
     moves = np.zeros((7, 3))
     moves[:, 1] = np.arange(7)
     moves[3, 0] = 2.0

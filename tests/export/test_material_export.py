@@ -1,4 +1,4 @@
-"""Materials in exported files: every field of glTF, and of the PBR extension of .mtl."""
+"""Materials in exported files: every field of glTF and of the PBR extension of .mtl."""
 
 from __future__ import annotations
 
@@ -85,8 +85,8 @@ def test_gltf_keeps_every_field(tmp_path):
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
-def test_gltf_places_textures_as_they_were(tmp_path, angle):
-    """T R S of the file's coordinates, whose v starts at the first row, gives the same point."""
+def test_gltf_preserves_texture_transforms(tmp_path, angle):
+    """T R S of the coordinates in the file, where v starts at the first row, is the same point."""
     cos, sin = math.cos(angle), math.sin(angle)
     matrix = np.array([[2.0 * cos, -3.0 * sin, 0.25], [2.0 * sin, 3.0 * cos, -0.5]])
     material = Material("", Texture("a.png", PICTURE, transform=matrix), is_physical=True)
@@ -103,7 +103,7 @@ def test_gltf_places_textures_as_they_were(tmp_path, angle):
 
 
 def test_gltf_packs_metallic_and_roughness(tmp_path):
-    """Roughness goes into green, metallic into blue; the smaller image is enlarged."""
+    """Roughness is stored in green, metallic in blue; the smaller image is enlarged."""
     metal = Texture("m.png", np.full((1, 1, 4), 40, np.uint8), channel=3)
     rough = Texture("r.png", ORM, channel=0)
     material = Material("", None, None, 1.0, 1.0, metal, rough, is_physical=True)
@@ -114,7 +114,7 @@ def test_gltf_packs_metallic_and_roughness(tmp_path):
     assert (pixels[..., 2] == 40).all()
 
 
-def test_material_libraries_come_back(tmp_path):
+def test_material_libraries_round_trip(tmp_path):
     wanted = replace(everything(), alpha_mode="blend", unlit=False, emissive=(0.0, 3.0, 1.5))
     notes = export(textured(wanted), tmp_path / "out.obj")
     (lost,) = (note for note in notes if note.key == "X003.parts")

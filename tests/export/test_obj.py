@@ -1,4 +1,4 @@
-"""Wavefront ``.obj``, read back by a separate parser."""
+"""Wavefront ``.obj`` files, read back by a separate parser."""
 
 from dataclasses import replace
 
@@ -40,7 +40,7 @@ def names(folder):
 
 def corners(obj):
     """Return the faces as three arrays of indices counted from 0."""
-    table = np.array([face for _, face in obj.faces], dtype=float)  # None becomes nan
+    table = np.array([face for _, face in obj.faces], dtype=float)  # None is stored as nan
     return table[..., 0] - 1, table[..., 1] - 1, table[..., 2] - 1
 
 
@@ -54,7 +54,7 @@ def test_mesh_at_rest_round_trips(tmp_path):
 
 
 def test_colours_follow_positions_in_srgb(tmp_path):
-    """0.21404 of the light is sRGB 0.5; opacity is written where there is any."""
+    """0.21404 in linear light is sRGB 0.5; opacity is written if present."""
     colors = np.tile([1.0, 0.21404, 0.0, 1.0], (5, 1))
     for opacity in ((), (0.25,)):
         colors[0, 3:] = opacity or 1.0
@@ -69,16 +69,16 @@ def test_colours_follow_positions_in_srgb(tmp_path):
 def test_indices_are_counted_from_1(tmp_path):
     write(tmp_path, seamed_actor())
     lines = (tmp_path / "out.obj").read_text().splitlines()
-    # Vertex 0 with coordinate 0, vertex 1 with 1 in the first and with 3 in the second triangle.
+    # Vertex 0 has coordinate 0; vertex 1 has 1 in the first and 3 in the second triangle.
     assert lines[-3:] == ["f 1/1/1 2/2/2 3/3/3", "f 2/4/2 4/5/4 3/6/3", "f 1/1/1 4/5/4 2/4/2"]
 
 
-def test_seam_gives_one_vertex_several_texture_coordinates(tmp_path):
+def test_vertex_on_a_seam_has_several_texture_coordinates(tmp_path):
     obj, _ = write(tmp_path, seamed_actor())
     vertices, coordinates, _ = corners(obj)
     assert sorted(set(coordinates[vertices == 1])) == [1, 3]
     assert sorted(set(coordinates[vertices == 2])) == [2, 5]
-    assert len(obj.v) == 5  # none was duplicated
+    assert len(obj.v) == 5  # no vertex is duplicated
 
 
 def test_mesh_with_one_coordinate_per_vertex_repeats_its_index(tmp_path):
@@ -96,7 +96,7 @@ def test_mesh_without_coordinates_has_vertex_normal_faces(tmp_path):
     assert_array_equal(corners(obj)[0], TRIANGLES)
 
 
-def test_normals_have_length_1_whatever_the_mesh_stores(tmp_path):
+def test_normals_have_length_1_for_any_stored_length(tmp_path):
     obj, _ = write(tmp_path, seamed_actor())
     expected = [[0, 0, 1], [0, 0.6, 0.8], [1, 0, 0], [0, 0, -1], [0, 1, 0]]
     assert_allclose(obj.vn, expected, rtol=0, atol=1e-9)  # nine digits are written
@@ -104,25 +104,25 @@ def test_normals_have_length_1_whatever_the_mesh_stores(tmp_path):
 
 def test_posed_vertices_and_normals_are_written(tmp_path):
     actor = seamed_actor()
-    actor.pose.dofs[5] = np.pi / 2  # tip about z: joint 1, the sixth DOF
+    actor.pose.dofs[5] = np.pi / 2  # tip about z, the sixth DOF
     obj, _ = write(tmp_path, actor)
-    # Vertex 3 follows the root by half, at (1, 2, 1), and the tip by half, where (0, 2) from it
-    # rotates to (-2, 0).
+    # Vertex 3 follows the root, at (1, 2, 1), and the tip with equal weights; relative to the tip,
+    # (0, 2) rotates to (-2, 0).
     expected = POSITIONS.copy()
     expected[3] = [(1 + 1 - 2) / 2, (2 + 0) / 2, (1 + 1) / 2]
     assert_allclose(obj.v, expected, rtol=0, atol=1e-9)
-    assert_allclose(obj.vn[1], [-0.6, 0, 0.8], rtol=0, atol=1e-9)  # all of it the tip's
+    assert_allclose(obj.vn[1], [-0.6, 0, 0.8], rtol=0, atol=1e-9)  # the tip has the whole weight
 
 
 def test_placed_figure_is_scaled_then_moved(tmp_path):
     actor = seamed_actor()
     actor.pose.figure_scale, actor.pose.figure_translation[:] = 2.0, [10, 0, -1]
-    actor.placement = np.diag([7.0, 7, 7, 1])  # its placement in the scene is not exported
+    actor.placement = np.diag([7.0, 7, 7, 1])  # the placement in the scene is not exported
     obj, _ = write(tmp_path, actor)
     assert_allclose(obj.v, 2 * POSITIONS + [10, 0, -1], rtol=0, atol=1e-9)
 
 
-def test_numbers_keep_nine_digits(tmp_path):
+def test_numbers_have_nine_digits(tmp_path):
     values = np.array([1 / 3, -2e6 / 7, 1.23456789012e-5, 123456789.123, -0.0, 1e-300])
     positions = np.concatenate([POSITIONS[:3], values.reshape(2, 3)])
     mesh = Mesh(positions, np.tile([0.0, 0, 1], (5, 1)), TRIANGLES)
@@ -175,7 +175,7 @@ def test_texture_is_written_next_to_the_mesh(tmp_path):
     assert f"{tmp_path / 'out_0.png'}: its texture" in notes
 
 
-def test_each_run_of_triangles_names_its_material(tmp_path):
+def test_each_run_of_triangles_states_its_material(tmp_path):
     actor = textured(PICTURE, OTHER_PICTURE, None, of_triangle=(1, 0, 1))
     obj, _ = write(tmp_path, actor)
     assert [material for material, _ in obj.faces] == ["material1", "material0", "material1"]
@@ -192,14 +192,14 @@ def test_triangles_without_material_do_not_inherit_one(tmp_path):
 
 
 @pytest.mark.parametrize("pictures", [(), (None,)])
-def test_without_a_texture_there_is_no_material(tmp_path, pictures):
+def test_file_without_a_texture_has_no_material(tmp_path, pictures):
     of_triangle = [len(pictures) - 1] * 3
     obj, _ = write(tmp_path, textured(*pictures, of_triangle=of_triangle))
     assert names(tmp_path) == ["out.obj"] and obj.libraries == []
     assert [material for material, _ in obj.faces] == [None] * 3
 
 
-def test_existing_files_are_kept(tmp_path):
+def test_existing_files_are_not_replaced(tmp_path):
     for name in ("out.mtl", "out_0.png"):
         (tmp_path / name).write_bytes(b"precious")
     obj, _ = write(tmp_path, textured(PICTURE))
@@ -210,7 +210,7 @@ def test_existing_files_are_kept(tmp_path):
     assert_array_equal(pixels(tmp_path / picture), PICTURE)
 
 
-def test_the_same_files_are_used_again(tmp_path):
+def test_existing_equal_files_are_used_again(tmp_path):
     for _ in range(3):
         write(tmp_path, textured(PICTURE))
     assert names(tmp_path) == ["out.mtl", "out.obj", "out_0.png"]
@@ -219,7 +219,7 @@ def test_the_same_files_are_used_again(tmp_path):
     assert names(tmp_path) == ["out-2.mtl", "out.mtl", "out.obj", "out_0-2.png", "out_0.png"]
 
 
-def test_long_names_of_two_textures_stay_distinct(tmp_path):
+def test_long_names_of_two_textures_are_distinct(tmp_path):
     obj, _ = write(tmp_path, textured(PICTURE, OTHER_PICTURE), f"{'x' * 200}.obj")
     materials = read_mtl(tmp_path / obj.libraries[0])
     for index, picture in enumerate((PICTURE, OTHER_PICTURE)):
@@ -228,9 +228,9 @@ def test_long_names_of_two_textures_stay_distinct(tmp_path):
 
 
 @pytest.mark.parametrize("stem", ["a fat cat", "two\nlines", "ünï", "semi;colon", ".hidden", "#"])
-def test_companion_files_have_names_without_blanks(tmp_path, stem):
+def test_companion_files_have_names_without_spaces(tmp_path, stem):
     obj, _ = write(tmp_path, textured(PICTURE), f"{stem}.obj")
-    (library,) = obj.libraries  # one word
+    (library,) = obj.libraries  # a name without spaces
     picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
     assert len(picture.split()) == 1
     assert names(tmp_path) == sorted([f"{stem}.obj", library, picture])

@@ -1,4 +1,4 @@
-"""Binary ``.ply``: the header and every byte after it, read back by a separate parser."""
+"""Binary ``.ply`` files, of which a separate parser reads the header and every byte after it."""
 
 from dataclasses import replace
 
@@ -60,7 +60,7 @@ def test_mesh_round_trips(tmp_path):
     assert notes == [f"{tmp_path / 'out.ply'}: 5 vertices, 3 triangles"]
 
 
-def test_corners_have_texture_coordinates_along_seams_too(tmp_path):
+def test_corners_have_texture_coordinates_also_along_seams(tmp_path):
     ply, _ = write(tmp_path, seamed_actor())
     found = np.array([face["texcoord"] for face in ply.elements["face"]])
     assert found.shape == (3, 6)
@@ -100,7 +100,7 @@ def test_textures_are_left_out(tmp_path):
 
 
 def test_colours_of_vertices_are_written_as_srgb(tmp_path):
-    """0.214 and 0.5 of the light are sRGB 127.5 and 187.5; opacity is linear."""
+    """0.214 and 0.5 in linear light are sRGB 127.5 and 187.5; opacity is linear."""
     colors = np.zeros((5, 4))
     colors[:2] = [[1.0, 0.21404, 0.5, 1.0], [0.0, 2.0, 0.0031308, 0.2]]
     notes = export(seamed_actor(mesh=replace(seamed_mesh(), colors=colors)), tmp_path / "out.ply")
@@ -111,7 +111,7 @@ def test_colours_of_vertices_are_written_as_srgb(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["two\nlines", "end_header\n", "é\udcff 文", "", "x" * 5000, "\r"])
-def test_no_name_breaks_the_header(tmp_path, name):
+def test_names_with_line_breaks_do_not_break_the_header(tmp_path, name):
     ply, _ = write(tmp_path, seamed_actor(name))
     assert len(ply.elements["vertex"]) == 5 and len(ply.comments) == 1
 

@@ -1,4 +1,4 @@
-"""Any figure as ``.skel`` and ``.skin``: it round-trips, or the error is reported."""
+"""Export of any figure as ``.skel`` and ``.skin``, which round-trips or reports its error."""
 
 import re
 from dataclasses import replace
@@ -28,7 +28,7 @@ EXACT = 1e-12  # metres; sums of a few dozen values below 2
 
 
 def there_and_back(actor, folder, **skinning):
-    """Return the actor read from the two files, and the exporter's messages."""
+    """Return the actor read from the two files, and the messages of the exporter."""
     notes = export(actor, folder / "rig.skel", Skinning(**skinning))
     scene = viewer.load(*sorted(folder.glob("rig.sk*")))
     known = re.compile("drawn untextured$|do not sum to 1 .*; used as stored$")
@@ -62,7 +62,7 @@ def names(folder):
 
 @pytest.fixture
 def body(tmp_path):
-    """A model of SMPL's layout, shaped and posed, with its arrays."""
+    """A shaped and posed model with the layout of SMPL, and its arrays."""
     folder = tmp_path / "model"
     folder.mkdir()
     arrays = model("smpl", 48)
@@ -95,7 +95,7 @@ def test_reported_error_is_that_of_the_omitted_correctives(tmp_path, body):
     plain = smpl_forward(arrays, SHAPE, numbers, correct=False)[0]
     worst = 1000 * np.linalg.norm(whole - plain, axis=1).max()
     assert worst > 1
-    assert told_error(notes) == (pytest.approx(worst, rel=5e-3), "mm")  # messages give three digits
+    assert told_error(notes) == (pytest.approx(worst, rel=5e-3), "mm")  # messages have three digits
     assert_allclose(vertices(again), plain, rtol=0, atol=EXACT)
 
 
@@ -104,7 +104,7 @@ def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
     again, notes = there_and_back(actor, tmp_path)
     shaped, joints = smpl_forward(arrays, SHAPE)
     assert_allclose(again.figure.mesh.positions, shaped, rtol=0, atol=EXACT)
-    # Bound where the shaped body's joints are.
+    # The joints are bound at the positions of the shaped body.
     place = [again.figure.skeleton.names.index(name) for name in actor.figure.skeleton.names]
     inverse_bind = again.figure.skin.inverse_bind[place]
     assert_allclose(inverse_bind[:, :3, 3], -joints, rtol=0, atol=EXACT)
@@ -113,7 +113,7 @@ def test_shape_is_baked_into_the_rest_mesh(tmp_path, body):
     assert parts_not_held(notes) == [shapes, correctives, Phrase("part-regressor")]
 
 
-def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
+def test_weights_refer_to_the_joints_in_their_new_order(tmp_path, body):
     actor, arrays, _ = body
     again, _ = there_and_back(actor, tmp_path)
     skin, old = again.figure.skin, actor.figure.skeleton.names
@@ -124,12 +124,12 @@ def test_weights_follow_their_joints_into_the_new_order(tmp_path, body):
     assert_array_equal(dense, arrays["weights"])
 
 
-# Order, offsets, limits
+# Order, offsets and limits
 
 
 def test_joints_are_listed_depth_first(tmp_path):
-    # The children of 0 are 1 and 2, of 1 are 3 and 5, of 2 is 4: breadth-first input, depth-first
-    # output.
+    # The children of 0 are 1 and 2, those of 1 are 3 and 5, that of 2 is 4; the input is
+    # breadth-first, the output depth-first.
     joints = ball_skeleton(tuple("abcdef"), np.array([-1, 0, 0, 1, 2, 1]), np.eye(6, 3))
     actor = Actor(Figure("tree", skeleton=joints))
     again, _ = there_and_back(actor, tmp_path)
@@ -137,14 +137,14 @@ def test_joints_are_listed_depth_first(tmp_path):
     assert again.figure.skeleton.parents.tolist() == [-1, 0, 1, 1, 0, 4]
 
 
-def test_several_roots_stay_roots(tmp_path):
+def test_several_roots_remain_roots(tmp_path):
     joints = ball_skeleton(tuple("abc"), np.array([-1, -1, 0]), np.eye(3))
     actor = Actor(Figure("two", skeleton=joints))
     actor.pose.figure_translation[:] = 5, 6, 7
     again, _ = there_and_back(actor, tmp_path)
     assert again.figure.skeleton.names == ("a", "c", "b")
     found = joint_matrices(again.figure, again.pose)[:, :3, 3]
-    # a and c unchanged, then b, all moved.
+    # a and c are followed by b, and all are moved.
     assert_allclose(found, [[6, 6, 7], [5, 6, 8], [5, 7, 7]], rtol=0, atol=EXACT)
 
 
@@ -155,7 +155,7 @@ def test_skeleton_without_mesh_writes_one_file(tmp_path):
     assert notes == [f"{tmp_path / 'rig.skel'}: 1 joint"]
 
 
-def test_either_suffix_writes_both(tmp_path):
+def test_either_suffix_writes_both_files(tmp_path):
     for suffix in (".skel", ".skin", ".SKEL"):
         folder = tmp_path / suffix
         folder.mkdir()
@@ -171,7 +171,7 @@ def test_limits_and_missing_dofs_are_kept(tmp_path):
     )
     again, _ = there_and_back(Actor(Figure("hinge", skeleton=joints)), tmp_path)
     found = again.figure.skeleton
-    # The root's translation by its DOF is now in its offset.
+    # The translation DOF of the root becomes part of its offset.
     assert_array_equal(found.rest_translations, [[0, 0.5, 0], [0, 1, 0]])
     assert_array_equal(found.rest_dofs, [0, 0, 0, 0.2, 0, 0, 0, 0, 0.3])
     inf = np.inf
@@ -192,12 +192,12 @@ def test_boxes_are_kept_or_generated(tmp_path):
 # Place
 
 
-def test_figure_translation_goes_to_the_root(tmp_path):
+def test_figure_translation_is_stored_in_the_root(tmp_path):
     actor = seamed_actor()
     actor.pose.figure_translation[:] = 5, 6, 7
     again, notes = there_and_back(actor, tmp_path)
     assert_array_equal(again.figure.skeleton.rest_translations, [[5, 6, 7], [1, 0, 0]])
-    # Split along the seam: vertices 1 and 2 twice, vertex 4 of no triangle last.
+    # Along the seam, vertices 1 and 2 occur twice; vertex 4, which is in no triangle, is last.
     split = POSITIONS[[0, 1, 1, 2, 2, 3, 4]] + [5, 6, 7]
     assert_allclose(vertices(again), split, rtol=0, atol=EXACT)
     assert told_error(notes) == (0, "")
@@ -216,12 +216,12 @@ def test_scale_is_baked_into_all_lengths(tmp_path):
 
 
 def test_error_of_a_figure_without_unit_is_relative_to_its_size(tmp_path, monkeypatch):
-    # As if the scale were lost.
+    # The reported error is that of a missing scale.
     monkeypatch.setattr("viewer.export.rig.scaled", lambda figure, factor: figure)
     actor = seamed_actor()
     actor.pose.figure_scale = 1.5
     _, notes = there_and_back(actor, tmp_path)
-    # The box of the mesh reaches from (0, 0, 0) to (3, 3, 3): its diagonal is sqrt(27) as well.
+    # The bounding box of the mesh is from (0, 0, 0) to (3, 3, 3), so its diagonal is also sqrt(27).
     assert told_error(notes) == (pytest.approx(50, rel=5e-3), "% of the size")
 
 
@@ -233,7 +233,7 @@ def test_loss_of_the_up_axis_is_reported(tmp_path):
 # Weights and seams
 
 
-def test_raw_weights_are_kept(tmp_path):
+def test_raw_weights_are_written_as_stored(tmp_path):
     actor = viewer.load(
         write_pig(tmp_path / "pig", skinning_weights="0 0 0.5\n1 1 1\n0 2 1\n2 3 1\n2 4 0.75\n")
     ).actors[0]
@@ -250,7 +250,7 @@ def test_error_caused_by_raw_weights_is_reported(tmp_path):
     actor = viewer.load(write_pig(tmp_path / "pig", skinning_weights=rows)).actors[0]
     actor.pose.figure_translation[:] = 3, 4, 0
     _, notes = there_and_back(actor, tmp_path)
-    # As part of the skin only half of the 5 m apply to vertex 0.
+    # Because of its weights, vertex 0 moves by only half of the 5 m.
     assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
     lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
     assert [part.key for part in parts_not_held(notes)] == lost
@@ -259,7 +259,7 @@ def test_error_caused_by_raw_weights_is_reported(tmp_path):
 @pytest.mark.parametrize(
     ("options", "sums"), [({"normalize": True}, [1, 1]), ({"max_influences": 1}, [1, 1])]
 )
-def test_weights_are_written_as_used(tmp_path, options, sums):
+def test_weights_are_written_after_limiting_and_normalising(tmp_path, options, sums):
     weights = [[0.5, 0], [0, 1], [1, 0], [0.5, 0.75], [1, 0]]
     again, notes = there_and_back(seamed_actor(weights=weights), tmp_path, **options)
     skin = again.figure.skin
@@ -274,8 +274,8 @@ def test_loss_of_dual_quaternions_is_reported(tmp_path):
     actor = seamed_actor(weights=weights, unit="m")
     actor.pose.dofs[3] = np.pi / 2  # the tip about x, the line through both joints
     _, notes = there_and_back(actor, tmp_path, method="dqs")
-    # DQS rotates by 45 degrees and preserves the distance r from the line, LBS reduces it to r cos
-    # 45; the farthest vertex is 4, sqrt(18) from the line.
+    # DQS rotates by 45 degrees and preserves the distance r from the line, while LBS reduces it to
+    # r cos 45; the farthest vertex is 4, sqrt(18) from the line.
     gap = 18**0.5 * (1 - 0.5**0.5)
     assert told_error(notes) == (pytest.approx(1000 * gap, rel=5e-3), "mm")
 
@@ -289,7 +289,7 @@ def test_seams_are_split(tmp_path):
     assert ("X005.seams", {"before": 5, "after": 7}) in faults.told(notes)
 
 
-def test_texture_is_copied_too(tmp_path):
+def test_texture_is_copied(tmp_path):
     mesh = seamed_mesh(pictures=(PICTURE,), of_triangle=np.zeros(3, np.int32))
     again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
     assert names(tmp_path) == ["cloth0.png", "rig.skel", "rig.skin"]
@@ -306,7 +306,7 @@ def refused(actor, folder, error=RigError):
     return str(caught.value)
 
 
-def test_other_orders_of_rotation_are_refused(tmp_path):
+def test_other_rotation_orders_are_refused(tmp_path):
     joints = skeleton([-1, 0], [(0, "x", 0), (1, "z", 0), (1, "x", 0)], names=["hip", "knee"])
     assert refused(Actor(Figure("a", skeleton=joints)), tmp_path) == (
         ".skel rotates joints about x, then y, then z; joint knee has a different rotation order"

@@ -1,4 +1,4 @@
-"""Rigged meshes as files: all or none, and correctives in formats that cannot store them."""
+"""Files of rigged meshes, written completely or not at all, and correctives in each format."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from viewer.rig.skinning import deform
 
 @pytest.fixture(scope="module")
 def rigged():
-    """A bent arm with correctives, rigged onto its own mesh."""
+    """A bent arm with correctives, rigged to its own mesh."""
     plain = arm()
     offsets = np.random.default_rng(4).normal(scale=0.02, size=(9, plain.mesh.n_vertices, 3))
     template = Figure(
@@ -36,7 +36,7 @@ def rigged():
     return target, transfer(template, pose, target)
 
 
-def test_rigged_file_names():
+def test_file_names_of_rigged_meshes_depend_on_the_format():
     assert files_of(Path("a/b.npz")) == [Path("a/b.npz")]
     assert [path.name for path in files_of(Path("b.skin"))] == [
         "b.skel", "b.skin", "b.obj", "b.json",
@@ -49,7 +49,7 @@ def test_rigged_file_names():
     )
 
 
-def test_without_correctives_the_pose_matches_the_target(rigged):
+def test_pose_matches_the_target_without_correctives(rigged):
     target, found = rigged
     assert found.figure.correctives is not None
     plain = without_correctives(found)
@@ -80,7 +80,7 @@ def test_npz_keeps_correctives(rigged, tmp_path):
     assert again.correctives is not None and len(again.fields) == 3
 
 
-def test_gltf_holds_the_figure_at_rest(rigged, tmp_path):
+def test_gltf_contains_the_figure_at_rest(rigged, tmp_path):
     _, found = rigged
     lines = faults.lines(write_rigged(found, tmp_path / "arm.glb"))
     assert lines[-2] == "the figure is at rest: .npz and .skel also store the target's pose"
@@ -88,6 +88,6 @@ def test_gltf_holds_the_figure_at_rest(rigged, tmp_path):
     plain = without_correctives(found)
     assert actor.figure.require_skeleton().n_joints == plain.skeleton.n_joints
     wanted = deform(plain, rest_pose(plain.skeleton))[0]
-    # The file is in single precision.
+    # The file has single precision.
     assert_allclose(deform(actor.figure, actor.pose)[0], wanted, rtol=0, atol=1e-6)
     assert files_of(tmp_path / "arm.gltf") == [tmp_path / "arm.gltf", tmp_path / "arm.bin"]

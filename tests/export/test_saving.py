@@ -1,4 +1,4 @@
-"""Exporters with a full disk, a locked folder or an unusual target: nothing is lost."""
+"""Exporters with a full disk, a locked folder or an unusual target, which must not lose files."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from viewer.export import EXPORTERS, export
 from viewer.formats import all_or_none, save_text
 from viewer.media import saving
 
-# VRM files need a humanoid, and are saved as glTF files are.
+# VRM files need a humanoid and are saved like glTF files.
 WRITERS = [kind for key, kind in EXPORTERS.items() if key != "vrm"]
 SUFFIXES = [kind.suffixes[0] for kind in WRITERS if kind.writes_pose]
-# Files that each exporter writes for the figure below, which has two textures.
+# The files that each exporter writes for the figure below, which has two textures.
 SAVES = {".obj": 4, ".ply": 1, ".npz": 1, ".json": 1, ".skel": 4, ".glb": 1}
-# Existing files, by the suffix of the output.
+# Existing files by the suffix of the output.
 BESIDE = {".skel": (".skin",)}
 
 
 @pytest.fixture
 def rig(tmp_path):
-    """A figure with two textures, as files."""
+    """A figure with two textures as files."""
     folder = tmp_path / "in"
     folder.mkdir()
     of_triangle = np.array([0, 0, 1])
@@ -46,7 +46,7 @@ def contents(folder):
 
 
 class Fault:
-    """Makes the n-th call of a step fail, and all later ones if the disk stays full."""
+    """A step that fails at its n-th call, and at all later calls if the disk stays full."""
 
     def __init__(self, monkeypatch, step: str, number: int) -> None:
         self.calls, self.number, self.step = 0, number, step
@@ -82,7 +82,7 @@ class Fault:
 
 
 class HalfWay:
-    """A stream that calls a function when half of the bytes are written."""
+    """A stream that calls a function after half of the bytes are written."""
 
     def __init__(self, stream, meet) -> None:
         self.stream, self.meet = stream, meet
@@ -104,7 +104,7 @@ class HalfWay:
 @pytest.mark.parametrize("step", ["open", "write", "flush", "rights", "rename"])
 @pytest.mark.parametrize("is_there", [False, True], ids=["new", "replaced"])
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_full_disk_at_every_step_changes_nothing(
+def test_full_disk_at_every_step_changes_no_file(
     rig, tmp_path, monkeypatch, capsys, suffix, is_there, step
 ):
     folder = tmp_path / "out"
@@ -125,7 +125,7 @@ def test_full_disk_at_every_step_changes_nothing(
         assert captured.err.count("\n") == 1
         assert contents(folder) == before
     assert code == 0 and captured.err == ""
-    assert number > SAVES[suffix]  # every one of them has failed once
+    assert number > SAVES[suffix]  # every step has failed once
     written = contents(folder)
     assert len(written) == SAVES[suffix] and b"precious" not in b"".join(written.values())
     assert not [name for name in written if name.startswith(".")]
@@ -174,7 +174,7 @@ def test_folder_that_cannot_be_written_is_refused(rig, tmp_path, capsys, suffix)
     folder.mkdir()
     folder.chmod(0o555)
     if os.access(folder, os.W_OK):
-        folder = Path("/proc")  # root can write anywhere except in a kernel file system
+        folder = Path("/proc")  # only kernel file systems are not writable for root
     assert run(["convert", *rig, "-o", str(folder / f"person{suffix}")]) == 5
     error = capsys.readouterr().err
     assert error.startswith(f"viewer: {folder}/") and error.count("\n") == 1
@@ -216,10 +216,10 @@ def test_dangling_link_creates_its_target(rig, tmp_path):
     assert link.is_symlink() and len(read_obj(tmp_path / "real.obj").v) == 7
 
 
-# Several files at once
+# Several files together
 
 
-def test_all_or_none_keeps_what_was_written():
+def test_all_or_none_accepts_an_empty_list():
     with all_or_none([]):
         pass
 
@@ -262,7 +262,7 @@ def test_failing_outer_block_reverts_inner_writes(tmp_path):
     assert contents(tmp_path) == {"old": b"changed", "new": b"written", "twice": b"twice"}
 
 
-def test_all_or_none_refuses_before_anything_changes(tmp_path, monkeypatch):
+def test_all_or_none_refuses_before_any_change(tmp_path, monkeypatch):
     old = tmp_path / "old"
     old.write_text("old")
 

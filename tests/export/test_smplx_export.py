@@ -1,4 +1,4 @@
-"""SMPL-X arrays for retargeting to robots: keys, values, conversions; options of plain arrays."""
+"""SMPL-X arrays for retargeting to robots: keys, values, and conversions; options of arrays."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def written(animation, path, key="smplx", **options):
         return dict(arrays), notes
 
 
-def test_keys_and_shapes_are_those_that_robot_tools_read(family, tmp_path):
+def test_keys_and_shapes_are_those_read_by_robot_tools(family, tmp_path):
     path = tmp_path / "a.npz"
     arrays, notes = written(family_animation(family["smplx"], family_motion(55)), path)
     shapes = {key: array.shape for key, array in arrays.items()}
@@ -84,7 +84,7 @@ def test_joints_of_other_members_are_found_by_name(family, tmp_path, kind):
     assert "is not SMPL-X" in notes[-1]
 
 
-def test_a_changing_shape_is_averaged_and_gaps_are_marked(family, tmp_path):
+def test_changing_shape_is_averaged_and_gaps_are_marked(family, tmp_path):
     shape = np.zeros((4, 10))
     shape[:, 0] = [1, 2, 3, 6]
     motion = family_motion(55, rows=np.array([0, 1, -1, 2, 3]), shape=shape)
@@ -95,7 +95,7 @@ def test_a_changing_shape_is_averaged_and_gaps_are_marked(family, tmp_path):
     assert any("betas are its average" in note for note in notes)
 
 
-def test_the_file_is_read_back(family, tmp_path):
+def test_file_is_read_back(family, tmp_path):
     motion = family_motion(55)
     animation = family_animation(family["smplx"], motion)
     export_animation(animation, tmp_path / "a.npz", "smplx", MotionOptions(world_up="z"))
@@ -117,7 +117,7 @@ def test_quaternions_of_arrays_are_in_the_requested_order(family, tmp_path, orde
     assert_allclose(arrays["rotations"][:, joint, order.index("x")], x, atol=ATOL)
 
 
-def test_arrays_are_rotated_to_another_up_axis(family, tmp_path):
+def test_arrays_are_rotated_to_a_different_up_axis(family, tmp_path):
     animation = family_animation(family["smpl"], family_motion(24))
     old, _ = written(animation, tmp_path / "a.npz", "npz", world_up="y")
     new, _ = written(animation, tmp_path / "b.npz", "npz", world_up="y", up="z")
@@ -128,7 +128,7 @@ def test_arrays_are_rotated_to_another_up_axis(family, tmp_path):
     assert_array_equal(old["rotations"][:, 1:], new["rotations"][:, 1:])
 
 
-def test_other_orders_are_refused(family, tmp_path):
+def test_unknown_quaternion_orders_are_refused(family, tmp_path):
     animation = family_animation(family["smpl"], family_motion(24))
     with pytest.raises(RigError, match="expected xyzw or wxyz"):
         written(animation, tmp_path / "a.npz", "npz", quaternions="wzyx")

@@ -1,4 +1,4 @@
-"""Exports of keyed transforms: scales of joints, rates of keys, and what formats cannot hold."""
+"""Exports of keyed transforms: scales of joints, rates of keys, and limits of formats."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,7 @@ GROWS = channel(1, "scale", [0.0, 1.0], [[1.0, 1, 1], [2, 0.5, 1]])
 
 
 def written(animation, path, kind):
-    """Return the notes of an export, by key."""
+    """Return the notes of an export by key."""
     notes = export_animation(animation, path, kind, MotionOptions())
     return {note.key: note for note in notes}
 
@@ -41,11 +41,11 @@ def test_gltf_animates_scales_translations_and_weights(tmp_path):
     assert found == [("hip", "translation"), ("knee", "scale"), ("leg mesh", "weights")]
 
 
-def test_frames_are_at_the_rate_of_the_keys(tmp_path):
+def test_frames_have_the_rate_of_the_keys(tmp_path):
     animation = sample_animation(Actor(leg(), clip=bow()))
     found = written(animation, tmp_path / "bow.glb", "gltf")
     assert found["X001.gltf-motion"].values["rate"] == 24.0
-    # Linear keys at frames are reproduced between them as well.
+    # Linear keys at frames are also reproduced between the frames.
     assert not [key for key in found if key.startswith("X002")]
 
 
@@ -56,7 +56,7 @@ def test_steps_between_frames_are_measured(tmp_path):
     assert [key for key in found if key.startswith("X002")]
 
 
-def test_bvh_follows_scales_with_positions_and_says_what_is_lost(tmp_path):
+def test_bvh_represents_scales_by_positions_and_reports_the_loss(tmp_path):
     animation = sample_animation(Actor(leg(), clip=clip_of(GROWS)))
     found = written(animation, tmp_path / "leg.bvh", "bvh")
     lost = found["X003.bvh-joint-scales"].values
@@ -78,13 +78,13 @@ def course_rig() -> Figure:
     ))  # fmt: skip
 
 
-def test_anim_says_which_scales_are_lost(tmp_path):
+def test_anim_reports_lost_scales(tmp_path):
     animation = sample_animation(Actor(course_rig(), clip=clip_of(GROWS)))
     found = written(animation, tmp_path / "rig.anim", "anim")
     assert found["X003.clip-joint-scales"].values == {"low": 0.5, "high": 2.0}
 
 
-def test_amass_says_which_scales_are_lost(tmp_path):
+def test_amass_reports_lost_scales(tmp_path):
     figure = family_figure("smpl", tmp_path)
     turn = channel(0, "rotation", [0.0, 1.0], [about(1, 0.0), about(1, 90.0)])
     animation = sample_animation(Actor(figure, clip=clip_of(GROWS, turn)))

@@ -46,7 +46,7 @@ Frame Time: 0.0333333
 
 
 def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | Phrase]]:
-    """Read a text; also return its warnings as (key, line, values), and the estimates."""
+    """Read a text; return the motion, its warnings as (key, line, values), and the estimates."""
     data = text if isinstance(text, bytes) else text.encode()
     source = Source("a.bvh", data)
     motion = bvh.read(source)
@@ -55,7 +55,7 @@ def read(text: str | bytes) -> tuple[SkeletonMotion, list[Fault | Phrase]]:
 
 
 def one_joint(channels: str, frames: str, extra: str = "") -> str:
-    """Return a file of a root with these channels; the skeleton is 1.7 high."""
+    """Return a file with these channels of the root; the skeleton is 1.7 high."""
     count = len(channels.split())
     return (
         f"HIERARCHY ROOT a {{ OFFSET 0 0 0 CHANNELS {count} {channels} {extra} "
@@ -65,9 +65,8 @@ def one_joint(channels: str, frames: str, extra: str = "") -> str:
 
 
 def person(scale: float = 1.0) -> str:
-    """Return a standing person 1.7 tall with hips, knees and a head, then rotated by 90 degrees.
-
-    In the second frame the root is at (0.5, 0.9, 0.25), and rotated about z.
+    """Return a standing person 1.7 tall with hips, knees and a head. In the second frame the root
+    is at (0.5, 0.9, 0.25) and rotated by 90 degrees about z.
     """
 
     def offset(*place: float) -> str:
@@ -104,4 +103,4 @@ PERSON_TURNED = [
     [0.95, 0.8, 0.25],
     [-0.1, 0.9, 0.25],
 ]
-"""Joint positions of ``person()`` in the second frame: (x, y) at rest becomes (-y, x)."""
+"""Joint positions of ``person()`` in the second frame, where (x, y) at rest becomes (-y, x)."""

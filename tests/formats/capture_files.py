@@ -1,4 +1,4 @@
-"""Folders in EasyMocap's layout, for tests."""
+"""Folders in the layout of EasyMocap for tests."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def waves(*shape: int, seed: float = 0.0) -> np.ndarray:
 
 
 def body(person: int, count: int = 72, seed: float = 0.0, flat: bool = False, **changes) -> dict:
-    """Return a record of body parameters; a change of None leaves a key out."""
+    """Return a record of body parameters; keys set to None are left out."""
     poses = waves(count, seed=seed)
     if count not in (69, 63):
         poses[:3] = 0.0
@@ -35,7 +35,7 @@ def body(person: int, count: int = 72, seed: float = 0.0, flat: bool = False, **
 
 
 def points(person: int, count: int = 25, columns: int = 4, seed: float = 0.0, **changes) -> dict:
-    """Return a record of keypoints, confidences from 0.4 to 1."""
+    """Return a record of keypoints with confidences from 0.4 to 1."""
     rows = waves(count, columns, seed=seed)
     if columns == 4:
         rows[:, 3] = 0.7 + 0.5 * rows[:, 3]
@@ -43,7 +43,7 @@ def points(person: int, count: int = 25, columns: int = 4, seed: float = 0.0, **
 
 
 def write_frames(folder: Path, frames: dict[int | str, object]) -> Path:
-    """Write frame files: file numbers get six digits, strings are used unchanged."""
+    """Write frame files; numbers become names of six digits, strings are used unchanged."""
     folder.mkdir(parents=True, exist_ok=True)
     for frame, content in frames.items():
         name = f"{frame:06}" if isinstance(frame, int) else frame
@@ -60,7 +60,7 @@ def opened(path: Path, **options):
 
 
 def noticed(parts: list, path: Path | None = None) -> list[Fault]:
-    """Return the warnings of all parts; with a path, all of them must be about that file."""
+    """Return the warnings of all parts; if a path is given, check that all are about that file."""
     found = [one for part in parts for one in part.warnings]
     assert all(str(one).isprintable() for one in found)
     assert path is None or all(one.path == path for one in found)
@@ -68,7 +68,7 @@ def noticed(parts: list, path: Path | None = None) -> list[Fault]:
 
 
 def rows_of(parts: list, person: int) -> list[int]:
-    """Return the frames in which a person's body is present, in all parts together."""
+    """Return the frames of all parts in which the body of a person is present."""
     frames = [
         np.flatnonzero(part.bodies[person].timing.present)
         for part in parts

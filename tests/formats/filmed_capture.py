@@ -7,7 +7,7 @@ from formats.capture_files import points, write_frames
 from PIL import Image
 
 K1 = 0.2
-SIDE = 101  # pixels of the cameras' images
+SIDE = 101  # width and height of the images in pixels
 CENTER = 50.0
 FOCAL = 100.0
 
@@ -18,9 +18,9 @@ def _matrix(key, rows, columns, data):
 
 
 def write_filmed(folder):
-    """Write one camera at (0, -5, 0) that looks along +y, z up; images of frames 0 and 2 of 3.
-
-    The images are grey, 100 and 200, with a line that the lens draws from ideal column 90.
+    """Write one camera at (0, -5, 0) that looks along +y with z up, and images for frames 0 and 2
+    of 3. The images have grey values of 100 and 200, and a line at the distorted position of column
+    90.
     """
     write_frames(folder / "keypoints3d", {frame: [points(0)] for frame in range(3)})
     head = '%YAML:1.0\n---\nnames: [ "01" ]\n'
@@ -33,7 +33,7 @@ def write_filmed(folder):
     images.mkdir(parents=True)
     for number in (0, 2):
         pixels = np.full((SIDE, SIDE, 3), 100 + 50 * number, dtype=np.uint8)
-        # The lens draws the direction (0.4, 0), ideal pixel 90, at 0.4 (1 + k1 0.16) = 0.4128.
+        # The lens maps the direction (0.4, 0), undistorted pixel 90, to 0.4 (1 + k1 0.16) = 0.4128.
         pixels[:, 91:92] = 0
         Image.fromarray(pixels).save(images / f"{number:06}.png")
     return folder

@@ -1,4 +1,4 @@
-"""Skeletons and motions with one error each, and the error reported for it."""
+"""Skeleton and motion files with one error each, and the reported error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pickles assembled opcode by opcode, in ways that current writers do not use."""
+"""Pickles assembled opcode by opcode, including forms that current writers do not use."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def opened(data: bytes) -> Archive:
 
 
 def refusal(data: bytes) -> Fault:
-    """Return the refusal of bytes, which must name the file."""
+    """Return the refusal of bytes, which must include the file name."""
     with pytest.raises(FormatError) as caught:
         archive = opened(data)
         for key in archive.keys:
@@ -41,13 +41,13 @@ def refusal(data: bytes) -> Fault:
 
 
 def text(words: str) -> bytes:
-    """A string of Python 2, which is text or bytes."""
+    """Return a string of Python 2, which is text or bytes."""
     data = words.encode("latin-1")
     return b"U" + bytes([len(data)]) + data
 
 
 def payload(data: bytes) -> bytes:
-    """A long string of Python 2."""
+    """Return a long string of Python 2."""
     return b"T" + struct.pack("<i", len(data)) + data
 
 
@@ -70,7 +70,7 @@ def named(module: str, name: str) -> bytes:
 
 
 def several(*items: bytes) -> bytes:
-    """A tuple."""
+    """Return a tuple."""
     return b"(" + b"".join(items) + b"t"
 
 
@@ -83,7 +83,7 @@ def finished(body: bytes) -> bytes:
 
 
 def saved(**items: bytes) -> bytes:
-    """A whole pickle of named values."""
+    """Return a complete pickle of named values."""
     return finished(mapping(**items))
 
 
@@ -92,7 +92,7 @@ def shape(*sides: int) -> bytes:
 
 
 def element_type(code: str = "f8", order: str = "<", size: int = -1) -> bytes:
-    """``numpy.dtype``, with its state."""
+    """Return a ``numpy.dtype`` with its state."""
     made = named("numpy", "dtype") + several(text(code), whole(0), whole(1)) + b"R"
     state = (whole(3), text(order), b"N", b"N", b"N", whole(size), whole(-1), whole(0))
     return made + several(*state) + b"b"
@@ -106,14 +106,14 @@ def empty_array(module: str = "numpy.core.multiarray") -> bytes:
 def array_of(
     sides: tuple[int, ...], data: bytes, code: str = "f8", order: str = "<", fortran: int = 0
 ) -> bytes:
-    """An array as Python 2 writes it; shape and bytes may disagree."""
+    """Return an array as Python 2 writes it; shape and bytes may disagree."""
     size = {"S": 1, "U": 4}.get(code[0], 0) * int(code[1:] or 0) or -1
     state = (whole(1), shape(*sides), element_type(code, order, size), whole(fortran))
     return empty_array() + several(*state, payload(data)) + b"b"
 
 
 def array(values: NDArray[Any]) -> bytes:
-    """An array with its own type, byte order and memory order."""
+    """Return an array with its type, byte order and memory order."""
     is_fortran = values.flags.f_contiguous and not values.flags.c_contiguous
     order = values.dtype.byteorder.replace("=", "<")
     return array_of(
@@ -126,7 +126,7 @@ def array(values: NDArray[Any]) -> bytes:
 
 
 def created(module: str, name: str, state: bytes) -> bytes:
-    """An object of a class with a state, as from protocol 2 on."""
+    """Return an object of a class with a state, as from protocol 2 on."""
     return named(module, name) + b")\x81" + state + b"b"
 
 
@@ -140,7 +140,7 @@ def matrix(
     name: str = "csc_matrix",
     shape_key: str = "_shape",
 ) -> bytes:
-    """A sparse matrix; by default [[1, 0, 3], [0, 0, 2]]."""
+    """Return a sparse matrix; by default [[1, 0, 3], [0, 0, 2]]."""
     state = {
         "data": array(np.array(data, np.float64)),
         "indices": array(np.array(indices, np.int32)),
@@ -152,18 +152,18 @@ def matrix(
 
 
 def fake_class(monkeypatch: pytest.MonkeyPatch, module: str, name: str) -> type:
-    """A class with a name that Python's own pickler takes for importable."""
+    """Create a class with a name that Python's pickler considers importable."""
     made = type(name, (), {"__module__": module})
     parts = module.split(".")
     for count in range(1, len(parts) + 1):
         path = ".".join(parts[:count])
-        # If another test has imported the real modules, they warn or refuse.
+        # The real modules, if imported by another test, would warn or refuse.
         monkeypatch.setitem(sys.modules, path, ModuleType(path))
     monkeypatch.setattr(sys.modules[module], name, made, raising=False)
     return made
 
 
 def unframed(data: bytes) -> bytes:
-    """A small pickle of protocol 4 or 5 without its frame, so that its length may change."""
+    """Return a small pickle of protocol 4 or 5 without its frame, so that its length may change."""
     assert data[2:3] == b"\x95"
     return data[:2] + data[11:]

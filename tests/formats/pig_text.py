@@ -1,8 +1,8 @@
 """A PIG model of five vertices and three joints for tests, and functions that read it.
 
-Two triangles share the edge from vertex 1 to vertex 2; in the texture they are separate, so that
-these two vertices have two texture coordinates each. Vertex 4 belongs to no triangle. All values
-are multiples of a quarter, for hand calculation.
+Two triangles share the edge from vertex 1 to vertex 2, but are separate in the texture, so these
+two vertices have two texture coordinates each. Vertex 4 belongs to no triangle. All values are
+multiples of a quarter, for hand calculation.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ GOOD = {**CORE, **MORE}
 
 
 def write(folder, files=GOOD, **changes):
-    """Rewrite a folder; a change is a file's new text, bytes, or None to leave it out."""
+    """Rewrite a folder; a change is the new text or bytes of a file, or None to omit the file."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     for name, text in {**files, **{f"{key}.txt": text for key, text in changes.items()}}.items():
@@ -50,7 +50,7 @@ def write(folder, files=GOOD, **changes):
 
 
 def read(path):
-    """Return the figure and the warnings of a folder or archive, the latter as data."""
+    """Return the figure of a folder or archive, and its warnings as data."""
     source = Source.open(path)
     return pig.read(source), warnings_of(source.diagnostics)
 
@@ -62,7 +62,7 @@ def silent(path):
 
 
 def refusal(path):
-    """Return the file and the reason of a model's refusal: name, key, line and values."""
+    """Return the refusal of a model: file name, key, line and values."""
     with pytest.raises((FormatError, RigError)) as caught:
         viewer.load(path)
     assert caught.value.exit_code == 2
@@ -72,7 +72,7 @@ def refusal(path):
 
 
 def arrays(*, dense=True):
-    """Return the same model as the arrays of an archive, matrices as dense (3, 5) arrays."""
+    """Return the model as arrays of an archive, with matrices as dense (3, 5) arrays."""
     given = {
         name.removesuffix(".txt"): np.array([row.split() for row in text.splitlines()], float)
         for name, text in GOOD.items()
@@ -108,7 +108,7 @@ def assert_core(figure):
     rest = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0], [2, 2, -1]]
     assert_array_equal(mesh.positions, rest)
     assert_array_equal(mesh.triangles, [[0, 1, 2], [1, 3, 2]])
-    # Both triangles lie in the plane z = 0; the vertex of no triangle gets +y.
+    # Both triangles are in the plane z = 0; the vertex without a triangle gets the normal +y.
     assert_array_equal(mesh.normals, [[0, 0, 1]] * 4 + [[0, 1, 0]])
     assert skeleton.parents.tolist() == [-1, 0, 1]
     assert_array_equal(skeleton.rest_translations, [[0, 0, 0], [1, 0, 0], [0, 1, 0.5]])

@@ -1,4 +1,4 @@
-"""Writing and reading figures, and comparing them."""
+"""Functions that write, read and compare figures."""
 
 import math
 import tempfile
@@ -15,7 +15,7 @@ LARGEST = float(np.finfo(np.float32).max)
 
 
 def skeleton(parents, **changes) -> Skeleton:
-    """Build a skeleton with the DOFs that ``.skel`` has."""
+    """Build a skeleton with the DOFs of ``.skel``."""
     n_joints = len(parents)
     parts = {
         "names": tuple(f"j{joint}" for joint in range(n_joints)),

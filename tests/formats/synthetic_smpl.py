@@ -12,10 +12,10 @@ from collections.abc import Iterable
 import numpy as np
 
 KINDS = ("smpl", "smplh", "smplx", "mano", "flame")
-"""Kinds of models, by their published names in lower case."""
+"""Kinds of models, as their published names in lower case."""
 
 NO_PARENT = 4294967295
-"""The parent of the root in ``kintree_table``: -1 as an unsigned number."""
+"""The parent of the root in ``kintree_table``, -1 as an unsigned number."""
 
 TURNS = 8
 """Vertices per turn of the spiral that forms the skin."""
@@ -116,7 +116,7 @@ def joint_parents(kind: str) -> tuple[int, ...]:
 
 
 def _finger_parents(wrist: int, first: int) -> list[int]:
-    """Return the parents of five fingers of three joints, whose first joint is ``first``."""
+    """Return the parents of five fingers of three joints each, starting with joint ``first``."""
     return [wrist if joint % 3 == 0 else first + joint - 1 for joint in range(15)]
 
 
@@ -126,7 +126,7 @@ def _rounded(values: np.ndarray, bits: int = 24) -> np.ndarray:
 
 
 def _waves(seed: float, *shape: int) -> np.ndarray:
-    """Return values from -1 to 1 that do not repeat along any axis."""
+    """Return values from -1 to 1 without repetition along any axis."""
     indices = np.indices(shape, dtype=float) + 1.0
     phase = np.full(shape, seed)
     for axis, index in enumerate(indices):
@@ -201,14 +201,14 @@ def _finger_step(joint: int) -> np.ndarray:
 
 
 def _order_by_distance(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return for each point the indices of the others, the nearest first."""
+    """Return for each point the indices of the other points, the nearest first."""
     whole = [np.round(places * 2.0**20).astype(np.int64) for places in (points, others)]
     gaps = whole[0][:, None] - whole[1][None]
     return np.argsort((gaps * gaps).sum(axis=2), axis=1, kind="stable")
 
 
 def _regressor(template: np.ndarray, targets: np.ndarray) -> np.ndarray:
-    """Return rows of sixteenths over the nearest vertices and a distant one, to separate joints."""
+    """Return rows of multiples of 1/16 for the nearest vertices and a distant one."""
     regressor = np.zeros((len(targets), len(template)))
     nearest = _order_by_distance(targets, template)
     for joint, row in enumerate(regressor):
@@ -219,7 +219,7 @@ def _regressor(template: np.ndarray, targets: np.ndarray) -> np.ndarray:
 
 
 def _weights(template: np.ndarray, targets: np.ndarray, parents: Iterable[int]) -> np.ndarray:
-    """Return rows of one to four sixteenths; each joint influences a vertex if there are enough."""
+    """Return rows of one to four multiples of 1/16; if possible, every joint has influence."""
     weights = np.zeros((len(template), len(targets)))
     nearest = _order_by_distance(template, targets)
     above = [max(parent, 0) for parent in parents]
@@ -265,7 +265,7 @@ def _landmarks(n_faces: int) -> dict[str, np.ndarray]:
 
 
 def _texture_coordinates(faces: np.ndarray, n_vertices: int) -> dict[str, np.ndarray]:
-    """Return coordinates with a seam up the spiral: more of them than vertices."""
+    """Return texture coordinates with a seam up the spiral, which are more than the vertices."""
     index = np.arange(n_vertices)
     coordinates = np.stack([index % TURNS / TURNS, _rounded(index / (n_vertices - 1), 20)], axis=1)
     doubled = index[TURNS::TURNS]

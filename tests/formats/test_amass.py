@@ -1,4 +1,4 @@
-"""AMASS and related motions: all spellings, mismatched arrays, and distinction from poses."""
+"""AMASS and related motions: all key names, mismatched arrays, and distinction from poses."""
 
 import pickle
 
@@ -20,13 +20,13 @@ NO_RATE = ("F007.motion-no-rate", None, {"rate": 30.0})
 
 
 def saved(path, **arrays):
-    """Write an archive; a change of None leaves a key out."""
+    """Write an archive; keys set to None are left out."""
     np.savez(path, **{key: value for key, value in arrays.items() if value is not None})
     return path
 
 
 def first_release(count=4, **changes):
-    """Return the arrays of AMASS for SMPL+H."""
+    """Return the arrays of an AMASS file for SMPL+H."""
     values = {
         "poses": waves(count, 156),
         "trans": waves(count, 3, seed=1),
@@ -53,7 +53,7 @@ def refusal(path):
     return fault_of(caught.value.diagnostic)
 
 
-def test_first_release(tmp_path):
+def test_first_release_is_read(tmp_path):
     path = saved(tmp_path / "walk_poses.npz", **first_release())
     motion, warnings = motion_of(path)
     assert (motion.name, warnings) == ("walk_poses", [])
@@ -106,7 +106,7 @@ def test_soft_tissue_coefficients_are_counted(tmp_path):
     assert motion_of(path)[1] == [("F007.motion-tissue", None, {"n": 2})]
 
 
-def test_second_release(tmp_path):
+def test_second_release_is_read(tmp_path):
     path = saved(
         tmp_path / "a_stageii.npz",
         gender=np.array("neutral"),
@@ -117,7 +117,7 @@ def test_second_release(tmp_path):
         poses=waves(3, 165),
         betas=waves(16),
         num_betas=np.array(16),
-        # Parts rounded to float32 count as equal, and the fingers may be missing.
+        # Parts rounded to single precision are treated as equal, and the fingers may be missing.
         root_orient=waves(3, 165)[:, :3].astype(np.float32),
         pose_body=waves(3, 165)[:, 3:66],
         pose_eye=waves(3, 165)[:, 69:75],
@@ -129,7 +129,7 @@ def test_second_release(tmp_path):
     assert motion.facts == (("gender", "neutral"), ("made for", "smplx"))
 
 
-def test_split_keys_alone(tmp_path):
+def test_split_keys_without_poses_are_read(tmp_path):
     parts = {
         "root_orient": waves(3, 3, seed=1),
         "pose_body": waves(3, 63, seed=2),
@@ -144,7 +144,7 @@ def test_split_keys_alone(tmp_path):
     assert_array_equal(motion.vectors, expected)
 
 
-def test_names_of_smplx(tmp_path):
+def test_names_of_smplx_are_read(tmp_path):
     path = saved(
         tmp_path / "a.npz",
         global_orient=waves(2, 1, 3),
@@ -161,7 +161,7 @@ def test_names_of_smplx(tmp_path):
     assert (motion.flat_hands, motion.shape.shape) == (False, (2, 10))
 
 
-def test_hand_angles_are_joints_and_never_get_the_mean(tmp_path):
+def test_hand_angles_are_joint_rotations_without_the_mean(tmp_path):
     parts = {"global_orient": waves(2, 3), "body_pose": waves(2, 63)}
     parts |= {"right_hand_pose": waves(2, 45), "flat_hand_mean": np.array(False)}
     path = saved(tmp_path / "a.npz", **parts, transl=waves(2, 3), fps=np.array(25))
@@ -170,7 +170,7 @@ def test_hand_angles_are_joints_and_never_get_the_mean(tmp_path):
     assert warnings == [("F007.motion-angles", None, {"item": "right_hand_pose"})]
 
 
-def test_speech_expressions(tmp_path):
+def test_speech_expressions_are_read(tmp_path):
     path = saved(
         tmp_path / "a.npz",
         betas=waves(300),
@@ -186,14 +186,15 @@ def test_speech_expressions(tmp_path):
     assert_array_equal(motion.expression, waves(3, 100))
 
 
-def test_dance_data_in_a_pickle(tmp_path):
+def test_dance_data_in_a_pickle_is_read(tmp_path):
     path = tmp_path / "gBR_sBM_c01.pkl"
     values = {"smpl_poses": waves(3, 72), "smpl_trans": 93.0 * waves(3, 3)}
     values |= {"smpl_scaling": np.array([93.0]), "smpl_loss": 0.5}
     path.write_bytes(pickle.dumps(values, protocol=4))
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.up, motion.timing.frame_rate) == (SMPL, "y", 60.0)
-    assert_allclose(motion.translations, waves(3, 3), rtol=0, atol=1e-15)  # one rounding of 93 x
+    # A single rounding of 93 x.
+    assert_allclose(motion.translations, waves(3, 3), rtol=0, atol=1e-15)
     assert warnings == [("F007.motion-aist-rate", None, {"rate": 60.0})]
 
 
@@ -201,7 +202,7 @@ def test_dance_data_in_a_pickle(tmp_path):
     ("shape", "names"),
     [((2, 72), SMPL), ((2, 24, 3), SMPL), ((2, 66), SMPL[:22]), ((2, 52, 3), SMPLH)],
 )
-def test_several_poses_alone_are_a_motion(tmp_path, shape, names):
+def test_several_poses_without_other_keys_are_a_motion(tmp_path, shape, names):
     path = saved(tmp_path / "a.npz", poses=waves(*shape))
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.n_rows, motion.up) == (names, 2, "")
@@ -219,7 +220,7 @@ def test_several_poses_alone_are_a_motion(tmp_path, shape, names):
         {"betas": waves(10), "gender": np.array("male")},
     ],
 )
-def test_one_frame_is_a_pose(tmp_path, arrays):
+def test_single_frame_is_a_pose(tmp_path, arrays):
     source = Source.open(saved(tmp_path / "a.npz", **arrays))
     assert detect(source) == "pose"
     assert isinstance(read(source), PoseRecord)
@@ -233,7 +234,7 @@ def test_one_frame_is_a_pose(tmp_path, arrays):
         ({"root_orient": waves(1, 3), "pose_body": waves(1, 63), "fps": np.array(30)}, SMPL[:22]),
     ],
 )
-def test_one_frame_at_a_frame_rate_is_a_motion(tmp_path, arrays, names):
+def test_single_frame_with_a_frame_rate_is_a_motion(tmp_path, arrays, names):
     motion, _ = motion_of(saved(tmp_path / "a.npz", **arrays))
     assert (motion.joint_names, motion.n_rows, motion.timing.rows.tolist()) == (names, 1, [0])
 
@@ -257,7 +258,7 @@ def test_empty_motions_are_refused(tmp_path, arrays, key):
     assert fault_of(caught.value.diagnostic) == fault
 
 
-# The same data twice
+# Duplicate data
 
 
 @pytest.mark.parametrize(
@@ -299,7 +300,7 @@ def test_hand_components_next_to_full_poses_are_not_compared(tmp_path):
     assert motion_of(saved(tmp_path / "b.npz", **first_release(**beside)))[1] == []
 
 
-def test_parts_covering_the_same_joints_are_used_once(tmp_path):
+def test_second_part_with_the_same_joints_is_ignored(tmp_path):
     parts = {"root_orient": waves(3, 3), "pose_body": waves(3, 63), "pose_eye": waves(3, 6)}
     parts |= {"leye_pose": waves(3, 3, seed=2), "reye_pose": waves(3, 6)[:, 3:]}
     path = saved(tmp_path / "a.npz", **parts, trans=waves(3, 3), fps=np.array(30))
@@ -309,14 +310,14 @@ def test_parts_covering_the_same_joints_are_used_once(tmp_path):
     assert warnings == [("F007.motion-again", None, {"item": "leye_pose"})]
 
 
-def test_own_metadata_is_read(tmp_path):
+def test_metadata_of_the_writer_is_read(tmp_path):
     present = np.array([True, False, True, True])
     arrays = first_release(present=present, up=np.array("y"))
     motion, warnings = motion_of(saved(tmp_path / "a.npz", **arrays))
     assert (motion.timing.rows.tolist(), motion.up, warnings) == ([0, -1, 2, 3], "y", [])
 
 
-def test_unknown_keys_are_named(tmp_path):
+def test_unknown_keys_are_reported(tmp_path):
     path = saved(tmp_path / "a.npz", **first_release(contact=np.zeros(4)))
     assert motion_of(path)[1] == [("F007.motion-keys", None, {"keys": ["contact"]})]
 
@@ -380,18 +381,18 @@ def test_mismatched_parts_are_refused(tmp_path, part, message):
     assert refusal(saved(tmp_path / "a.npz", root_orient=waves(3, 3), **part)) == message
 
 
-def test_subject_shape_is_not_a_motion(tmp_path):
+def test_shape_of_a_subject_is_refused_as_a_motion(tmp_path):
     path = saved(tmp_path / "shape.npz", betas=waves(16), gender=np.array("male"))
     assert refusal(path) == (("F002.motion-shape", None, {"keys": ["betas", "gender"]}))
 
 
-def test_first_stage_file_is_not_a_motion(tmp_path):
+def test_file_of_the_first_stage_is_refused_as_a_motion(tmp_path):
     arrays = {"betas": waves(16), "markers_latent": np.zeros((4, 3)), "gender": np.array("male")}
     path = saved(tmp_path / "female_stagei.npz", **arrays)
     assert detect(Source.open(path)) == "amass"
     assert refusal(path) == (("F002.motion-stage", None, {}))
 
 
-def test_other_archives_are_described_by_their_keys(tmp_path):
+def test_archives_of_other_data_are_described_by_their_keys(tmp_path):
     path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
     assert refusal(path) == (("F002.motion", None, {"keys": ["pose_body"]}))

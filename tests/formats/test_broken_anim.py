@@ -1,4 +1,4 @@
-"""``.anim`` files with errors: refused with their line, or read with a warning."""
+"""Errors in ``.anim`` files, which are refused with their line or read with a warning."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ def test_unsorted_keys_are_sorted_with_a_warning() -> None:
     assert warnings == [("C001.anim-sorted", 1, {"channel": 0, "late": 1, "before": 0})]
 
 
-def test_channel_without_keys_warns() -> None:
+def test_channel_without_keys_is_reported_as_a_warning() -> None:
     _, warnings = parse("animation { range 0 1 numchannels 1 channel { keys 0 { } } }")
     assert warnings == [("C010.anim-no-keys", None, {"channel": 0})]
 
@@ -239,7 +239,7 @@ def test_malformed_files_are_refused_with_their_line(text: str, fault: Fault) ->
     assert refusal_of(lambda: parse(text)) == fault
 
 
-def test_truncation_anywhere_gives_an_error_or_a_warning() -> None:
+def test_truncation_anywhere_is_an_error_or_a_warning() -> None:
     for length in range(len(GOOD)):
         try:
             _, warnings = parse(GOOD[:length])

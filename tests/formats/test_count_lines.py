@@ -1,4 +1,4 @@
-"""Wrong counts are refused at the line of the count, with both values."""
+"""Wrong counts, which are refused at the line of the count with both values."""
 
 import pytest
 from faults import refusal_of
@@ -44,7 +44,7 @@ def refusal(name, text):
     return refusal_of(lambda: read(Source(name, text.encode())))
 
 
-# File, text before a count, the count, and the actual number for each wrong one.
+# For each wrong count: the file, the text before the count, the count, and the actual number.
 COUNTS = [
     ("a.skin", "positions ", 3),
     ("a.skin", "normals ", 3),
@@ -62,7 +62,7 @@ COUNTS = [
 
 @pytest.mark.parametrize("step", [-1, 1])
 @pytest.mark.parametrize(("name", "head", "count"), COUNTS)
-def test_a_wrong_count_is_refused_at_its_line(name, head, count, step):
+def test_wrong_count_is_refused_at_its_line(name, head, count, step):
     text = FILES[name]
     assert f"{head}{count}" in text
     before, _, after = text.partition(f"{head}{count}")
@@ -79,14 +79,14 @@ def test_too_many_rows_of_a_table_are_refused_at_its_element(element, count, lin
 
 
 @pytest.mark.parametrize(("stated", "line"), [("1 0 0.25 1 0.75", 13), ("3 0 0.25 1 0.75", 13)])
-def test_a_vertex_that_misstates_its_influences_is_refused_at_its_line(stated, line):
-    """The counts of all later vertices seem to be shifted."""
+def test_vertex_with_a_wrong_number_of_influences_is_refused_at_its_line(stated, line):
+    """The wrong count makes the counts of all later vertices appear shifted."""
     fault = refusal("a.skin", SKIN.replace("2 0 0.25 1 0.75", stated))
     values = {"vertex": 1, "pairs": stated[:1].encode(), "found": 4}
     assert fault == ("F002.skin-influences", line, values)
 
 
-def test_counts_of_a_single_line_file_are_followed():
+def test_counts_in_a_file_of_one_line_are_used():
     text = " ".join(SKIN.replace("1 1 1\n}", "2 1 1\n}").split())
     key, _, values = refusal("a.skin", text)
     assert key == "F002.skin-influences-end"

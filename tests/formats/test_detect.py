@@ -33,7 +33,7 @@ def test_content_determines_the_format(data, key, suffix):
         ("A.SKEL", SKIN, "skin", {"found": ".skin", "suffix": ".skel"}),
     ],
 )
-def test_wrong_suffix_is_a_warning(name, data, key, values):
+def test_wrong_suffix_is_reported_as_a_warning(name, data, key, values):
     assert found(name, data) == (key, [("F007.suffix", None, values)])
 
 
@@ -86,7 +86,7 @@ def test_skin_is_recognised(data):
 @pytest.mark.parametrize(
     ("name", "wanted"), [("a.skel", ".skel"), ("a.skin", ".skin"), ("a", None)]
 )
-def test_other_content_is_described(data, kind, name, wanted):
+def test_content_of_other_kinds_is_described(data, kind, name, wanted):
     with pytest.raises(FormatError) as caught:
         found(name, data)
     assert caught.value.path == Path(name)
@@ -106,14 +106,14 @@ def test_gltf_is_recognised(name, data):
 
 
 @pytest.mark.parametrize(("name", "key"), [("a.skel", "skel"), ("a.skin", "skin")])
-def test_text_with_a_known_suffix_goes_to_its_reader(name, key):
+def test_unknown_text_with_a_known_suffix_is_passed_to_its_reader(name, key):
     assert found(name, b"hello world") == (key, [])
 
 
 @pytest.mark.parametrize(
     ("data", "kind"), [(b"PK\x03\x04\x14", "a ZIP archive"), (b"\x93NUMPY\1\0", "a numpy array")]
 )
-def test_broken_archive_under_a_text_suffix_is_named(data, kind):
+def test_broken_archive_with_a_text_suffix_is_described(data, kind):
     fault = refusal_of(lambda: detect(Source("a.skel", data)))
     assert fault == ("F002.kind", None, {"wanted": ".skel", "looks": kind})
 
@@ -128,7 +128,7 @@ def test_folder_of_other_files_is_refused(tmp_path):
     ("arrays", "key", "found"),
     [({"a": 1, "b": 2}, "F002.unknown-archive", ["a", "b"]), ({}, "F002.empty-archive", None)],
 )
-def test_archive_of_other_keys_is_refused(tmp_path, arrays, key, found):
+def test_archive_with_unknown_keys_is_refused(tmp_path, arrays, key, found):
     np.savez(tmp_path / "a.npz", **arrays)
     other, line, values = refusal_of(lambda: detect(Source.open(tmp_path / "a.npz")))
     assert (other, line, values.get("found")) == (key, None, found)

@@ -1,5 +1,4 @@
-"""Refusals of text formats give the line, counted over seeded mutations of tiny files.
-
+"""The fraction of refusals of text formats that have a line, over seeded mutations of tiny files.
 Only errors about a whole file have no line: an empty file, or an unknown format.
 """
 
@@ -65,18 +64,18 @@ def refusal(source):
 
 
 def assert_lines(problems, fewest):
-    """Check which fraction of the refusals, given with the refused bytes, has a line."""
+    """Check the fraction of refusals, given with the refused bytes, that have a line."""
     told = [(problem, data) for problem, data in problems if data.strip()]
     assert len(told) >= fewest
     without = [str(problem) for problem, _ in told if problem.line is None]
     assert len(without) <= (1.0 - SHARE) * len(told), without
     for problem, data in told:
-        # A line may end with CR, LF or both; one more for the end of the file.
+        # A line may end with CR, LF or both; one line is added for the end of the file.
         assert problem.line is None or 1 <= problem.line <= 1 + len(re.findall(rb"[\r\n]", data))
 
 
 @pytest.mark.parametrize("name", TEXTS)
-def test_text_formats(name):
+def test_refusals_of_text_formats_have_lines(name):
     problems = []
     for seed in SEEDS:
         rng = random.Random(seed)
@@ -87,14 +86,14 @@ def test_text_formats(name):
 
 
 @pytest.mark.parametrize("name", FRAMES)
-def test_easymocap_frames(tmp_path, name):
+def test_refusals_of_easymocap_frames_have_lines(tmp_path, name):
     problems = []
     for seed in SEEDS:
         rng = random.Random(seed)
         for data in (mutate(FRAMES[name], rng) for _ in range(TRIES)):
             (tmp_path / name).write_bytes(data)
             problem = refusal(Source.open(tmp_path / name))
-            # A frame without the key "annots" is read as a pose, which is not tested here.
+            # A frame without the key "annots" would be read as a pose, which is not tested here.
             problems += (
                 [(problem, data)]
                 if problem and not problem.diagnostic.key.startswith("F002.pose-")
@@ -103,7 +102,7 @@ def test_easymocap_frames(tmp_path, name):
     assert_lines(problems, TRIES)
 
 
-def test_pig_tables(tmp_path):
+def test_refusals_of_pig_tables_have_lines(tmp_path):
     folder = write_pig(tmp_path / "pig")
     problems = []
     for seed in SEEDS:
@@ -112,13 +111,14 @@ def test_pig_tables(tmp_path):
             name = rng.choice(list(PIG))
             (folder / name).write_bytes(mutate(PIG[name].encode(), rng))
             problem = refusal(Source.open(folder))
-            # Another file may be reported, as the contents of one restrict those of the others.
+            # The report may be about a different file, because the contents of the files depend on
+            # each other.
             problems += [(problem, problem.path.read_bytes())] if problem else []
             (folder / name).write_text(PIG[name])
     assert_lines(problems, TRIES)
 
 
-def test_cameras(tmp_path):
+def test_refusals_of_cameras_have_lines(tmp_path):
     notes = []
     for seed in SEEDS:
         rng = random.Random(seed)

@@ -1,4 +1,4 @@
-"""Readers that continue after errors: neutral values replace invalid ones."""
+"""Readers that continue after errors and replace invalid values by neutral ones."""
 
 from __future__ import annotations
 
@@ -19,33 +19,33 @@ from viewer.errors import ViewerError
 from viewer.formats import Source, anim, bvh, obj, read, skel, skin, smpl
 
 
-def test_an_invalid_vertex_is_placed_between_its_neighbours() -> None:
+def test_invalid_vertex_is_placed_between_its_neighbours() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0", "2 nan 0", 1), "a.skin")
-    # The middle of (0, 0, 0) and (0, 2, 0).
+    # This is the middle of (0, 0, 0) and (0, 2, 0).
     assert figure.mesh.positions.tolist() == [[0, 0, 0], [0, 1, 0], [0, 2, 0]]
     assert figure.mesh.n_triangles == 1 and figure.skin.weights.tolist() == [1, 0.25, 0.75, 1]
 
 
-def test_an_invalid_weight_becomes_0_and_the_others_stay() -> None:
+def test_invalid_weight_becomes_0_and_other_weights_are_unchanged() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "2 0 nan 1", 1), "a.skin")
     assert figure.skin.weights.tolist() == [1, 0, 0.75, 1]
     assert figure.skin.joints.tolist() == [0, 0, 1, 1]
 
 
-def test_an_unparsable_line_of_weights_affects_no_other() -> None:
+def test_invalid_line_of_weights_does_not_affect_other_lines() -> None:
     figure, _ = gone_on(skin, SKIN.replace("2 0 0.25 1", "3 0 0.25 1", 1), "a.skin")
     assert figure.skin.starts.tolist() == [0, 1, 1, 2]
     assert figure.skin.weights.tolist() == [1, 1]
 
 
-def test_an_invalid_corner_repeats_another_corner() -> None:
+def test_invalid_corner_repeats_another_corner() -> None:
     figure, _ = gone_on(skin, SKIN.replace("0 1 2\n}", "0 1 7\n}", 1), "a.skin")
     assert figure.mesh.triangles.tolist() == [[0, 1, 0]]
     figure, _ = gone_on(obj, OBJ.replace("f 1 2 3", "f x 2 3"), "a.obj")
     assert figure.mesh.triangles[2].tolist() == [1, 1, 2]
 
 
-def test_a_singular_bind_matrix_keeps_the_joint_at_its_bind_position() -> None:
+def test_singular_bind_matrix_keeps_the_bind_position_of_the_joint() -> None:
     broken = SKIN.replace("0 1 0\n  0 0 1\n  5", "0 0 0\n  0 0 1\n  5")
     figure, _ = gone_on(skin, broken, "a.skin")
     assert figure.skin.inverse_bind[0, :3, 3].tolist() == [-5, -6, -7]
@@ -79,7 +79,7 @@ def frames(*rows: str) -> str:
      ("boxmin nan\nnan\n0", 2), ("boxmin 0 x 0 and more", 0)],
 )  # fmt: skip
 @pytest.mark.parametrize("end", ["\n", "\r\n", "\r"])
-def test_an_invalid_skeleton_item_affects_no_other_line(item: str, below: int, end: str) -> None:
+def test_invalid_skeleton_item_does_not_affect_other_lines(item: str, below: int, end: str) -> None:
     text = f"balljoint a {{\n{item}\ncolour red\nballjoint b {{ }} }}".replace("\n", end)
     source = Source("a.skel", text.encode(), diagnostics=Collector(keeps_errors=True))
     figure = skel.read(source)
@@ -87,7 +87,7 @@ def test_an_invalid_skeleton_item_affects_no_other_line(item: str, below: int, e
     assert warnings_of(source.diagnostics) == [("F006.unknown", 3 + below, {"found": b"colour"})]
 
 
-def test_an_invalid_frame_repeats_the_previous_one() -> None:
+def test_invalid_frame_repeats_the_previous_frame() -> None:
     good = [f"{k} 1 0" + " 0" * 12 for k in range(5)]
     bad = [good[0], good[1].replace("1", "nan", 1), good[2], good[3] + " 7", good[4]]
     motion, faults = gone_on(bvh, frames(*bad), "a.bvh")
@@ -96,12 +96,12 @@ def test_an_invalid_frame_repeats_the_previous_one() -> None:
     assert motion.clip.translations[:, 0, 0].tolist() == [0, 0, 2, 2, 4]
 
 
-def test_an_invalid_key_is_left_out() -> None:
+def test_invalid_key_is_left_out() -> None:
     clip, _ = gone_on(anim, ANIM.replace("0.5 1", "0.5 nan"), "a.anim")
     assert clip.channels[0].times.tolist() == [0, 1]
 
 
-def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
+def test_errors_of_body_models_state_vertex_and_joint(tmp_path: Any) -> None:
     arrays = model("smpl")
     arrays = {key: np.array(values) for key, values in arrays.items()}
     arrays["v_template"][3, 0] = np.nan
@@ -123,7 +123,7 @@ def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
     assert "v_template: expected finite numbers, found nan at vertex 3" in texts
     assert "weights: expected finite numbers, found inf at vertex 4" in texts
     assert "weights: vertex 5: expected weights that sum to 1, found 0.5" in texts
-    # Valid rows are scaled to a sum of exactly 1, invalid ones are as in the file.
+    # Valid rows are normalised to a sum of exactly 1; invalid rows are as in the file.
     sums = np.bincount(
         np.repeat(np.arange(figure.skin.n_vertices), np.diff(figure.skin.starts)),
         figure.skin.weights,
@@ -133,8 +133,8 @@ def test_body_model_errors_name_vertex_and_joint(tmp_path: Any) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
-def test_a_reader_continues_only_after_recoverable_errors(seed: int) -> None:
-    """Files that the strict reader refuses have an error; files that it accepts have none."""
+def test_readers_continue_only_after_recoverable_errors(seed: int) -> None:
+    """Files refused by the strict reader have an error; files accepted by it have none."""
     rng = random.Random(seed)
     texts = {**FILES, "dir/b.skin": SKIN.encode(), "dir/a.obj": OBJ.encode(),
              "dir/a.ply": PLY.encode(), "dir/a.bvh": BVH.encode()}  # fmt: skip
@@ -165,7 +165,7 @@ def test_non_finite_values_have_a_separate_code(word: str) -> None:
     assert [fault.code for fault in source.diagnostics.errors] == ["F003"]
 
 
-def test_skin_locations_are_lines() -> None:
+def test_locations_in_skin_files_are_lines() -> None:
     source = Source("a.skin", SKIN.encode())
     skin.read(source)
     found = {kind: source.place(kind, 1) for kind in ("positions", "normals", "weights")}

@@ -1,7 +1,5 @@
-"""The work for files with many joints grows linearly with the number of joints.
-
-Function calls are counted for some number of joints and for four times as many; no time is
-measured.
+"""Linear growth of the work with the number of joints in a file. Function calls are counted for a
+number of joints and for four times as many; no time is measured.
 """
 
 import sys
@@ -21,7 +19,7 @@ from viewer.rig.posing.pose_record import record_of
 from viewer.rig.skeleton import ball_skeleton, dof_label, dof_labels, joint_labels
 
 FEW, MANY = 200, 800
-LINEAR = 4.4  # ratio of the work for four times the joints; less than 4 if part of it is constant
+LINEAR = 4.4  # ratio of the work for four times the joints; below 4 if part of it is constant
 SKEL = "balljoint j{} {{\n offset 0 1 0\n rotxlimit -1 1\n pose 0.5 0 0\n"
 BVH = "j{}\n{{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
 
@@ -62,7 +60,7 @@ FILES = {
 
 
 def calls(work):
-    """Return the number of function calls, including Python's own functions."""
+    """Return the number of function calls, including those of built-in functions."""
     count = 0
 
     def note(frame, event, argument):
@@ -89,15 +87,15 @@ def read_it(name, text, takes_faults):
 @pytest.mark.slow
 @pytest.mark.parametrize("takes_faults", [False, True], ids=["reading", "lint"])
 @pytest.mark.parametrize("name", FILES)
-def test_readers_are_linear_in_the_joints(name, takes_faults):
-    read_it(name, FILES[name](2), takes_faults)  # modules are loaded once
+def test_work_of_readers_is_linear_in_the_number_of_joints(name, takes_faults):
+    read_it(name, FILES[name](2), takes_faults)  # load modules before counting
     texts = [FILES[name](count) for count in (FEW, MANY)]
     few, many = (calls(partial(read_it, name, text, takes_faults)) for text in texts)
     assert many < LINEAR * few
 
 
 class Names(tuple):
-    """Names that count how often they are accessed."""
+    """A list of names that counts how often they are accessed."""
 
     __slots__ = ()
     looked = 0
@@ -130,7 +128,7 @@ def pair(skeleton):
 
 
 @pytest.mark.parametrize("work", [joint_labels, dof_labels, record, pair])
-def test_names_are_scanned_only_a_few_times(work):
+def test_names_are_accessed_only_a_few_times(work):
     Names.looked = 0
     skeleton = chain(MANY)
     work(skeleton)
@@ -144,7 +142,7 @@ def test_all_dof_labels_match_single_labels():
 
 
 @pytest.mark.parametrize("name", ["nested.skel", "wide.skel"])
-def test_many_joints_stand_where_the_file_puts_them(name):
+def test_many_joints_have_the_positions_of_the_file(name):
     skeleton = read_it(name, FILES[name](MANY).replace("0.5 0 0", "0 0 0"), False).skeleton
     heights = world_matrices(skeleton, rest_pose(skeleton))[:, 1, 3]
     wanted = np.arange(1, MANY + 1) if name == "nested.skel" else np.arange(MANY).clip(0, 1)

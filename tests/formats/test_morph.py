@@ -1,4 +1,4 @@
-"""The .morph reader: grammar, quirks, exact messages."""
+"""The .morph reader: grammar, quirks, and messages."""
 
 import pytest
 from faults import refusal_of, warnings_of
@@ -41,25 +41,25 @@ def assert_good(target):
     ],
     ids=["plain", "crlf", "one line", "glued", "mark", "swapped", "other order", "descending"],
 )
-def test_reads_every_part_without_warnings(text):
+def test_all_values_are_read_without_warnings(text):
     target, warnings = parse(text)
     assert_good(target)
     assert warnings == []
 
 
-def test_missing_last_brace_warns():
+def test_missing_last_brace_is_reported_as_a_warning():
     target, warnings = parse(GOOD.rstrip("}\n"))
     assert_good(target)
     assert warnings == [("F006.last-brace", None, {"section": "normals"})]
 
 
-def test_missing_normals_warn():
+def test_missing_normals_are_reported_as_a_warning():
     target, warnings = parse(POSITIONS)
     assert target.normals is None
     assert warnings == [("F007.morph-normals", None, {})]
 
 
-def test_empty_target_warns():
+def test_empty_target_is_reported_as_a_warning():
     target, warnings = parse("positions 0 { } normals 0 { }")
     assert len(target.vertices) == 0 and warnings == [("F007.morph-empty", None, {})]
 
@@ -145,7 +145,7 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
     assert refusal_of(lambda: parse(text)) == fault
 
 
-def test_truncation_anywhere_gives_an_error_or_a_warning():
+def test_truncation_anywhere_is_an_error_or_a_warning():
     for length in range(len(GOOD.rstrip())):
         try:
             _, warnings = parse(GOOD[:length])
@@ -160,7 +160,7 @@ def test_morph_is_distinguished_from_a_skin_by_its_suffix():
     assert detect(Source("smile.skin", GOOD.encode())) == "skin"
 
 
-def test_morphs_are_not_written(tmp_path):
+def test_writing_of_morphs_is_refused(tmp_path):
     target, _ = parse(GOOD)
     with pytest.raises(UnsupportedFormatError, match=r'no writer for "\.morph"') as caught:
         write(target, tmp_path / "copy.morph")

@@ -1,4 +1,4 @@
-"""Thousands of broken files: each gives a figure or one line that starts with the path."""
+"""Thousands of broken files, which are read or refused in one line that starts with the path."""
 
 import random
 import re
@@ -95,7 +95,7 @@ TOKENS = [
 
 
 def check(path, data):
-    """Read one file; if it loads, it can also be posed."""
+    """Read one file; if it loads, it must also be possible to pose it."""
     source = Source(path, data)
     try:
         figure = read(source)
@@ -112,7 +112,7 @@ def check(path, data):
 
 
 def move(figure):
-    """Deform a figure that was read, in its rest pose and in another one."""
+    """Deform a figure in its rest pose and in another pose."""
     if figure.skeleton is not None:
         pose = rest_pose(figure.skeleton)
         assert np.isfinite(world_matrices(figure.skeleton, pose)).all()
@@ -128,7 +128,7 @@ def move(figure):
 
 
 def star_skeleton(n_joints):
-    """Return a skeleton for a skin without one: every joint is a child of the first."""
+    """Return a skeleton for a skin without one, with every joint a child of the first."""
     return Skeleton(
         names=("",) * n_joints,
         parents=[-1] + [0] * (n_joints - 1),
@@ -225,21 +225,21 @@ MUTATIONS = [
 
 @pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("seed", range(10))
-def test_mutated_file_gives_a_figure_or_one_line(path, seed):
+def test_mutated_file_is_read_or_refused_in_one_line(path, seed):
     rng = random.Random(seed)
     for _ in range(150):
         check(path, mutate(FILES[path], rng))
 
 
 @pytest.mark.parametrize("path", FILES)
-def test_truncated_file_gives_a_figure_or_one_line(path):
+def test_truncated_file_is_read_or_refused_in_one_line(path):
     for cut in range(len(FILES[path])):
         check(path, FILES[path][:cut])
 
 
 @pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("token", [b"{", b"}", b" ", b"-", b"x", b"\0", b"9", b".", b"\x1a"])
-def test_inserted_letter_gives_a_figure_or_one_line(path, token):
+def test_file_with_an_inserted_letter_is_read_or_refused_in_one_line(path, token):
     data = FILES[path]
     for at in range(0, len(data), 2):
         check(path, data[:at] + token + data[at:])
@@ -247,13 +247,13 @@ def test_inserted_letter_gives_a_figure_or_one_line(path, token):
 
 @pytest.mark.parametrize("path", FILES)
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"1e-45", b"-1"])
-def test_extreme_number_gives_a_figure_or_one_line(path, token):
+def test_file_with_an_extreme_number_is_read_or_refused_in_one_line(path, token):
     words = re.split(rb"(\s+)", FILES[path])
     for at in range(0, len(words), 2):
         check(path, b"".join([*words[:at], token, *words[at + 1 :]]))
 
 
-def test_all_extreme_numbers_still_give_a_poseable_figure():
+def test_file_with_only_extreme_numbers_can_be_posed():
     check("dir/a.skel", re.sub(rb"-?\d\S*", b"3.4e38", SKEL))
     body = re.sub(rb"(\n  ?)(-?[\d.e-]+) (\S+) (\S+)(?=\n)", rb"\1\2 3.4e38 -3.4e38", SKIN)
     check("dir/a.skin", body)
@@ -261,19 +261,19 @@ def test_all_extreme_numbers_still_give_a_poseable_figure():
 
 @given(st.lists(st.sampled_from(TOKENS), max_size=60), st.sampled_from(sorted(FILES)))
 @settings(max_examples=400)
-def test_random_words_give_a_figure_or_one_line(words, path):
+def test_random_words_are_read_or_refused_in_one_line(words, path):
     check(path, b" ".join(words))
 
 
 @given(st.binary(max_size=200), st.sampled_from(sorted(FILES)))
 @settings(max_examples=200)
-def test_random_bytes_give_a_figure_or_one_line(data, path):
+def test_random_bytes_are_read_or_refused_in_one_line(data, path):
     check(path, data)
 
 
 @given(st.data(), st.sampled_from(sorted(FILES)))
 @settings(max_examples=300)
-def test_replaced_words_give_a_figure_or_one_line(data, path):
+def test_file_with_replaced_words_is_read_or_refused_in_one_line(data, path):
     words = re.split(rb"(\s+|[{}])", FILES[path])
     places = st.integers(0, len(words) - 1)
     changes = data.draw(
@@ -284,10 +284,11 @@ def test_replaced_words_give_a_figure_or_one_line(data, path):
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r\r\n", b"\r"])
 @pytest.mark.parametrize("path", FILES)
-def test_word_that_should_be_a_number_is_found_on_its_line(path, end):
+def test_invalid_number_is_reported_on_its_line(path, end):
     lines = FILES[path].split(b"\n")
     for number, line in enumerate(lines, start=1):
-        # Rows of numbers, whole or after the keyword of an item; not those after an unknown word.
+        # Only rows of numbers are changed, with or without the keyword of an item, but not those
+        # after an unknown word.
         if b"unknown" in line or not re.search(rb"[\d.]+$", line) or b"{" in line:
             continue
         broken = [*lines[: number - 1], line[:-1] + b"x", *lines[number:]]

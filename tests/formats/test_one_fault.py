@@ -1,4 +1,4 @@
-"""Readers that continue after errors: one error of each kind, with its location and effect."""
+"""Readers that continue after errors, with one error of each kind, its location and its effect."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from viewer.formats import Source, anim, bvh, obj, ply, skel, skin
 @pytest.mark.parametrize(
     "case", MESH_FAULTS + MOTION_FAULTS, ids=lambda case: f"{case[1]}, {case[4]!r}"[:40]
 )
-def test_one_error_is_reported_with_its_location(case: tuple[Any, ...]) -> None:
+def test_each_error_is_reported_with_its_location(case: tuple[Any, ...]) -> None:
     module, name, text, old, new, fault, part, places = case
     assert old in text
     broken = text.replace(old, new, 1)
     assert gone_on(module, broken, name)[1] == [(fault, 1, part, places)]
-    with pytest.raises(ViewerError):  # without the list, the reader still refuses
+    with pytest.raises(ViewerError):  # without collecting errors, the reader refuses the file
         module.read(Source(name, broken.encode()))
 
 

@@ -1,4 +1,4 @@
-"""The .anim reader and writer: grammar, quirks, and messages about broken files."""
+"""The .anim reader and writer: grammar, quirks, and messages."""
 
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from viewer.rig.motion.clip import Channel, Clip
 SKEL = "balljoint root { offset 0 0 0 }"
 
 
-def test_reads_every_part() -> None:
+def test_all_values_are_read() -> None:
     clip, warnings = parse(GOOD)
     assert (clip.name, clip.start, clip.end, warnings) == ("walk", -1.0, 4.0, [])
     (channel,) = clip.channels
@@ -56,7 +56,7 @@ def test_clip_round_trips(tmp_path: Path) -> None:
         assert (old.tangents, old.extrapolation) == (new.tangents, new.extrapolation)
 
 
-def test_tangents_mix_rules_and_slopes_on_the_two_sides() -> None:
+def test_tangents_may_mix_rules_and_slopes_on_both_sides() -> None:
     keys = "0 1 13.7 -0.22 1 2 flat -.75 2 3 +1e-1 linear 3 4 smooth 5."
     channel = f"channel {{ extrapolate linear cycle keys 4 {{ {keys} }} }}"
     clip, warnings = parse(f"animation {{ range 0 1 numchannels 1 {channel} }}")
@@ -69,7 +69,7 @@ def test_tangents_mix_rules_and_slopes_on_the_two_sides() -> None:
     )
 
 
-def test_range_may_differ_from_the_keys_and_channels_from_each_other() -> None:
+def test_range_may_differ_from_the_keys_and_between_channels() -> None:
     channels = (
         "channel 0{extrapolate constant cycle keys 2{-1 1 flat flat 1 2 flat flat}}"
         "channel 1{extrapolate linear bounce keys 1{2 7 flat flat}}"
@@ -80,18 +80,18 @@ def test_range_may_differ_from_the_keys_and_channels_from_each_other() -> None:
     assert [channel.target for channel in clip.channels] == [0, 1]
 
 
-def test_keys_at_one_time_are_both_kept() -> None:
+def test_keys_at_the_same_time_are_both_kept() -> None:
     clip, warnings = parse(GOOD.replace("{ 0 1", "{ 2 1"))
     assert warnings == [] and clip.channels[0].times.tolist() == [2.0, 2.0]
 
 
-def test_reversed_range_is_put_in_order_with_a_warning() -> None:
+def test_reversed_range_is_swapped_with_a_warning() -> None:
     clip, warnings = parse(GOOD.replace("range -1 4", "range 4 -1"))
     assert (clip.start, clip.end) == (-1.0, 4.0)
     assert warnings == [("F007.anim-reversed", 1, {"start": "-1", "end": "4"})]
 
 
-def test_what_follows_the_animation_is_ignored_with_a_warning() -> None:
+def test_text_after_the_animation_is_ignored_with_a_warning() -> None:
     assert parse(f"{GOOD} more")[1] == [("F006.anim-after", 1, {"found": b"more"})]
 
 
@@ -131,7 +131,7 @@ def test_clip_is_recognised_by_content() -> None:
     assert detect(Source("walk.txt", GOOD.encode())) == "anim"
 
 
-def test_clip_of_another_skeleton_names_both_dof_counts(tmp_path: Path) -> None:
+def test_clip_of_another_skeleton_is_refused_with_both_dof_counts(tmp_path: Path) -> None:
     (tmp_path / "a.skel").write_text(SKEL)
     (tmp_path / "a.anim").write_text(GOOD)
     with pytest.raises(RigError) as caught:
@@ -141,7 +141,7 @@ def test_clip_of_another_skeleton_names_both_dof_counts(tmp_path: Path) -> None:
     )
 
 
-def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
+def test_clip_for_a_body_is_refused_with_the_reason(tmp_path: Path) -> None:
     """The wasp's 72 channels and SMPL's 72 values have different meanings."""
     np.savez(tmp_path / "smpl.npz", **model("smpl", 32))
     channel = "channel { extrapolate linear linear keys 1 { 0 0 flat flat } } "
@@ -155,7 +155,7 @@ def test_clip_of_a_body_says_why_it_does_not_fit(tmp_path: Path) -> None:
     )
 
 
-def test_clip_alone_asks_for_its_skeleton(tmp_path: Path) -> None:
+def test_clip_without_a_skeleton_is_refused(tmp_path: Path) -> None:
     (tmp_path / "a.anim").write_text(GOOD)
     with pytest.raises(RigError, match=r"open it together with its \.skel"):
         load(tmp_path / "a.anim")

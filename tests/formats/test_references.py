@@ -1,4 +1,4 @@
-"""Referenced files must be below the folder of the referencing file, with links resolved."""
+"""References to files, which must be below the referencing file's folder after resolving links."""
 
 import json
 
@@ -27,7 +27,7 @@ PLY = (
 
 @pytest.fixture
 def folder(tmp_path):
-    """Return a model's folder, with a secret image next to it, and links to that image."""
+    """Return the folder of a model, with a secret image next to it, and links to that image."""
     model = tmp_path / "model"
     (tmp_path / "secret").mkdir()
     (model / "sub").mkdir(parents=True)
@@ -87,7 +87,7 @@ def skin_text(name):
 
 
 def write_model(folder, kind, name):
-    """Write a model that names an image; return its path, and the file and line of the name."""
+    """Write a model that refers to an image; return its path, and the reference's file and line."""
     path = folder / f"a.{kind}"
     if kind == "obj":
         (folder / "m.mtl").write_text(f"newmtl a\nmap_Kd {name}\n")
@@ -101,7 +101,7 @@ def write_model(folder, kind, name):
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 @pytest.mark.parametrize("name", ["../secret/x.png", "{top}/secret/x.png", "link.png", "way/x.png"])
-def test_a_texture_from_outside_is_not_read(folder, kind, name):
+def test_texture_outside_the_folder_is_not_read(folder, kind, name):
     name = name.format(top=folder.parent)
     path, named, line = write_model(folder, kind, name)
     source = Source.open(path)
@@ -114,7 +114,7 @@ def test_a_texture_from_outside_is_not_read(folder, kind, name):
 
 
 @pytest.mark.parametrize("kind", ["skin", "ply"])
-def test_an_absolute_path_is_reported_even_within_the_folder(folder, kind):
+def test_absolute_path_is_reported_even_within_the_folder(folder, kind):
     path, named, line = write_model(folder, kind, f"{folder}/in.png")
     source = Source.open(path)
     assert read(source).mesh.materials[0].image is None
@@ -123,7 +123,7 @@ def test_an_absolute_path_is_reported_even_within_the_folder(folder, kind):
     assert (warning.path, fault_of(warning)) == (named, ("F005.texture-refused", line, values))
 
 
-def test_a_library_with_an_absolute_path_gets_the_image_beside_it_and_says_so(folder):
+def test_absolute_path_in_a_library_is_replaced_by_the_image_next_to_it_with_a_warning(folder):
     path, named, line = write_model(folder, "obj", "/home/elsewhere/in.png")
     source = Source.open(path)
     (material,) = read(source).mesh.materials
@@ -135,7 +135,7 @@ def test_a_library_with_an_absolute_path_gets_the_image_beside_it_and_says_so(fo
 
 @pytest.mark.parametrize("kind", ["skin", "obj", "ply"])
 @pytest.mark.parametrize("name", ["in.png", "sub/in.png", "same.png"])
-def test_a_texture_within_the_folder_is_read(folder, kind, name):
+def test_texture_within_the_folder_is_read(folder, kind, name):
     path, _, _ = write_model(folder, kind, name)
     source = Source.open(path)
     (material,) = read(source).mesh.materials
@@ -143,7 +143,7 @@ def test_a_texture_within_the_folder_is_read(folder, kind, name):
     assert source.warnings == []
 
 
-def test_a_library_behind_a_link_is_not_read(folder):
+def test_library_behind_a_link_is_not_read(folder):
     path, _, _ = write_model(folder, "obj", "in.png")
     (folder / "m.mtl").rename(folder.parent / "secret" / "m.mtl")
     (folder / "m.mtl").symlink_to(folder.parent / "secret" / "m.mtl")
@@ -156,7 +156,7 @@ def test_a_library_behind_a_link_is_not_read(folder):
 
 @pytest.mark.parametrize("item", ["skeleton {}", "skin {}", "morphs 1 {{ {} }}"])
 @pytest.mark.parametrize("name", ["../secret/a.skel", "{top}/secret/a.skel", "way/a.skel"])
-def test_a_rig_naming_files_outside_its_folder_is_refused(folder, item, name):
+def test_rig_with_files_outside_its_folder_is_refused(folder, item, name):
     name = name.format(top=folder.parent)
     with pytest.raises(FormatError) as caught:
         read(Source(folder / "a.rig", f"rig a {{\n{item.format(name)}\n}}\n".encode()))
@@ -164,13 +164,13 @@ def test_a_rig_naming_files_outside_its_folder_is_refused(folder, item, name):
     assert f'within the folder of the .rig, found "{name[:39]}' in str(caught.value)
 
 
-def test_a_rig_may_use_backslashes(folder):
+def test_rig_may_use_backslashes(folder):
     named = read(Source(folder / "a.rig", b"rig a { skeleton sub\\a.skel }"))
     assert isinstance(named, NamedFiles)
     assert named.paths == (folder / "sub" / "a.skel",)
 
 
-def test_the_texture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
+def test_texture_of_a_pig_folder_must_not_be_a_link_out_of_the_folder(folder):
     pig = write_pig(folder / "pig")
     (pig / "skin.png").symlink_to(folder.parent / "secret" / "x.png")
     contents = read_files([pig])
@@ -178,7 +178,7 @@ def test_the_texture_of_a_pig_folder_may_not_be_a_link_out_of_it(folder):
     assert f"{pig}: texture skin.png is outside the folder: not read" in contents.warnings
 
 
-def test_a_linked_file_finds_companions_next_to_the_link(folder):
+def test_linked_file_finds_companions_next_to_the_link(folder):
     path, _, _ = write_model(folder, "skin", "in.png")
     elsewhere = folder.parent / "elsewhere"
     elsewhere.mkdir()
@@ -191,14 +191,14 @@ def test_a_linked_file_finds_companions_next_to_the_link(folder):
     assert material.image.tolist() == [[[1, 2, 3, 255]]]
 
 
-def test_an_image_named_by_the_user_may_be_anywhere(folder):
+def test_image_given_by_the_user_may_be_anywhere(folder):
     path, _, _ = write_model(folder, "skin", "gone.png")
     scene = viewer.load(path, folder / "link.png")
     (material,) = scene.actors[0].figure.mesh.materials
     assert np.asarray(material.image).tolist() == [[[9, 8, 7, 255]]]
 
 
-def test_a_texture_outside_the_folder_is_not_exported(folder, tmp_path, capsys):
+def test_texture_outside_the_folder_is_not_exported(folder, tmp_path, capsys):
     from viewer.cli import run
 
     path, named, line = write_model(folder, "skin", "../secret/x.png")

@@ -85,7 +85,7 @@ def test_handmade_skin_round_trips():
     found, _ = again(wanted, skin)
     assert_equal_meshes(found.mesh, wanted.mesh)
     assert_equal_skins(found.skin, wanted.skin)
-    assert np.array_equal(found.mesh.materials[0].image, image)  # its texture was written too
+    assert np.array_equal(found.mesh.materials[0].image, image)  # the texture was written too
 
 
 def test_mesh_without_skin_round_trips():
@@ -95,7 +95,7 @@ def test_mesh_without_skin_round_trips():
     assert len(warnings) == 1
 
 
-def test_other_images_are_not_replaced(tmp_path):
+def test_existing_different_images_are_not_replaced(tmp_path):
     (tmp_path / "a.png").write_bytes(b"mine")
     textured = mesh(materials=(Material("", Texture("a.png", np.zeros((1, 1, 4), np.uint8))),))
     with pytest.raises(OutputError, match=r"a\.png: a different image already exists"):
@@ -107,7 +107,7 @@ def test_other_images_are_not_replaced(tmp_path):
 def test_textures_in_subfolders_round_trip(tmp_path):
     image = np.arange(16, dtype=np.uint8).reshape(2, 2, 4)
     textured = mesh(materials=(Material("", Texture("sub/b.png", image)),))
-    for _ in range(2):  # the second time the same texture exists already
+    for _ in range(2):  # the second time the same texture exists
         write(Figure("a", textured), tmp_path / "a.skin")
     found = skin.read(Source.open(tmp_path / "a.skin")).mesh.materials[0]
     assert found.texture == "sub/b.png" and np.array_equal(found.image, image)
@@ -133,7 +133,7 @@ def test_real_files_round_trip(shared, name):
     assert_equal_skins(found.skin, skin_read.skin)
 
 
-# Unsupported content
+# Content that a format cannot store
 
 
 def refused_for(caught):
@@ -175,14 +175,14 @@ def refused_for(caught):
         ({"names": ("\ud800",)}, ("F002.skel-name", {"name": "\ud800"})),
     ],
 )
-def test_skeleton_that_does_not_fit_is_refused(tmp_path, changes, fault):
+def test_skeleton_that_the_format_cannot_store_is_refused(tmp_path, changes, fault):
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", skeleton=skeleton([-1], **changes)), tmp_path / "a.skel")
     assert refused_for(caught) == fault
     assert list(tmp_path.iterdir()) == []
 
 
-def test_skeleton_in_another_order_than_depth_first_is_refused(tmp_path):
+def test_skeleton_not_in_depth_first_order_is_refused(tmp_path):
     breadth_first = skeleton([-1, 0, 0, 1])
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", skeleton=breadth_first), tmp_path / "a.skel")
@@ -251,7 +251,7 @@ def test_skeleton_with_fewer_dofs_is_refused(tmp_path):
         ),
     ],
 )
-def test_mesh_that_does_not_fit_is_refused(tmp_path, changes, message):
+def test_mesh_that_the_format_cannot_store_is_refused(tmp_path, changes, message):
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", mesh(**changes)), tmp_path / "a.skin")
     assert str(caught.value) == message
@@ -265,7 +265,7 @@ def test_weights_beyond_float32_are_refused(tmp_path):
     assert str(caught.value) == ".skin cannot store numbers beyond 3.4e+38"
 
 
-def test_parts_that_a_figure_lacks_cannot_be_written(tmp_path):
+def test_missing_parts_of_a_figure_cannot_be_written(tmp_path):
     with pytest.raises(UnsupportedFormatError) as caught:
         write(Figure("a", mesh()), tmp_path / "a.skel")
     assert str(caught.value) == "figure a has no skeleton to write as .skel"
@@ -286,7 +286,7 @@ def test_suffix_in_capitals_is_written(tmp_path):
     assert (tmp_path / "A.SKIN").read_text().startswith("positions 3 {\n")
 
 
-def test_properties_of_materials_that_skin_omits_are_named(tmp_path):
+def test_properties_of_materials_that_skin_omits_are_reported(tmp_path):
     plain = Material("a", Texture("a.png", np.full((1, 1, 4), 255, np.uint8)))
     figure = Figure("a", mesh(uvs=np.zeros((3, 2)), materials=(plain,), triangle_materials=[0]))
     assert write(figure, tmp_path / "a.skin") == []
@@ -300,7 +300,7 @@ def test_properties_of_materials_that_skin_omits_are_named(tmp_path):
 
 
 def test_texture_seams_are_split(tmp_path):
-    """Three vertices, two triangles; vertices 0 and 2 have other coordinates in the second one."""
+    """Vertices 0 and 2 of three have different coordinates in the second of two triangles."""
     uvs = np.arange(10.0).reshape(5, 2)
     shape = mesh(triangles=[[0, 1, 2], [0, 2, 1]], uvs=uvs, uv_triangles=[[0, 1, 2], [3, 4, 1]])
     weights = skin_from_lists([[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(1, 1.0)]], [np.eye(4)] * 2)

@@ -1,4 +1,4 @@
-"""Checks of output files: refused targets, and paths of the same file."""
+"""Checks of output paths: refused targets, and several paths of one file."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def old(tmp_path):
     return path
 
 
-def test_missing_files_pass(tmp_path, old):
+def test_target_that_does_not_exist_is_accepted(tmp_path, old):
     check_targets([tmp_path / "a", tmp_path / "b"], [old, tmp_path / "missing"], False)
     check_targets([old], [], True)
     check_targets([], [old], False)
@@ -39,7 +39,7 @@ def test_existing_file_is_refused_even_through_a_link(tmp_path, old):
 
 
 @pytest.mark.parametrize("make", [Path.symlink_to, Path.hardlink_to])
-def test_input_is_refused_under_any_name(tmp_path, old, make):
+def test_input_is_refused_under_any_path(tmp_path, old, make):
     other = tmp_path / "other"
     make(other, old)
     for target, read in ((old, old), (other, old), (old, other)):
@@ -57,7 +57,7 @@ def test_files_in_an_opened_folder_are_inputs(tmp_path):
     check_targets([folder / "new", folder / "out" / "a"], [folder], True)
 
 
-def test_one_file_under_two_names_is_refused(tmp_path, old):
+def test_one_file_under_two_paths_is_refused(tmp_path, old):
     (tmp_path / "link").symlink_to("old")
     (tmp_path / "nothing").symlink_to("new")
     os.link(old, tmp_path / "hard")
@@ -82,7 +82,7 @@ def test_read_only_folder_is_refused(tmp_path, monkeypatch):
     assert refused([target]) == f"{target}: the folder {tmp_path} is not writable"
 
 
-def test_devices_are_never_replaced_and_need_no_force(tmp_path):
+def test_devices_are_never_replaced_and_require_no_force(tmp_path):
     os.mkfifo(tmp_path / "pipe")
     check_targets([Path("/dev/null"), Path("/dev/null"), tmp_path / "pipe"], [], False)
 
@@ -104,7 +104,7 @@ def test_input_folder_is_not_replaced(tmp_path, name):
     assert "input" in refused(tmp_path / "link" / "smpl", [target], True, check_folder_target)
 
 
-def test_existing_folder_needs_force(tmp_path, old):
+def test_existing_folder_requires_force(tmp_path, old):
     target = tmp_path / "out" / "smpl"
     check_folder_target(target, [old], False)
     target.mkdir(parents=True)

@@ -1,4 +1,4 @@
-"""Temporary files are removed when the process is terminated."""
+"""Temporary files, which are removed when the process is terminated."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from viewer.media.saving import Replacement
 from viewer.media.unfinished import remove_unfinished
 
 
-def test_finished_files_stay_and_unfinished_ones_are_removed(tmp_path):
+def test_finished_files_stay_and_unfinished_files_are_removed(tmp_path):
     save_bytes(tmp_path / "done.txt", b"whole")
     finished, begun = Replacement(tmp_path / "a.mp4"), Replacement(tmp_path / "b.mp4")
     finished.begin().write_bytes(b"video")

@@ -1,4 +1,4 @@
-"""Figures and motions with one error each."""
+"""Figures and motions with one planted error each."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def with_normal(vertex: int, normal: tuple[float, float, float]) -> Figure:
 
 
 def with_island(weights: list[tuple[int, float]]) -> Figure:
-    """Return the column and a tetrahedron next to it, vertices 20 to 23."""
+    """Return the column and a tetrahedron of vertices 20 to 23 next to it."""
     figure = column()
     far = np.array([[5.0, 0, 0], [6, 0, 0], [5, 1, 0], [5, 0, 1]])
     faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]) + 20
@@ -93,7 +93,7 @@ def skeleton_with(**changes) -> Figure:
 def posed_outside() -> Scene:
     figure = column()
     pose = rest_pose(figure.skeleton)
-    pose.dofs[7] = 4.0  # knee.y, which ends at 3
+    pose.dofs[7] = 4.0  # knee.y, with an upper limit of 3
     return scene_of(figure, pose=pose)
 
 
@@ -132,7 +132,7 @@ def moebius() -> Figure:
 
 
 def keyed(channels: dict[int, tuple[list[float], list[float]]], end: float = 1.0) -> Scene:
-    """Return the column with a clip of keys; the other channels stay at 0."""
+    """Return the column with a clip of these keys; the other channels are 0."""
     figure = column()
     made = []
     for target in range(figure.skeleton.n_dofs):
@@ -142,7 +142,7 @@ def keyed(channels: dict[int, tuple[list[float], list[float]]], end: float = 1.0
 
 
 def moving(change: Callable[[np.ndarray, np.ndarray], None], timing: Timing | None = None) -> Scene:
-    """Return standing legs whose root's translations (F, 3) and rotations (F, J, 4) are changed."""
+    """Return standing legs with changed root translations (F, 3) and rotations (F, J, 4)."""
     figure = legs()
     clip = standing(figure)
     translations, rotations = clip.translations.copy(), clip.rotations.copy()
@@ -184,7 +184,7 @@ def shaking_point(points: np.ndarray) -> None:
 
 
 def people(*places: np.ndarray) -> Scene:
-    """Return people of one capture at given x in each frame, NaN where they are absent."""
+    """Return people of one capture at given x in each frame; NaN means absent."""
     found = []
     for number, x in enumerate(places):
         scene = moving(lambda root, _, x=x: np.copyto(root[:, 0], np.nan_to_num(x)))
@@ -226,7 +226,7 @@ def point_jump(points: np.ndarray) -> None:
 
 
 def five_joints() -> Figure:
-    """Return the column on five joints in a row, vertex 8 influenced by all of them."""
+    """Return the column bound to a chain of five joints, all of which influence vertex 8."""
     figure = column()
     names = ("a", "b", "c", "d", "e")
     skeleton = make_skeleton(names, [-1, 0, 1, 2, 3], [[0, 0, 0]] + [[0, 1, 0]] * 4)
@@ -297,7 +297,7 @@ def scaled(*factors: float) -> np.ndarray:
     return matrix
 
 
-# name: (maker, code, location, expected values, first)
+# Values by name: (maker, code, kind of location, expected locations).
 FAULTS: dict[str, tuple[Callable[[], Figure | Scene], str, str, list[int]]] = {
     "sum too small": (lambda: weighted({5: [(0, 0.9)]}), "W001", "vertices", [5]),
     "sum too large": (

@@ -1,4 +1,4 @@
-"""Small valid figures and motions, for tests that introduce one error."""
+"""Small valid figures and motions for tests that introduce one error."""
 
 from __future__ import annotations
 
@@ -22,10 +22,9 @@ FRAMES = 60
 
 
 def column() -> Figure:
-    """Return a closed square column, 5 rings of 4 vertices, on two joints; x to -x mirrors it.
-
-    Vertices 4 h + k are ring h at y = h: k = 0 to 3 go around at (1, 1), (-1, 1), (-1, -1), (1, -1)
-    in x and z, which mirrors 0 with 1 and 2 with 3. Joint 0 is at the foot, joint 1 at y = 2.
+    """Return a closed square column of 5 rings of 4 vertices on two joints, symmetric in x.
+    Vertices 4 h + k are ring h at y = h, with k = 0 to 3 at (1, 1), (-1, 1), (-1, -1), (1, -1) in x
+    and z; 0 mirrors 1, and 2 mirrors 3. Joint 0 is at the foot, joint 1 at y = 2.
     """
     ring = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]], dtype=float)
     positions = np.array([[x, h, z] for h in range(HEIGHTS) for x, z in ring])
@@ -54,7 +53,7 @@ def make_mesh(positions, triangles) -> Mesh:
 
 
 def make_skeleton(names, parents, offsets, limits=(-3.0, 3.0)) -> Skeleton:
-    """Build a skeleton whose joints rotate about x, y and z; the root also translates."""
+    """Build a skeleton with joints that rotate about x, y and z; the root also translates."""
     count = len(names)
     dofs = 3 + 3 * count
     bounds = np.tile(limits, (dofs, 1))
@@ -81,7 +80,7 @@ def legs() -> Figure:
 
 
 def standing(figure: Figure, **changes) -> SampledClip:
-    """Return a motion of 60 frames at 30 fps in which nothing moves."""
+    """Return a motion of 60 frames at 30 fps without movement."""
     count = figure.skeleton.n_joints
     clip = SampledClip(
         name="still",
@@ -93,7 +92,7 @@ def standing(figure: Figure, **changes) -> SampledClip:
 
 
 def keypoints() -> tuple[Figure, PointClip]:
-    """Return three points that are still and visible for 60 frames."""
+    """Return three static points that are visible for 60 frames."""
     limbs = np.array([[0, 1], [1, 2]])
     layout = PointLayout("three", ("hip", "knee", "ankle"), limbs, np.zeros(3, dtype=np.int32))
     rows = np.tile([[0, 1, 0, 0.9], [0, 0.5, 0, 0.9], [0, 0, 0, 0.9]], (FRAMES, 1, 1))

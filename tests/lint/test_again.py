@@ -1,4 +1,4 @@
-"""Checks of an open scene and its files: no duplicates, locations, and changed files."""
+"""Repeated checks of an open scene and its files: duplicates, locations, and changed files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ TEXTS = {
 
 @pytest.fixture
 def files(tmp_path: Path) -> list[Path]:
-    """A rig and a clip with errors that readers repair, so that the figures lack them."""
+    """A rig and a clip with errors that readers repair, so that the figures do not contain them."""
     for name, text in TEXTS.items():
         (tmp_path / name).write_text(text)
     return [tmp_path / name for name in TEXTS]
@@ -41,7 +41,7 @@ def checked(files: list[Path], scene: Scene | None = None) -> list[Finding]:
     return lint_again(scene or viewer.load(*files), files).findings
 
 
-def test_reader_repairs_are_found_as_by_the_command(files: list[Path]) -> None:
+def test_errors_repaired_by_readers_are_found_as_by_the_command(files: list[Path]) -> None:
     again = lint_again(viewer.load(*files), files)
     assert again.n_files == 3 and again.notes == ()
     texts = [*map(finding_text, again.findings)]
@@ -52,14 +52,14 @@ def test_reader_repairs_are_found_as_by_the_command(files: list[Path]) -> None:
     } <= places  # fmt: skip
 
 
-def test_nothing_is_reported_twice(files: list[Path]) -> None:
+def test_no_finding_is_reported_twice(files: list[Path]) -> None:
     codes = [f.code for f in checked(files)]
     assert [code for code in codes if code in ("W001", "M007", "S003", "C001")] == [
         "S003", "M007", "C001", "W001"
     ]  # fmt: skip
 
 
-def test_reader_findings_jump_to_the_location_they_name(files: list[Path]) -> None:
+def test_reader_findings_have_the_location_they_state(files: list[Path]) -> None:
     found = {f.code: f for f in checked(files)}
     assert (found["M007"].actor, found["M007"].vertices.tolist()) == (0, [1])
     assert (found["S003"].actor, found["S003"].joints.tolist()) == (0, [0])
@@ -76,13 +76,13 @@ def test_edited_data_has_no_line(files: list[Path]) -> None:
     scene.actors[0] = replace(scene.actors[0], figure=replace(figure, skin=skin))
     found = {f.code: f for f in checked(files, scene)}
     assert found["W001"].diagnostic.values["n"] == 2 and found["W001"].file is None
-    # The skeleton is still the one from the file.
+    # The skeleton is still that of the file.
     assert found["S003"].file.name == "a.skel" and found["S003"].actor == 0
-    # It is unknown whether the reader's messages about the skin apply to this mesh.
+    # The reader's messages about the skin may not apply to this mesh.
     assert found["M007"].file.name == "a.skin" and found["M007"].actor is None
 
 
-def test_missing_files_are_named(files: list[Path]) -> None:
+def test_missing_files_are_reported(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].unlink()
     again = lint_again(scene, files)
@@ -93,7 +93,7 @@ def test_missing_files_are_named(files: list[Path]) -> None:
     assert found["W001"].file is None and found["S003"].line == 5
 
 
-def test_changed_files_are_named(files: list[Path]) -> None:
+def test_changed_files_are_reported(files: list[Path]) -> None:
     scene, opened_at = viewer.load(*files), time.time()
     assert lint_again(scene, files, since=opened_at + 60.0).notes == ()
     os.utime(files[0], (opened_at + 100.0,) * 2)
@@ -107,7 +107,7 @@ def test_changed_files_are_named(files: list[Path]) -> None:
     assert again.notes[0].startswith("a.skel, a.skin, a.anim were changed")
 
 
-def test_a_changed_file_inside_a_folder_is_detected(tmp_path: Path) -> None:
+def test_changed_file_in_a_folder_is_detected(tmp_path: Path) -> None:
     from formats import pig_text
 
     folder = pig_text.write(tmp_path / "pig")
@@ -116,7 +116,7 @@ def test_a_changed_file_inside_a_folder_is_detected(tmp_path: Path) -> None:
     assert lint_again(scene, [folder], since=opened_at + 60.0).notes[0].startswith("pig was")
 
 
-def test_a_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
+def test_new_error_in_a_changed_file_is_reported(files: list[Path]) -> None:
     scene = viewer.load(*files)
     files[1].write_text(TEXTS["a.skin"].replace("2 0 0", "2 up 0", 1))
     found = checked(files, scene)
@@ -130,7 +130,7 @@ def test_guessed_files_are_used_only_if_the_scene_matches_them() -> None:
     assert lint_again(scene_of(column()), bundled, is_likely=True).n_files == 0
 
 
-def test_people_of_a_capture_keep_their_folder(shared_data: Path) -> None:
+def test_findings_about_captured_people_refer_to_the_folder(shared_data: Path) -> None:
     folder = shared_data / "smpl_synthetic" / "easymocap" / "keypoints3d"
     found = checked([folder])
     assert [(f.code, f.actor, f.file) for f in found if f.code == "C012"] == [
@@ -157,7 +157,7 @@ def test_progress_may_cancel_while_frames_are_read(shared_data: Path) -> None:
     ("found", "part", "vertices", "joints"),
     [
         (("M007.computed", "positions", [5]), "mesh", [5], []),
-        (("M010.skin-vertex", "positions", [99]), "mesh", None, None),  # there are 20
+        (("M010.skin-vertex", "positions", [99]), "mesh", None, None),  # there are 20 frames
         (("B003.skin-matrix", "bindings", [1]), "mesh", [], [1]),
         (("S003.limits", "items", [1]), "skeleton", [], [1]),
         (("F006.unknown", "", None), "skeleton", None, None),
@@ -176,7 +176,7 @@ def test_reader_findings_keep_their_locations(found, part, vertices, joints) -> 
         assert (aimed.vertices.tolist(), aimed.joints.tolist()) == (vertices, joints)
 
 
-def test_a_vertex_named_only_in_a_value_is_found() -> None:
+def test_vertex_stated_only_in_a_value_is_found() -> None:
     remark = Diagnostic("W002.vertex", Path("a.npz"), values={"vertex": 3})
     aimed = aimed_at(of_diagnostic(remark), scene_of(column()).actors[0], "mesh")
     assert aimed.vertices.tolist() == [3]

@@ -1,4 +1,4 @@
-"""Files with many errors: each is found once, at its line."""
+"""Files with many errors, each of which is found once at its line."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from viewer.rig.figure import Figure
 
 
 def saved(folder: Path, figure: Figure) -> list[str]:
-    """Write the sound column and return the lines of its ``.skin``; its ``.skel`` lies beside."""
+    """Write the valid column as ``.skel`` and ``.skin`` and return the lines of the ``.skin``."""
     write(figure, folder / "a.skel")
     write(figure, folder / "a.skin")
     return (folder / "a.skin").read_text().splitlines()
 
 
 def section(lines: list[str], name: str) -> int:
-    """Return the index of the line after a section's header."""
+    """Return the index of the line after the header of a section."""
     return next(k for k, line in enumerate(lines) if line.startswith(f"{name} ")) + 1
 
 
@@ -38,7 +38,7 @@ def heavy(findings: list[Finding]) -> list[tuple[str, int | None]]:
     return [(f.code, f.line) for f in findings if f.severity != "note"]
 
 
-def test_the_valid_column_has_no_findings(tmp_path: Path) -> None:
+def test_valid_column_has_no_findings(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, saved(tmp_path, column()))) == []
 
 
@@ -72,7 +72,7 @@ def test_ten_errors_in_one_skin_are_ten_findings(tmp_path: Path) -> None:
     ]
 
 
-def test_findings_of_one_code_report_count_and_locations(tmp_path: Path) -> None:
+def test_findings_of_one_code_have_a_count_and_locations(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     positions = section(lines, "positions")
     for vertex in (3, 8, 9):
@@ -85,7 +85,7 @@ def test_findings_of_one_code_report_count_and_locations(tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("vertex", range(20))
-def test_an_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int) -> None:
+def test_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + vertex] = "nan nan nan"
     assert [f.code for f in linted(tmp_path, lines) if f.severity != "note"] == ["F003"]
@@ -93,28 +93,28 @@ def test_an_invalid_position_causes_no_other_finding(tmp_path: Path, vertex: int
 
 
 @pytest.mark.parametrize("triangle", [0, 7, 33, 35])
-def test_an_invalid_triangle_causes_no_border_finding(tmp_path: Path, triangle: int) -> None:
+def test_invalid_triangle_causes_no_border_finding(tmp_path: Path, triangle: int) -> None:
     lines = saved(tmp_path, column())
     place = section(lines, "triangles") + triangle
     lines[place] = " ".join([*lines[place].split()[:2], "1000"])
     assert [f.code for f in linted(tmp_path, lines)] == ["F002"]
 
 
-def test_an_invalid_weight_causes_no_other_finding(tmp_path: Path) -> None:
+def test_invalid_weight_causes_no_other_finding(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "skinweights") + 9] = "2 0 nan 1 0.5"
     assert [f.code for f in linted(tmp_path, lines)] == ["W003"]
 
 
-def test_a_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
+def test_singular_matrix_does_not_hide_other_findings(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     bindings = section(lines, "bindings")
     lines[bindings + 1 : bindings + 4] = ["0 0 0"] * 3
-    lines[bindings + 7] = "-1 0 0"  # the second one mirrors
+    lines[bindings + 7] = "-1 0 0"  # the second matrix mirrors
     assert heavy(linted(tmp_path, lines)) == [("B002", bindings + 1), ("B005", bindings + 7)]
 
 
-def test_a_skin_without_bind_matrices_is_checked_alone(tmp_path: Path) -> None:
+def test_skin_without_bind_matrices_is_checked_without_its_skeleton(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     weights = section(lines, "skinweights")
     lines[weights] = "1 0 0.5"
@@ -122,7 +122,7 @@ def test_a_skin_without_bind_matrices_is_checked_alone(tmp_path: Path) -> None:
     assert heavy(linted(tmp_path, lines)) == [("B001", weights), ("W001", weights + 1)]
 
 
-def test_unparsable_file_reports_that_nothing_else_was_checked(tmp_path: Path) -> None:
+def test_unparsable_file_is_reported_as_unchecked(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     lines[section(lines, "positions") + 3] = "normals 4 {"
     (found,) = [f for f in linted(tmp_path, lines) if f.severity == "error"]
@@ -131,7 +131,7 @@ def test_unparsable_file_reports_that_nothing_else_was_checked(tmp_path: Path) -
     assert told([found.diagnostic]) == [("F002.unclosed", values)] and found.diagnostic.is_final
 
 
-def test_an_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> None:
+def test_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> None:
     texts = {"a.skel": skel_text.GOOD.replace("offset 0 1 0", "offset 0 nan 0"),
              "a.skin": skin_text.GOOD}  # fmt: skip
     for name, text in texts.items():
@@ -140,12 +140,13 @@ def test_an_invalid_joint_offset_is_not_a_bind_pose_mismatch(tmp_path: Path) -> 
     assert [(f.code, f.line, f.joints.tolist()) for f in found if f.severity == "error"] == [
         ("F003", 10, [1])
     ]
-    (bound,) = [f for f in found if f.code == "B004"]  # the root is bound elsewhere, at 5 6 7
+    # The root is bound at a different position, 5 6 7.
+    (bound,) = [f for f in found if f.code == "B004"]
     assert bound.joints.tolist() == [0] and bound.line == 20
 
 
 def test_all_errors_in_a_rig_file_are_found(tmp_path: Path) -> None:
-    """The files that a .rig names are checked one by one: errors in one do not hide others."""
+    """The files of a .rig are checked one by one, so that errors in one do not hide others."""
     (tmp_path / "a.rig").write_text("rig a { skeleton a.skel skin a.skin }")
     (tmp_path / "a.skel").write_text(skel_text.GOOD.replace("{", "[", 1))
     (tmp_path / "a.skin").write_text(skin_text.GOOD.replace("2 0 0.25", "2 0 0.5", 1))
@@ -185,13 +186,13 @@ def test_invalid_frames_are_not_jumps(tmp_path: Path) -> None:
     assert jump.line in (first + 20, first + 21) and sorted(jump.frames.tolist()) == [20, 21]
 
 
-def test_without_a_unit_lengths_are_in_figure_units(tmp_path: Path) -> None:
+def test_lengths_without_a_unit_are_in_figure_units(tmp_path: Path) -> None:
     lines = saved(tmp_path, column())
     skel = (tmp_path / "a.skel").read_text()
     assert "offset 0.0 2.0 0.0" in skel
     (tmp_path / "a.skel").write_text(skel.replace("offset 0.0 2.0 0.0", "offset 0.0 3.0 0.0"))
     (bound,) = [f for f in linted(tmp_path, lines) if f.code == "B004"]
-    # One unit of a column of 2 x 4 x 2, whose diagonal is sqrt(24).
+    # One unit of a column of 2 x 4 x 2 with a diagonal of sqrt(24).
     values = {"n": 1, "joint": "knee", "distance": "1 units (20.4 % of its size)"}
     assert told([bound.diagnostic]) == [("B004.joints", values)]
     assert bound.line == section(lines, "bindings") + 7

@@ -1,4 +1,4 @@
-"""Bind matrices: singularity, and other findings despite a singular one."""
+"""Bind matrices: singularity, and other findings despite a singular matrix."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def test_singularity_does_not_depend_on_scale() -> None:
     assert are_singular(matrices).tolist() == [False, False, False, True, True]
 
 
-def test_other_joints_are_compared_despite_a_singular_one() -> None:
-    """The knee was bound at y = 3, and rests at 2."""
+def test_other_joints_are_compared_despite_a_singular_matrix() -> None:
+    """The knee is bound at y = 3 and at rest at y = 2."""
     figure = column()
     matrices = figure.skin.inverse_bind.copy()
     matrices[0, :3, :3] = 0.0
@@ -35,11 +35,11 @@ def test_other_joints_are_compared_despite_a_singular_one() -> None:
     assert told([found["B004"].diagnostic]) == [("B004.joints", values)]
 
 
-def test_a_stray_vertex_does_not_hide_joints_that_were_bound_elsewhere() -> None:
+def test_stray_vertex_does_not_hide_joints_with_a_different_bind_position() -> None:
     """0.1 is 2 % of the column's size, but negligible relative to a box of 1700."""
     figure = column()
     mesh, skin = figure.mesh, figure.skin
-    # The column three times: enough vertices for one of them to count as a stray.
+    # Three copies of the column have enough vertices for one of them to be a stray.
     positions = np.tile(mesh.positions, (3, 1))
     positions[-1] = 1000.0
     counts = np.tile(np.diff(skin.starts), 3)

@@ -30,7 +30,7 @@ def test_codes_have_a_severity_a_title_and_a_hint() -> None:
         assert code.severity in SEVERITIES and code.title and code.hint
 
 
-def test_titles_differ() -> None:
+def test_titles_are_unique() -> None:
     assert len({code.title for code in CODES.values()}) == len(CODES)
 
 
@@ -60,7 +60,7 @@ def test_figure_shared_by_actors_is_checked_once() -> None:
     assert [(f.code, f.actor) for f in lint_scene(scene)] == [("W001", 0), ("S004", 1)]
 
 
-def test_a_scene_is_not_changed() -> None:
+def test_checks_do_not_change_the_scene() -> None:
     figure = column()
     scene = scene_of(figure, standing(figure))
     pose = scene.actors[0].pose.copy()
@@ -69,7 +69,7 @@ def test_a_scene_is_not_changed() -> None:
     assert np.array_equal(scene.actors[0].pose.translations, pose.translations)
 
 
-def test_points_of_vertices_triangles_and_joints() -> None:
+def test_locations_of_vertices_triangles_and_joints_are_their_points() -> None:
     scene = scene_of(column())
     scene.actors[0].placement[:3, 3] = 10.0, 0.0, 0.0
     vertex = Finding(Diagnostic("W001."), actor=0, vertices=np.array([5]))
@@ -80,7 +80,7 @@ def test_points_of_vertices_triangles_and_joints() -> None:
     assert points_of(joint, scene).tolist() == [[10, 2, 0]]
 
 
-def test_points_of_captures_and_of_nothing() -> None:
+def test_locations_in_captures_are_points_and_may_be_empty() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0]
@@ -100,7 +100,7 @@ def test_every_finding_can_be_framed(name: str) -> None:
 
 
 def test_placement_scale_is_applied() -> None:
-    """The speed of a figure in centimetres that is placed in metres is measured as drawn."""
+    """The speed of a figure in centimetres that is placed in metres is that of the drawn figure."""
     scene = made(FAULTS["jump"][0])
     before = [f.message for f in lint_scene(scene)]
     actor = scene.actors[0]

@@ -1,4 +1,4 @@
-"""Findings in keyed clips use timeline frames, whatever the sampling rate."""
+"""Frame numbers of findings in keyed clips, which match the timeline for any sampling rate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.scene import Actor, Scene
 
 
 def jumping(start: float, at: float, length: float = 4.0, offset: float = 0.0) -> Actor:
-    """Return the column with a clip that jumps by 90 m, in a hundredth of a second."""
+    """Return the column with a clip that jumps by 90 m in a hundredth of a second."""
     figure = column()
     channels = [
         Channel(target, [start], [0.0], (("linear", "linear"),))
@@ -35,7 +35,7 @@ def jump_of(scene: Scene, options: LintOptions | None = None) -> Finding:
 
 
 def shown_frame(scene: Scene, time: float) -> int:
-    """Return the frame that the window's timeline shows at a time."""
+    """Return the frame shown by the timeline of the window at a time."""
     playback = Clock()
     playback.show(scene)
     playback.seek(time)
@@ -43,10 +43,11 @@ def shown_frame(scene: Scene, time: float) -> int:
 
 
 @pytest.mark.parametrize(("start", "offset"), [(0.0, 0.0), (2.5, 0.0), (1.0, 3.2)])
-def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> None:
+def test_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -> None:
     scene = Scene([jumping(start, 2.0, offset=offset)])
     found = jump_of(scene)
-    # It is sampled at 60 fps from 0 to 4 s: from frame 60, at 2 s, to half a frame later.
+    # The clip is sampled at 60 fps from 0 to 4 s, so the jump is between frame 60, at 2 s, and half
+    # a frame later.
     assert found.frames.tolist() == [60]
     assert found.times == pytest.approx([start + offset + 2.0 + 1 / 60])
     values = found.diagnostic.values
@@ -58,7 +59,7 @@ def test_a_jump_is_reported_at_the_timeline_frame(start: float, offset: float) -
 
 def test_frames_use_the_requested_rate() -> None:
     found = jump_of(Scene([jumping(0.0, 2.0)]), LintOptions(frame_rate=24.0))
-    # Sampled at 72 fps.
+    # The clip is sampled at 72 fps.
     assert found.frames.tolist() == [48] and found.times == pytest.approx([2.0 + 1 / 72])
     assert (found.diagnostic.values["n"], found.diagnostic.values["all"]) == (1, 97)
 
@@ -74,7 +75,7 @@ def test_capture_frames_take_precedence_for_numbering() -> None:
     figure = legs()
     scene = Scene([jumping(0.0, 1.0, length=1.5), Actor(figure, clip=standing(figure))])
     found = jump_of(scene)
-    # The capture's first frame is called 100.
+    # The first frame of the capture has the number 100.
     assert found.frames.tolist() == [130] == [shown_frame(scene, float(found.times[0]))]
 
 
@@ -83,7 +84,7 @@ def test_curves_beyond_limits_report_frame_and_degrees() -> None:
     channel = Channel(7, [0.0, 1.0], [0.0, 4.0], (("linear", "linear"),) * 2)
     scene = scene_of(figure, Clip("keys", (channel,), 0.0, 1.0))
     (found,) = [f for f in lint_scene(scene) if f.code == "C006"]
-    # 4 radians at the end, of at most 3.
+    # The value is 4 radians at the end, with a limit of 3.
     when = Phrase("in-frame", frame=30, time=1.0)
     ends = {"low": "-171.9°", "high": "171.9°"}
     dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when=when, **ends)
@@ -100,7 +101,7 @@ def test_file_frame_numbers_are_kept() -> None:
     assert sorted(jump_of(scene).frames.tolist()) == [120, 121]
 
 
-def test_frames_of_keyed_transforms_are_at_the_rate_of_the_keys() -> None:
+def test_frames_of_keyed_transforms_have_the_rate_of_the_keys() -> None:
     keys = [[0.0, 0, 0], [0, 0, 0], [90, 0, 0]]
     jump = clip_of(channel(0, "translation", np.array([0, 12, 13]) / 24.0, keys))
     scene = Scene([Actor(leg(), clip=jump)])

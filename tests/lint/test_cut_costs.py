@@ -1,4 +1,4 @@
-"""Influence limit error where some joints or vertices are unusable."""
+"""Influence limit error if some joints or vertices are unusable."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ LAST = [(0, 0.3), (1, 0.3), (2, 0.2), (3, 0.15), (5, 0.05)]
 
 
 def scene(rows: dict[int, list[tuple[int, float]]], singular: bool = True) -> Scene:
-    """Return the column on six joints in a row; joint 4 is 2 m aside, the last one is singular."""
+    """Return the column on a chain of six joints; joint 4 is 2 m aside, the last is singular."""
     figure = column()
     offsets = [[0, 0, 0]] + [[0, 1, 0]] * 5
     skeleton = make_skeleton(tuple("abcdef"), [-1, 0, 1, 2, 3, 4], offsets, (0.0, 0.0))
@@ -41,12 +41,12 @@ def cost(scene: Scene, **invalid: Ints) -> Finding:
     return found
 
 
-# Joint 4 is 2 m from its rest position, so 0.05 of it is 100 mm; nothing else moves.
+# Joint 4 is 2 m from its rest position, so a weight of 0.05 is 100 mm; no other joint moves.
 COST = {"limit": 4, "most": "100 mm", "vertex": 8, "mean": "100 mm", "poses": 6}
 
 
 def without(n: int) -> Phrase:
-    """Return the part of a message that counts vertices whose error is unknown."""
+    """Return the part of a message with the number of vertices of unknown error."""
     return Phrase("cut-cost-left-out", n=n)
 
 
@@ -58,25 +58,25 @@ def test_vertices_of_a_singular_joint_are_left_out_and_counted() -> None:
     found = cost(scene({8: CROWDED, 5: LAST}))
     known = Phrase("cut-cost", **COST, left_out=without(1))
     assert told([found.diagnostic]) == [values_of(2, known)]
-    assert found.vertices.tolist() == [8, 5]  # unknown values come last
+    assert found.vertices.tolist() == [8, 5]  # unknown values are last
     found = cost(scene({8: CROWDED, 5: LAST, 6: LAST}))
     known = Phrase("cut-cost", **COST, left_out=without(2))
     assert told([found.diagnostic]) == [values_of(3, known)]
 
 
-def test_a_joint_of_weight_0_leaves_nothing_out() -> None:
+def test_joint_of_weight_0_leaves_out_no_vertex() -> None:
     found = cost(scene({8: [*CROWDED, (5, 0.0)]}))
     known = Phrase("cut-cost", **COST, left_out="")
     assert told([found.diagnostic]) == [values_of(1, known)]
 
 
-def test_an_unknown_error_is_not_reported_as_0() -> None:
+def test_unknown_error_is_not_reported_as_0() -> None:
     unknown = Phrase("cut-cost-unknown", limit=4, left_out=without(1))
     assert told([cost(scene({5: LAST})).diagnostic]) == [values_of(1, unknown)]
 
 
 @pytest.mark.parametrize(("part", "places"), [("bindings", [5]), ("positions", [5])])
-def test_vertices_not_from_the_file_are_left_out_too(part: str, places: list[int]) -> None:
+def test_vertices_not_from_the_file_are_left_out(part: str, places: list[int]) -> None:
     lost = np.array(places, dtype=np.int32)
     found = cost(scene({8: CROWDED, 5: LAST}, singular=False), **{part: lost})
     known = Phrase("cut-cost", **COST, left_out=without(1))
@@ -87,7 +87,7 @@ def test_overflowing_errors_are_left_out() -> None:
     whole = scene({8: CROWDED, 5: LAST}, singular=False)
     figure = whole.actors[0].figure
     matrices = figure.skin.inverse_bind.copy()
-    matrices[5, :3, :3] *= 1e308  # squares of its displacements are infinite
+    matrices[5, :3, :3] *= 1e308  # squares of the displacements are infinite
     whole.actors[0].figure = replace(figure, skin=replace(figure.skin, inverse_bind=matrices))
     known = Phrase("cut-cost", **COST, left_out=without(1))
     assert told([cost(whole).diagnostic]) == [values_of(2, known)]

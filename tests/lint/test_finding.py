@@ -13,7 +13,7 @@ from viewer.rig.scene import Actor
 
 
 def cube(*strays: list[float]) -> Figure:
-    """Return 5 x 5 x 5 points from 0 to 4, and strays; the diagonal is 4 sqrt(3) long."""
+    """Return 5 x 5 x 5 points from 0 to 4 with a diagonal of 4 sqrt(3), and stray points."""
     axis = np.arange(5.0)
     points = np.stack(np.meshgrid(axis, axis, axis), axis=-1).reshape(-1, 3)
     return Figure("cube", make_mesh(np.array([*points, *strays]), [[0, 1, 5]]))
@@ -29,7 +29,7 @@ def test_size_is_the_diagonal_of_the_mesh_or_of_the_joints() -> None:
 
 def test_stray_vertices_do_not_affect_the_size() -> None:
     assert Subject(Actor(cube([500.0, 500.0, 500.0]))).size() == pytest.approx(4 * np.sqrt(3))
-    # A vertex at a small distance counts: it may be intended.
+    # A vertex at a small distance is included, because it may be intended.
     assert Subject(Actor(cube([20.0, 0.0, 0.0]))).size() == pytest.approx(np.sqrt(400 + 16 + 16))
 
 
@@ -38,6 +38,6 @@ def test_relative_lengths_ignore_stray_vertices() -> None:
     assert subject.length(0.4 * np.sqrt(3)) == "0.693 units (10 % of its size)"
 
 
-def test_the_largest_rotation_is_reported_in_degrees() -> None:
+def test_largest_rotation_is_reported_in_degrees() -> None:
     assert MAX_ROTATION == 3400.0
     assert np.degrees(LintOptions().max_rotation) == pytest.approx(MAX_ROTATION)

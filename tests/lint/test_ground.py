@@ -1,4 +1,4 @@
-"""Ground detection and sinking feet: handmade motions with their expected findings."""
+"""Ground detection and sinking feet, with synthetic motions and their expected findings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _K = np.arange(FRAMES)
 
 
 def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]:
-    """Check legs whose root is offset from the floor by a given height in each frame."""
+    """Check legs with a root offset from the floor by a given height in each frame."""
     figure = legs()
     clip, count = standing(figure), len(heights)
     places = np.zeros((count, figure.skeleton.n_joints, 3))
@@ -37,7 +37,7 @@ def found(heights: np.ndarray, floor: float, **options: object) -> list[Finding]
 
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("depth", [0.02, 0.05, 0.1, 0.2])
-def test_a_short_sink_is_found_however_deep_and_wherever(depth: float, floor: float) -> None:
+def test_short_sinking_is_found_at_any_depth_and_floor(depth: float, floor: float) -> None:
     (sunk,) = found(np.where((_K >= 20) & (_K < 30), -depth, 0.0), floor)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(120, 130))
     values = {"joint": "left_ankle", "depth": f"{1000 * depth:g} mm", "frame": 120}
@@ -53,7 +53,7 @@ def test_sinking_for_half_of_the_motion_is_found_at_the_default_ground(depth: fl
 @pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
 def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> None:
     (note,) = found(np.where(_K >= 30, -depth, 0.0), 0.8)
-    # The ankles of the legs are 0.1 above the root's floor.
+    # The ankles of the legs are 0.1 above the floor of the root.
     assert (note.code, note.severity) == ("C013", "note")
     levels = [
         Phrase("resting-height", height=pytest.approx(height), seconds=1.0)
@@ -64,7 +64,7 @@ def test_sinking_for_half_of_the_motion_elsewhere_is_ambiguous(depth: float) -> 
 
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("depth", [0.1, 0.2])
-def test_a_ramp_down_after_standing_is_found(depth: float, floor: float) -> None:
+def test_ramp_down_after_standing_is_found(depth: float, floor: float) -> None:
     (sunk,) = found(np.where(_K >= 30, -depth * (_K - 30) / 29, 0.0), floor)
     assert sunk.code == "C008" and sunk.frames[0] == 159
     values = sunk.diagnostic.values
@@ -73,7 +73,7 @@ def test_a_ramp_down_after_standing_is_found(depth: float, floor: float) -> None
 
 @pytest.mark.parametrize("floor", FLOORS)
 @pytest.mark.parametrize("depth", [0.05, 0.1, 0.2])
-def test_a_ramp_without_a_level_is_ambiguous(depth: float, floor: float) -> None:
+def test_ramp_without_a_level_is_ambiguous(depth: float, floor: float) -> None:
     assert [f.code for f in found(-depth * _K / 59, floor)] == ["C013"]
 
 
@@ -83,7 +83,7 @@ def test_a_ramp_without_a_level_is_ambiguous(depth: float, floor: float) -> None
 def test_feet_sunk_for_some_time_are_found_near_the_default_ground(
     floor: float, depth: float, count: int
 ) -> None:
-    # At rest the feet are on floor 0, so sunk feet may be resting there.
+    # In the rest pose the feet are on floor 0, so sunken feet may be standing there.
     sunk = found(np.where((_K >= 20) & (20 + count > _K), -depth, 0.0), floor)
     assert [f.code for f in sunk] == ["C008"]
     assert sorted(sunk[0].frames.tolist()) == list(range(120, 120 + count))
@@ -91,10 +91,8 @@ def test_feet_sunk_for_some_time_are_found_near_the_default_ground(
 
 @pytest.mark.parametrize("height", [0.1, 0.2, 0.4])
 @pytest.mark.parametrize("count", [8, 14, 19])
-def test_a_short_rest_on_the_default_ground_far_below_is_ambiguous(
-    height: float, count: int
-) -> None:
-    # It stands or sits higher, or has sunk: this is undecidable.
+def test_short_stay_on_the_default_ground_far_below_is_ambiguous(height: float, count: int) -> None:
+    # The body may stand or sit higher, or may have sunk, which is undecidable.
     (note,) = found(np.where(count > _K, 0.0, height), 0.0)
     assert note.diagnostic.key == "C013.heights" and note.diagnostic.values["n"] == 2
     highest = note.diagnostic.values["levels"][0]
@@ -102,13 +100,13 @@ def test_a_short_rest_on_the_default_ground_far_below_is_ambiguous(
 
 
 @pytest.mark.parametrize("count", [8, 14, 19])
-def test_a_long_rest_below_the_default_ground_is_ambiguous(count: int) -> None:
+def test_long_stay_below_the_default_ground_is_ambiguous(count: int) -> None:
     assert [f.code for f in found(np.where(count > _K, 0.0, -0.05), 0.0)] == ["C013"]
 
 
 @pytest.mark.parametrize("height", [0.1, 0.4])
 @pytest.mark.parametrize("count", [22, 30, 40])
-def test_the_default_ground_breaks_a_near_tie(height: float, count: int) -> None:
+def test_default_ground_breaks_a_near_tie(height: float, count: int) -> None:
     assert found(np.where(count > _K, 0.0, height), 0.0) == []
     (sunk,) = found(np.where(count > _K, 0.0, -height), 0.0)
     assert sunk.code == "C008" and sorted(sunk.frames.tolist()) == list(range(100 + count, 160))
@@ -119,7 +117,7 @@ SOUND = {
     "stairs up": 0.17 * (_K // 10),
     "stairs down": -0.17 * (_K // 10),
     "stairs down after standing": -0.17 * np.clip((_K - 20) // 8, 0, 3),
-    # 0.5 s in the air: v = g t / 2, and 5 frames on the ground.
+    # The jump has 0.5 s in the air with v = g t / 2, and 5 frames on the ground.
     "jumping": np.maximum(0.0, np.where(
         _K % 20 >= 5, 2.45 * (_K % 20 - 5) / RATE - 4.9 * ((_K % 20 - 5) / RATE) ** 2, 0.0
     )),
@@ -137,14 +135,14 @@ def test_valid_motions_have_no_findings(name: str, floor: float) -> None:
         assert {f.code for f in found(SOUND[name], floor)} == jitter
 
 
-def test_a_single_noisy_frame_is_ignored_unless_deep() -> None:
+def test_single_noisy_frame_is_ignored_unless_deep() -> None:
     assert found(np.where(_K == 30, -0.02, 0.0), 0.0) == []
     (sunk,) = found(np.where(_K == 30, -0.03, 0.0), 0.0)
     values = {"n": 1, "all": 60, "joint": "left_ankle", "depth": "30 mm", "frame": 130}
     assert told([sunk.diagnostic]) == [("C008.foot", values)]
 
 
-def test_the_ground_can_be_given_or_left_out() -> None:
+def test_ground_can_be_given_or_disabled() -> None:
     half = np.where(_K >= 30, -0.1, 0.0)
     (sunk,) = found(half, 0.8, ground=0.9)
     assert sunk.code == "C008" and len(sunk.frames) == 30
@@ -155,19 +153,19 @@ def test_the_ground_can_be_given_or_left_out() -> None:
 
 @pytest.mark.parametrize("floor", [0.0, 0.8])
 @pytest.mark.parametrize("height", [0.03, 0.05])
-def test_a_rest_slightly_above_the_ground_is_found(height: float, floor: float) -> None:
-    # Too high for soles, too low for a step: 3 to 6 % of a height of 0.9.
+def test_stay_slightly_above_the_ground_is_found(height: float, floor: float) -> None:
+    # 3 to 6 % of a height of 0.9 is too high for soles and too low for a step.
     (floats,) = found(np.where(_K >= 48, height, 0.0), floor)
     values = {"n": 12, "all": 60, "height": f"{1000 * height:g} mm", "frame": 148}
     assert told([floats.diagnostic]) == [("C016.foot", values)]
     assert floats.frames.tolist() == list(range(148, 160))
 
 
-def test_a_short_rest_above_the_ground_is_no_floating() -> None:
+def test_short_stay_above_the_ground_is_not_reported_as_floating() -> None:
     assert found(np.where((_K >= 40) & (_K < 47), 0.05, 0.0), 0.0) == []
 
 
-def test_a_body_that_floats_and_rotates_has_no_ground() -> None:
+def test_body_that_floats_and_rotates_has_no_ground() -> None:
     rises = 2.0 + 0.3 * np.sin(2.0 * np.pi * _K / 20)
     (note,) = found(rises, 0.0)
     assert told([note.diagnostic]) == [("C013.no-height", {})]
@@ -183,20 +181,21 @@ def test_empty_scene_has_no_ground() -> None:
     assert ground_of(np.zeros(9), np.zeros(9, dtype=np.bool_), 1 / 30, 1.7) == Ground(None)
 
 
-def test_absent_people_do_not_count() -> None:
+def test_absent_people_are_ignored() -> None:
     lowest = np.where(np.arange(60) < 40, 7.0, 1.0)
     found_ground = ground_of(lowest, np.arange(60) < 40, 1 / 30, 1.7)
     assert found_ground == Ground(7.0, ((7.0, 40),))
 
 
-def test_the_longest_level_wins_but_for_near_ties() -> None:
+def test_longest_level_is_used_except_for_near_ties() -> None:
     here = np.ones(240, dtype=np.bool_)
 
     def ground(count: int) -> float | None:
         lowest = np.where(np.arange(240) < count, -0.02, 0.03)
         return ground_of(lowest, here, 1 / 60, 1.7, (0.0,)).height
 
-    # Of 240 frames, 30 to 60 are at most a third of the others; 70 are more; 80 or more are half.
+    # Of 240 frames, 30 to 60 are at most a third of the others, 70 are more, and 80 or more are
+    # half.
     assert [ground(count) for count in (30, 45, 60)] == [0.03] * 3
     assert ground(70) is None
     assert [ground(count) for count in (80, 120, 200)] == [-0.02] * 3

@@ -1,4 +1,4 @@
-"""Estimated noise of motions against its known size; jumps and gaps are not noise."""
+"""Estimated noise of motions, compared with its known size; jumps and gaps are not noise."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ def test_noise_is_measured_as_its_quadratic_mean() -> None:
     places = np.random.default_rng(0).normal(0.0, 0.01, (3000, 4, 3))
     found = noise_of(places, np.ones(3000, dtype=np.bool_), 15)
     middle = found[10:-10]
-    # 17.3 mm in three dimensions; the fifth of 15 values that overlap varies by some 20 %.
+    # The noise is 17.3 mm in three dimensions; the fifth of 15 overlapping values varies by some 20
+    # %.
     assert np.median(middle) == pytest.approx(0.01 * np.sqrt(3.0), rel=0.05)
     assert found[:9].max() == found[-9:].max() == 0.0
 
@@ -36,14 +37,14 @@ def test_noise_of_many_frames_is_that_of_each_batch() -> None:
 
 
 @pytest.mark.parametrize(("hertz", "metres"), [(1.0, 0.5), (2.0, 0.12), (0.2, 3.0)])
-def test_fast_but_smooth_motion_is_no_jitter(hertz: float, metres: float) -> None:
+def test_fast_smooth_motion_is_not_reported_as_jitter(hertz: float, metres: float) -> None:
     def swing(root, _):
         root[:, 0] = metres * np.sin(2.0 * np.pi * hertz * TIME)
 
     assert "C014" not in codes(swing)
 
 
-def test_jumps_are_no_jitter() -> None:
+def test_jumps_are_not_reported_as_jitter() -> None:
     def jump(root, _):
         root[:, 0] = 0.5 * (np.arange(FRAMES) // 8)
 

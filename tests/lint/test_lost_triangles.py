@@ -1,4 +1,4 @@
-"""Surfaces with invalid triangles, and whether they count as closed."""
+"""Surfaces with invalid triangles, which may or may not be treated as closed."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.lint import lint_files
 
 
 def grid(n: int, wraps: bool) -> np.ndarray:
-    """Return the triangles of n x n vertices, row by row; a torus if they wrap around."""
+    """Return the triangles of n x n vertices row by row, or of a torus if they wrap around."""
     rows, columns = np.divmod(np.arange(n * n), n)
     quads = [
         (rows + down) % n * n + (columns + right) % n
@@ -24,7 +24,7 @@ def grid(n: int, wraps: bool) -> np.ndarray:
 
 
 def bowl(n: int, height: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return an open sheet with its middle low or high: positions and triangles."""
+    """Return positions and triangles of an open sheet with a low or high middle."""
     y, x = np.divmod(np.arange(n * n), n)
     middle = (n - 1) / 2
     z = height * ((x - middle) ** 2 + (y - middle) ** 2)
@@ -32,13 +32,13 @@ def bowl(n: int, height: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def ring(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a closed torus that is inside out: positions and triangles."""
+    """Return positions and triangles of a closed torus that is inside out."""
     turns, tilts = 2 * np.pi * np.stack(np.divmod(np.arange(n * n), n)) / n
     radii = 3 + np.cos(tilts)
     positions = np.stack([radii * np.cos(turns), radii * np.sin(turns), np.sin(tilts)], axis=1)
     triangles = grid(n, wraps=True)
     a, b, c = np.moveaxis(positions[triangles], 1, 0)
-    # Independent of the check: outwards is away from the centre circle.
+    # The expected direction is independent of the check: outwards is away from the centre circle.
     middle = (a + b + c) / 3
     core = middle * [1, 1, 0]
     outward = middle - 3 * core / np.linalg.norm(core, axis=1, keepdims=True)
@@ -53,7 +53,7 @@ def codes(
     lost: Iterable[int] = (),
     nowhere: Iterable[int] = (),
 ) -> set[str]:
-    """Write a mesh with triangles that name vertex 999 and vertices at nan; return the codes."""
+    """Write a mesh with triangles that use vertex 999 and vertices at nan; return the codes."""
     positions, triangles = mesh
     gone, blank = set(lost), set(nowhere)
     lines = [
@@ -78,9 +78,7 @@ def border(n: int) -> tuple[list[int], list[int]]:
 
 @pytest.mark.parametrize("height", [0.1, -0.1, 0.02, -0.02])
 @pytest.mark.parametrize("n", [4, 6, 12])
-def test_an_open_sheet_missing_its_border_is_not_closed(
-    tmp_path: Path, n: int, height: float
-) -> None:
+def test_open_sheet_without_its_border_is_not_closed(tmp_path: Path, n: int, height: float) -> None:
     triangles, vertices = border(n)
     mesh = bowl(n, height)
     assert codes(tmp_path, mesh) == {"M005"}
@@ -89,15 +87,15 @@ def test_an_open_sheet_missing_its_border_is_not_closed(
     assert "M003" not in codes(tmp_path, mesh, lost=range(0, len(mesh[1]), 2))
 
 
-def test_a_closed_surface_missing_little_is_still_inside_out(tmp_path: Path) -> None:
-    mesh = ring(12)  # 288 triangles: 8 open edges squared are less than a quarter of those
+def test_closed_surface_with_few_lost_triangles_is_still_inside_out(tmp_path: Path) -> None:
+    mesh = ring(12)  # the square of 8 open edges is less than a quarter of the 288 triangles
     assert codes(tmp_path, mesh) == {"M003"}
     assert codes(tmp_path, mesh, lost=[7]) == {"M003", "F002"}
     assert codes(tmp_path, mesh, lost=[7, 99]) == {"M003", "F002"}
     assert codes(tmp_path, mesh, nowhere=[50]) == {"M003", "F003"}
 
 
-def test_a_closed_surface_missing_much_is_not_judged(tmp_path: Path) -> None:
+def test_closed_surface_with_many_lost_triangles_is_not_checked(tmp_path: Path) -> None:
     mesh = ring(12)
     assert codes(tmp_path, mesh, lost=[7, 99, 150]) == {"F002"}
     assert codes(tmp_path, mesh, lost=range(0, 288, 2)) == {"F002"}

@@ -24,7 +24,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.motion.timing import Timing
 
 
-def test_values_in_messages() -> None:
+def test_messages_have_the_expected_values() -> None:
     messages = {name: findings_of(FAULTS[name][0]) for name in ("sum too large", "jump", "sliding")}
     values = {f.diagnostic.key: f.diagnostic.values for found in messages.values() for f in found}
     assert values["W001.sums"] == {
@@ -33,17 +33,18 @@ def test_values_in_messages() -> None:
         "vertex": 9,
         "error": pytest.approx(0.1),
     }
-    # 3 m in 1/30 s; the legs are 0.2 m wide and 0.9 m high, and may move at 15 times 0.922 m.
+    # The jump is 3 m in 1/30 s; the legs are 0.2 m wide and 0.9 m high, and may move at 15 times
+    # 0.922 m per second.
     speeds = {"speed": "90 m/s", "limit": "13.8 m/s"}
     place = {"joint": "pelvis", "frame": 120, "time": pytest.approx(20 / 30)}
     assert values["C003.joint"] == {"n": 2, "all": 60, **speeds, **place}
-    # All 59 steps of 0.5 / 30 m.
+    # There are 59 steps of 0.5 / 30 m.
     slid = values["C007.foot"]
     assert (slid["joint"], slid["distance"], slid["speed"]) == ("left_ankle", "983 mm", "0.5 m/s")
 
 
-def test_values_of_mesh_and_gap_findings() -> None:
-    """Both ends of an edge, the first vertex of a normal, and which frames are missing."""
+def test_mesh_and_gap_findings_have_the_expected_values() -> None:
+    """The values are both ends of an edge, the first vertex of a normal, and the missing frames."""
     names = ("three on an edge", "hole", "one normal inwards", "gaps", "pose outside limits")
     found = [f.diagnostic for name in names for f in findings_of(FAULTS[name][0])]
     values = {one.key: one.values for one in found}
@@ -52,24 +53,24 @@ def test_values_of_mesh_and_gap_findings() -> None:
     assert values["M009.normals"] == {"n": 1, "all": 20, "vertex": 3}
     gaps = [Phrase("frame-range", first=110, last=112), Phrase("one-frame", frame=130)]
     assert values["C005.gaps"] == {"n": 4, "all": 60, "n_gaps": 2, "gaps": gaps}
-    # 4 and 3 radians.
+    # The values are 4 and 3 radians.
     ends = {"low": "-171.9°", "high": "171.9°"}
     dof = Phrase("beyond-limits", dof="knee.y", value="229.2°", when="", **ends)
     assert values["S004.pose"] == {"n": 1, "dof": dof}
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_one_item_uses_the_singular(name: str) -> None:
+def test_message_about_one_item_uses_the_singular(name: str) -> None:
     """A count of 1 is not followed by a plural, "are" or "have"."""
     for finding in findings_of(FAULTS[name][0]):
-        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the whole motion counts: 1 of 60
+        text = re.sub(r"[\d.]+ of ", "", finding.message)  # the total may be larger, as in 1 of 60
         of_one = re.findall(r"(?<![\d.:])1 ((?!units\b)[a-zA-Z]+s)\b(?! to | at )", text)
         assert set(of_one) <= {"has", "is"}, finding.message
         one = re.match(r"1 (?:of \d+ )?[\w ]*?\b(are|have|lie|move|list|point|belong)\b", text)
         assert one is None, finding.message
 
 
-def test_a_gap_is_shown_just_before_it() -> None:
+def test_gap_has_the_location_of_the_frame_before_it() -> None:
     (gap,) = findings_of(FAULTS["gaps"][0])
     # Frame 109 is the tenth, 9 / 30 s after the first.
     assert gap.seek == pytest.approx(0.3)
@@ -87,7 +88,7 @@ def test_long_absences_are_counted_as_absences() -> None:
 
 
 def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
-    """Each side of a sheet has its own normals; shared ones agree with one side."""
+    """Each side of a sheet has separate normals; shared normals agree with one side."""
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     front = np.array([[0, 1, 2], [0, 2, 3]])
     sides = Mesh(
@@ -105,8 +106,8 @@ def test_thin_sheets_and_creases_have_no_opposed_normals() -> None:
     assert found[0].vertices.tolist() == list(range(8))
 
 
-def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
-    """All joints but the root stay; e has its own translation, of which 0.05 is lost."""
+def test_influence_limit_error_is_the_vertex_displacement() -> None:
+    """Only the root and e move; 0.05 of the translation of e is lost."""
     figure = five_joints()
     scene = scene_of(figure)
     scene.actors[0].pose.translations[1:, 0] = 0.0
@@ -114,20 +115,21 @@ def test_the_influence_limit_error_is_the_vertex_displacement() -> None:
     locked = replace(figure.skeleton, dof_limits=np.zeros_like(figure.skeleton.dof_limits))
     scene.actors[0].figure = replace(figure, skeleton=locked)
     (found,) = [finding for finding in lint_scene(scene) if finding.code == "W007"]
-    # With all influences: 0.05 of 2 m. The limit drops e: 100 mm in the current pose, 0 at rest.
+    # With all influences the displacement is 0.05 of 2 m. The limit drops e, an error of 100 mm in
+    # the current pose and 0 at rest.
     costs = {"limit": 4, "most": "100 mm", "vertex": 8, "mean": "100 mm", "poses": 6}
     values = {"n": 1, "most": 5, "cost": Phrase("cut-cost", **costs, left_out="")}
     assert told([found.diagnostic]) == [("W007.influences", values)]
 
 
-def test_a_swinging_foot_does_not_slide() -> None:
+def test_swinging_foot_is_not_reported_as_sliding() -> None:
     def step(root: np.ndarray, _: np.ndarray) -> None:
         root[:, 2] = 2.5 * np.arange(FRAMES) / RATE  # 2.5 m/s, as a foot passes the ground
 
     assert [finding.code for finding in lint_scene(moving(step))] == []
 
 
-def test_a_person_who_appears_later_has_no_gap() -> None:
+def test_person_who_appears_later_has_no_gap() -> None:
     rows = np.arange(FRAMES)
     rows[:20] = rows[50:] = -1
     timing = Timing(RATE, rows, first_frame=100, holds=False)
@@ -135,7 +137,7 @@ def test_a_person_who_appears_later_has_no_gap() -> None:
 
 
 def test_seams_are_not_borders() -> None:
-    """Vertices at one place count as one: a closed mesh with a seam is closed."""
+    """Vertices at one position count as one, so a closed mesh with a seam is closed."""
     figure = column()
     positions = np.vstack([figure.mesh.positions, figure.mesh.positions[0::4]])
     triangles = figure.mesh.triangles.copy()
@@ -146,8 +148,8 @@ def test_seams_are_not_borders() -> None:
     assert codes == set()
 
 
-def test_low_confidence_is_counted_over_the_frames_that_see_a_keypoint() -> None:
-    """Low in 3 of the 10 frames in which it is seen; in 3 of 60, which is 5 %; and in 1 of 2."""
+def test_low_confidence_is_counted_over_frames_with_the_keypoint() -> None:
+    """Confidence is low in 3 of 10 frames with the keypoint, in 3 of 60 or 5 %, and in 1 of 2."""
 
     def change(points: np.ndarray) -> None:
         points[10:, 0, 3] = 0.0

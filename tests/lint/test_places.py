@@ -31,19 +31,18 @@ def test_locations_follow_pose_and_placement() -> None:
     actor.placement[:3, 3] = 0.0, 10.0, 0.0
     places = places_of(about(vertices=[5], joints=[1]), scene)
     assert places.vertices.tolist() == [[2, 11, 1]] and places.joints.tolist() == [[3, 12, 0]]
-    # In bind pose the mesh has no pose.
+    # The mesh in bind pose ignores the pose.
     bound = places_of(about(vertices=[5]), scene, binding=True)
     assert bound.vertices.tolist() == [[-1, 11, 1]]
 
 
 @pytest.mark.parametrize("scale", [1.0, 0.01, 250.0])
-def test_facing_is_the_mean_normal_in_the_scene(scale: float) -> None:
+def test_facing_direction_is_the_mean_normal_in_the_scene(scale: float) -> None:
     scene = scene_of(column())
     turn = rotation_vector_to_matrix(np.array([0.0, np.pi / 2, 0.0]))  # z becomes x
     scene.actors[0].placement[:3, :3] = scale * turn
-    # Vertices 4 and 5 of the second ring lie on the side z = 1, one at each edge of it: normals
-    # (1, 0, 1) / sqrt(2) and (-1, 0, 1) / sqrt(2) as far as the triangles around weigh both sides
-    # alike; the mean of the two has no x.
+    # Vertices 4 and 5 of the second ring are at the edges of the side z = 1, with normals of about
+    # (1, 0, 1) / sqrt(2) and (-1, 0, 1) / sqrt(2); the x of their mean is 0.
     normals = scene.actors[0].figure.mesh.normals[[4, 5]]
     expected = turn @ normals.mean(axis=0)
     facing = places_of(about(vertices=[4, 5]), scene).facing
@@ -51,19 +50,19 @@ def test_facing_is_the_mean_normal_in_the_scene(scale: float) -> None:
     assert facing[0] > 0.5
 
 
-def test_surrounding_locations_have_no_facing() -> None:
+def test_surrounding_locations_have_no_facing_direction() -> None:
     facing = places_of(about(vertices=[4, 5, 6, 7]), scene_of(column())).facing
     assert np.linalg.norm(facing) < 0.35
     assert not places_of(about(joints=[1]), scene_of(column())).facing.any()
 
 
-def test_unseen_captured_points_have_no_location() -> None:
+def test_undetected_captured_points_have_no_location() -> None:
     figure, clip = keypoints()
     scene = scene_of(figure, clip)
     scene.actors[0].points = clip.points[0].copy()
     scene.actors[0].points[2, 3] = 0.0
     assert places_of(about(joints=[1, 2]), scene).joints.tolist() == [[0, 0.5, 0]]
-    # There is still a position for the camera to look at.
+    # There is still a position for the camera target.
     assert points_of(about(joints=[2]), scene).tolist() == [[0, 1, 0], [0, 0.5, 0]]
 
 

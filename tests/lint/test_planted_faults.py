@@ -1,4 +1,4 @@
-"""One error introduced into a valid figure or motion: its code and location are reported."""
+"""Single errors introduced into valid figures and motions, and their codes and locations."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from viewer.lint import CODES
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_is_found_where_it_is(name: str) -> None:
+def test_planted_fault_is_found_at_its_location(name: str) -> None:
     maker, code, where, expected = FAULTS[name]
     found = [finding for finding in findings_of(maker) if finding.code == code]
     assert len(found) == 1, name
@@ -21,27 +21,27 @@ def test_a_planted_fault_is_found_where_it_is(name: str) -> None:
     assert found[0].actor == 0 and found[0].message and found[0].hint
 
 
-# Other findings that an introduced error really causes.
+# Other findings that are consequences of an introduced error.
 COMPANIONS = {
     "sum too large": {"Y002"},
     "negative": {"Y002"},
     "no influence": {"Y002"},
     "weights of 0": {"Y002"},
-    "flat triangle": {"M006"},  # the edge from 4 to 5 is listed once more
+    "flat triangle": {"M006"},  # repeats the edge from 4 to 5
     "sliver": {"M006"},
     "three on an edge": {"M005"},
     "triangle twice": {"M006"},
-    "stray vertex": {"Y001", "M001"},  # triangles to it are slivers
-    "vertex a hundred sizes away": {"Y001", "M003"},  # it turns the volume inside out
-    "jitter": {"C007"},  # by 20 mm back and forth
-    "exchanged people": {"C003"},  # both jump
-    "fast turn": {"C003"},  # the ankle follows the knee's rotation
+    "stray vertex": {"Y001", "M001"},  # its triangles are slivers
+    "vertex a hundred sizes away": {"Y001", "M003"},  # inverts the volume
+    "jitter": {"C007"},  # moves by 20 mm back and forth
+    "exchanged people": {"C003"},  # both people jump
+    "fast turn": {"C003"},  # the ankle follows the rotation of the knee
 }
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_causes_no_other_serious_finding(name: str) -> None:
-    """Errors and warnings are those of the introduced error, or follow from it as listed."""
+def test_planted_fault_causes_no_other_serious_finding(name: str) -> None:
+    """Errors and warnings must be those of the introduced error or its listed consequences."""
     maker, code, _, _ = FAULTS[name]
     heavy = {finding.code for finding in findings_of(maker) if finding.severity != "note"}
     assert heavy - {code} <= COMPANIONS.get(name, set()), name

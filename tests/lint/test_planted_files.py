@@ -1,4 +1,4 @@
-"""Errors introduced into files: reader errors and reader warnings."""
+"""Errors introduced into files, which are reader errors and reader warnings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LATE_KEYS = CLIP.replace("0 0 flat flat\n1 1", "1 0 flat flat\n0.5 1")
 
 
 def linted(folder: Path, texts: dict[str, str | bytes]) -> list[Finding]:
-    """Write files, lint them together, and return the findings, file names without their folder."""
+    """Write files, lint them together, and return the findings with file names without folders."""
     paths = []
     for name, text in texts.items():
         paths.append(folder / name)
@@ -43,7 +43,7 @@ def skel(old: str, new: str) -> dict[str, str]:
 
 RIG = {"a.skel": skel_text.GOOD, "a.skin": skin_text.GOOD}
 
-# name: (texts, code, severity, file, line)
+# Values by name: (texts, code, severity, file, line).
 FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
     "not a number": (skin("2 0 0", "2 up 0"), "F002", "error", "a.skin", 3),
     "not finite": (skin("2 0 0", "2 nan 0"), "F003", "error", "a.skin", 3),
@@ -89,7 +89,7 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_planted_fault_is_found_with_its_file_and_line(tmp_path: Path, name: str) -> None:
+def test_planted_fault_is_found_with_its_file_and_line(tmp_path: Path, name: str) -> None:
     texts, code, severity, file, line = FAULTS[name]
     found = [finding for finding in linted(tmp_path, texts) if finding.code == code]
     assert [(f.severity, f.file, f.line) for f in found] == [(severity, tmp_path / file, line)]
@@ -113,12 +113,12 @@ def test_other_files_are_still_checked(tmp_path: Path) -> None:
     assert [(f.code, f.file.name, f.line) for f in found if f.severity == "error"] == [
         ("F002", "bad.skel", 1),
         ("F002", "none.obj", 1),
-        ("F004", "none.obj", None),  # the skin does not fit the remaining joint
+        ("F004", "none.obj", None),  # the skin does not match the remaining joint
     ]
     assert [f.code for f in found if f.code == "W001"] == ["W001"]
 
 
-def test_a_missing_file_is_a_finding(tmp_path: Path) -> None:
+def test_missing_file_is_a_finding(tmp_path: Path) -> None:
     scene, found = lint_files([tmp_path / "none.npz"])
     assert [(f.code, f.severity, f.message) for f in found] == [
         ("F001", "error", "cannot be read: No such file or directory")
@@ -126,7 +126,7 @@ def test_a_missing_file_is_a_finding(tmp_path: Path) -> None:
     assert scene.actors == []
 
 
-def test_a_skin_that_does_not_fit_is_checked_alone(tmp_path: Path) -> None:
+def test_skin_that_does_not_match_is_checked_without_its_skeleton(tmp_path: Path) -> None:
     texts, *_ = FAULTS["too few bindings"]
     texts = {**texts, "a.skin": texts["a.skin"].replace("2 0 0.25", "2 0 0.5", 1)}
     assert {"B001", "W001"} <= {finding.code for finding in linted(tmp_path, texts)}
@@ -159,7 +159,7 @@ def put(key: str, place: tuple[int, ...], value: float) -> Callable[[dict[str, n
 
 
 MODELS = {
-    "parent after its child": (smpl(parents(1, 9)), "S001"),  # 9 descends from 6, 3 and 0
+    "parent after its child": (smpl(parents(1, 9)), "S001"),  # 9 is a descendant of 6, 3 and 0
     "own parent": (smpl(parents(5, 5)), "S002"),
     "cycle": (smpl(parents(1, 4)), "S002"),  # the knee 4 is a child of the hip 1
     "late parent": (smpl(parents(1, 2)), "S001"),
@@ -171,7 +171,7 @@ MODELS = {
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_body_model_faults(tmp_path: Path, name: str) -> None:
+def test_planted_faults_of_body_models_are_found(tmp_path: Path, name: str) -> None:
     write, code = MODELS[name]
     path = write(tmp_path)
     found = [f for f in lint_files([path])[1] if (name, f.code) != ("negative weight", "W001")]
@@ -181,13 +181,15 @@ def test_body_model_faults(tmp_path: Path, name: str) -> None:
 @pytest.mark.parametrize(
     ("parents_text", "code", "line"), [("-1\n2\n1\n", "S002", 2), ("-1\n2\n0\n", "S001", 2)]
 )
-def test_pig_parents(tmp_path: Path, parents_text: str, code: str, line: int) -> None:
+def test_invalid_parents_in_pig_are_found(
+    tmp_path: Path, parents_text: str, code: str, line: int
+) -> None:
     folder = pig_text.write(tmp_path / "pig", parents=parents_text)
     found = [f for f in lint_files([folder])[1] if f.severity == "error"]
     assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
 
 
-def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
+def test_gaps_and_low_confidence_in_captures_are_found(tmp_path: Path) -> None:
     frames = {frame: [capture_files.points(0)] for frame in range(20)}
     del frames[7], frames[8]
     folder = capture_files.write_frames(tmp_path / "keypoints3d", frames)
@@ -197,7 +199,7 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     gaps = [Phrase("frame-range", first=7, last=8)]
     values = {"n": 2, "all": 20, "n_gaps": 1, "gaps": gaps}
     assert told([gap.diagnostic]) == [("C005.gaps", values)]
-    # Of all 25 points, in all 18 frames, the confidence is 0.7 + 0.5 * waves.
+    # The confidence of all 25 points in all 18 frames is 0.7 + 0.5 * waves.
     low = np.flatnonzero(0.5 * capture_files.waves(25, 4)[:, 3] < 0.0)
     named = [f for f in found if f.code == "C011"]
     assert sorted(np.concatenate([f.joints for f in named]).tolist()) == low.tolist()
@@ -210,7 +212,7 @@ def test_captures_with_gaps_and_low_confidence(tmp_path: Path) -> None:
     assert rest.values["n"] == len(rest.values["points"]) == len(low) - 6
 
 
-def test_a_damaged_frame_is_a_gap_and_is_named(tmp_path: Path) -> None:
+def test_damaged_frame_is_a_gap_and_is_reported(tmp_path: Path) -> None:
     frames: dict[int | str, object] = {frame: [capture_files.points(0)] for frame in range(9)}
     folder = capture_files.write_frames(tmp_path / "keypoints3d", {**frames, 4: "[{"})
     found = lint_files([folder])[1]
@@ -218,7 +220,7 @@ def test_a_damaged_frame_is_a_gap_and_is_named(tmp_path: Path) -> None:
     assert any("000004" in f"{f.file} {f.message}" for f in found)
 
 
-def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
+def test_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
     from viewer.loading import MotionSettings
 
     frames = {frame: [capture_files.body(0)] for frame in range(3)}
@@ -229,12 +231,12 @@ def test_a_model_that_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
     ]
 
 
-def test_every_code_is_planted_somewhere() -> None:
+def test_every_code_is_produced_by_a_planted_fault() -> None:
     from formats.gltf.planted_gltf import PLANTED as GLTF
     from lint.planted import FAULTS as FIGURES
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
     planted |= {code for _, code in MODELS.values()} | {"F001"}
     planted |= set(GLTF)
-    # Codes that a readable file cannot cause: remarks are not errors.
+    # A readable file cannot cause these codes, which are remarks and not errors.
     assert set(CODES) - planted == {"F007"}

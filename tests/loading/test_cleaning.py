@@ -1,4 +1,4 @@
-"""Clean-up of a scene: order of changes, notes, merging of people, refusals."""
+"""Clean-up of a scene: order of changes, notes, merging of people, and refusals."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def keys(notes) -> list[str]:
     return [note.key for note in notes]
 
 
-def test_nothing_is_changed_unless_requested():
+def test_scene_is_not_changed_unless_requested():
     scene = Scene([person(0, 0, 60)])
     clip = scene.actors[0].clip
     assert clean_up(scene, CleanUp()) == [] and scene.actors[0].clip is clip
@@ -74,17 +74,19 @@ def test_longer_gaps_remain_and_are_reported():
     assert scene.actors[0].clip.timing.present.all()
 
 
-def test_one_person_tracked_twice_is_merged_with_the_frames_of_the_first():
+def test_person_tracked_twice_is_merged_with_the_frames_of_the_first():
     scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=0.1)])
     notes = clean_up(scene, CleanUp(merged=((1, 0),)))
     assert keys(notes) == ["X006.merged", "X006.overlap"]
-    assert "2 frames (frames 128 to 129), 100 mm apart: those of person 1 are used" in str(notes[1])
+    assert "2 frames (frames 128 to 129), 100 mm apart: the frames of person 1 are used" in str(
+        notes[1]
+    )
     (actor,) = scene.actors
     places = actor.clip.figure_translations[actor.clip.timing.rows, 0]
     assert_array_equal(places, [0.0] * 28 + [0.1] * 32)
 
 
-def test_two_people_are_not_merged():
+def test_different_people_are_not_merged():
     scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=1.0)])
     with pytest.raises(RigError, match="two people"):
         clean_up(scene, CleanUp(merged=((0, 1),)))
@@ -104,7 +106,7 @@ def test_motions_without_people_are_not_merged():
         clean_up(Scene([actor]), CleanUp(merged=((0, 5),)))
 
 
-def test_keypoints_are_cleaned_too():
+def test_keypoints_are_cleaned_up():
     figure, clip = keypoints()
     rows = clip.timing.rows.copy()
     rows[5] = -1
@@ -117,7 +119,7 @@ def test_keypoints_are_cleaned_too():
 
 
 def test_displacement_is_measured_in_millimetres():
-    # A spike of 100 mm in one frame: 5 points and degree 2 leave 17 / 35 of it.
+    # The spike is 100 mm in one frame; 5 points and degree 2 leave 17 / 35 of it.
     actor = person(0, 0, 60)
     places = np.zeros((60, 3))
     places[30, 2] = 0.1
@@ -131,12 +133,12 @@ def test_displacement_is_measured_in_millimetres():
 def test_feet_are_moved_to_the_ground(upside_down):
     actor = person(0, 0, 60)
     places = np.tile([0.3, 0.25, 0.0], (60, 1))  # the ankles are 0.1 above the origin
-    if upside_down:  # the world of the capture is; its placement makes it upright
+    if upside_down:  # the world of the capture is upside down, and its placement makes it upright
         actor.placement = rotation_transform(0, np.pi)
         turn = np.tile([1.0, 0.0, 0.0, 0.0], (60, 1))
         rotations = actor.clip.rotations.copy()
         rotations[:, 0] = turn
-        # The pelvis at height 1 rotates in place; then it is 1.25 below the origin of the file.
+        # The pelvis at height 1 rotates in place and is then 1.25 below the origin of the file.
         places = np.tile([0.3, -2.25, 0.0], (60, 1))
         actor.clip = replace(actor.clip, rotations=rotations)
     actor.clip = replace(actor.clip, figure_translations=places)
@@ -148,7 +150,7 @@ def test_feet_are_moved_to_the_ground(upside_down):
     assert_allclose(found, np.tile([0.3, expected, 0.0], (60, 1)), atol=1e-12)
 
 
-def test_feet_that_slide_are_held():
+def test_sliding_feet_are_held_in_place():
     actor = person(0, 0, 60)
     places = np.zeros((60, 3))
     places[:, 2] = 0.1 * np.arange(60) / 59
@@ -158,7 +160,7 @@ def test_feet_that_slide_are_held():
     assert (note.values["before"], note.values["after"]) == ("200 mm", "0 mm")
 
 
-def test_actors_without_feet_stay_where_they_are():
+def test_actors_without_feet_do_not_move():
     figure, clip = keypoints()
     scene = Scene([Actor(figure, clip=clip)])
     wanted = CleanUp(locks_feet=True, grounds=True)
@@ -166,7 +168,7 @@ def test_actors_without_feet_stay_where_they_are():
     assert scene.actors[0].clip is clip
 
 
-def test_clips_of_keys_are_refused_alone_and_reported_beside_captures():
+def test_keyed_clips_are_refused_without_captures_and_otherwise_reported():
     keyed = Actor(FIGURE, clip=Clip("keys", (), 0.0, 1.0))
     wanted = CleanUp(smoothing=SavitzkyGolay())
     with pytest.raises(RigError, match="captured motion"):
@@ -181,8 +183,9 @@ def test_ranges_outside_the_frames_of_the_file_are_refused(frames):
         clean_up(Scene([person(0, 0, 60)]), CleanUp(frames=frames))
 
 
-def test_the_note_names_the_windows_that_were_used():
-    # At 30 frames per second, 0.2 s are 7 frames; runs of 4 and 1 frames have 3 and none.
+def test_note_states_the_smoothing_windows_that_were_used():
+    # At 30 frames per second, 0.2 s are 7 frames; a run of 4 frames uses 3, and a run of 1 is not
+    # smoothed.
     scene = Scene([person(0, 0, 4), person(1, 8, 9), person(2, 12, 60)])
     wanted = CleanUp(merged=((0, 1, 2),), smoothing=SavitzkyGolay())
     *_, note = clean_up(scene, wanted)
@@ -192,13 +195,13 @@ def test_the_note_names_the_windows_that_were_used():
 
 
 def driven() -> Actor:
-    """Return a person whose motion was retargeted from a skeleton with the same joints."""
+    """Return a person with a motion retargeted from a skeleton with the same joints."""
     actor = person(0, 0, 60)
     drive = Drive(SkeletonMotion(actor.figure, actor.clip))
     return replace(actor, clip=driven_clip(drive, actor.figure)[0], drive=drive)
 
 
-def test_motions_that_are_retargeted_again_are_cleaned_again():
+def test_motions_that_are_retargeted_again_are_cleaned_up_again():
     actor = driven()
     clean_up(Scene([actor]), CleanUp(smoothing=SavitzkyGolay(), frames=(110, 131), rate=60.0))
     again = actor.drive.finish(driven_clip(actor.drive, actor.figure)[0])
@@ -206,7 +209,7 @@ def test_motions_that_are_retargeted_again_are_cleaned_again():
     assert again.timing.n_frames == actor.clip.timing.n_frames == 41
 
 
-def test_keypoints_of_a_person_without_any_get_the_first_number():
+def test_keypoints_of_merged_people_get_the_first_number():
     figure, clip = keypoints()
     scene = Scene([person(3, 0, 60), Actor(figure, clip=clip, person=7)])
     (note,) = clean_up(scene, CleanUp(merged=((3, 7),)))

@@ -41,7 +41,7 @@ def test_feet_are_planted_by_default(walking):
 
 
 @pytest.mark.slow
-def test_the_option_and_its_note_are_those_of_every_command(walking, capsys):
+def test_option_and_note_are_the_same_in_every_command(walking, capsys):
     out = str(walking.with_name("out.bvh"))
     for words, is_said in ((), True), (("--feet", "on"), True), (("--feet", "off"), False):
         assert run(["convert", str(walking), "--body", "-o", out, "--force", *words]) == 0

@@ -1,4 +1,4 @@
-"""Videos and folders of images for the cameras of captures: which camera, rate, size, refusals."""
+"""Videos and folders of images for the cameras of captures: camera, rate, size, and refusals."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def grey(image) -> int:
     return round(float(image.pixels[..., :3].mean()) / 20.0)
 
 
-def test_the_only_camera_gets_the_video_and_its_size(video):
+def test_single_camera_gets_the_video_and_its_size(video):
     views, images, notes = filmed(capture(), [view("01")], MotionSettings(video=video), 25.0)
     assert views[0].size == SIZE and notes == []
     assert images.cameras == ("01",) and images.size_of("01") == SIZE
@@ -63,7 +63,7 @@ def test_frames_of_the_capture_have_the_numbers_of_the_video(video):
     assert "the video ends at 0.40 s, the capture at 0.52 s" in note
 
 
-def test_of_several_cameras_the_one_with_the_name_of_the_video_gets_it(video):
+def test_camera_with_the_name_of_the_video_gets_it(video):
     settings = MotionSettings(video=video)
     views, images, _ = filmed(capture(), [view("01"), view("film")], settings, 25.0)
     assert images.cameras == ("film",) and [each.size for each in views] == [None, SIZE]
@@ -76,7 +76,7 @@ def test_people_in_camera_space_get_a_camera_with_the_size_of_the_video(video):
     settings = MotionSettings(video=video)
     views, images, notes = filmed(capture(space="camera"), [], settings, 25.0)
     assert views[0].size == SIZE and images.cameras == (views[0].name,)
-    # 3-4-5: the diagonal of 64 x 48 is 80; the principal point is the centre.
+    # By 3-4-5, the diagonal of 64 x 48 is 80; the principal point is the centre.
     np.testing.assert_allclose(views[0].intrinsic, [[80, 0, 32], [0, 80, 24], [0, 0, 1]])
     assert [note.key for note in notes] == ["F007.assumed-camera"]
     with pytest.raises(RigError) as found:
@@ -84,13 +84,13 @@ def test_people_in_camera_space_get_a_camera_with_the_size_of_the_video(video):
     assert found.value.cause.key == "F001.video-camera"
 
 
-def test_another_frame_rate_is_reported_and_matched_by_time(video):
+def test_different_frame_rate_is_reported_and_frames_matched_by_time(video):
     _, images, notes = filmed(capture(), [view("01")], MotionSettings(video=video), 50.0)
     assert [note.key for note in notes] == ["F007.video-rate"]
     assert grey(images.at("01", 6 / 50.0)) == 3
 
 
-def test_a_capture_without_a_rate_has_that_of_the_video(tmp_path, video):
+def test_capture_without_a_rate_has_that_of_the_video(tmp_path, video):
     take = write_filmed(tmp_path / "take")
     scene = load(take, motion=MotionSettings(video=video))
     assert scene.actors[0].clip.timing.frame_rate == 25.0
@@ -100,7 +100,7 @@ def test_a_capture_without_a_rate_has_that_of_the_video(tmp_path, video):
 
 
 @pytest.mark.parametrize(("rate", "keys"), [(None, ["F007.capture-no-rate"]), (25.0, [])])
-def test_an_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
+def test_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
     write_frames(tmp_path / "take" / "smpl", {n: [body(0), body(1)] for n in range(3)})
     scene = load(tmp_path / "take", motion=MotionSettings(frame_rate=rate))
     assert scene.actors[0].clip.timing.frame_rate == (rate or 30.0)
@@ -109,7 +109,7 @@ def test_an_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
     assert all("--fps" in str(note) for note in found)
 
 
-def test_a_single_frame_needs_no_frame_rate(tmp_path):
+def test_single_frame_needs_no_frame_rate(tmp_path):
     write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
     keys = [note.key for note in load(tmp_path / "take").diagnostics]
     assert "F007.capture-no-rate" not in keys
@@ -125,7 +125,7 @@ def test_footage_of_several_captures_is_refused(tmp_path, video, option):
     assert found.value.cause.key == "F001.several-captures"
 
 
-def test_a_folder_of_images_counted_from_1_belongs_to_the_only_camera(tmp_path):
+def test_folder_of_images_numbered_from_1_is_assigned_to_the_only_camera(tmp_path):
     take = write_filmed(tmp_path / "take")
     for number in (1, 2, 3):
         pixels = np.full((SIDE, SIDE, 3), 50 * number, dtype=np.uint8)
@@ -145,7 +145,7 @@ def test_images_of_people_in_camera_space_need_no_calibration(tmp_path):
     assert views[0].intrinsic[0, 0] == 50.0
 
 
-def test_a_text_file_is_no_video(tmp_path):
+def test_text_file_is_refused_as_a_video(tmp_path):
     write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
     (tmp_path / "a.mp4").write_text("no video")
     with pytest.raises(FormatError):

@@ -1,4 +1,4 @@
-"""Animations of opened figures: the first plays, or the requested one."""
+"""Animations of opened figures, of which the first or the requested one plays."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -19,14 +19,14 @@ def opened(*figures, animation="", files=None):
     return begin(contents, MotionSettings(animation=animation))[0]
 
 
-def test_the_first_animation_plays_from_its_start():
+def test_first_animation_plays_from_its_start():
     actor = opened(animated_leg()).actors[0]
     assert actor.clip is actor.figure.animations[0].clip() and actor.animation == 0
-    assert actor.pose.shape_weights[1] == 0.5  # the first key of the weights
-    assert actor.clip.start == 0.5  # clips keep their own times
+    assert actor.pose.shape_weights[1] == 0.5  # the value of the first weight key
+    assert actor.clip.start == 0.5  # clips keep their times
 
 
-def test_a_requested_animation_plays_in_every_figure_of_the_file():
+def test_requested_animation_plays_in_every_figure_of_the_file():
     hero, hat = animated_leg(), replace(leg(name="hat"), animations=(animation(bow()),))
     scene = opened(hero, hat, animation="BOW")
     assert [actor.animation for actor in scene.actors] == [1, 0]
@@ -38,7 +38,7 @@ def test_a_requested_animation_plays_in_every_figure_of_the_file():
     assert [actor.clip for actor in opened(hero, hat, animation="none").actors] == [None, None]
 
 
-def test_characters_that_share_no_animation_play_their_own_first_one():
+def test_characters_without_common_animations_play_their_first_ones():
     hero = animated_leg()
     horse = replace(leg(name="horse"), animations=(animation(replace(bow(), name="trot")),))
     scene = opened(hero, horse)
@@ -51,13 +51,13 @@ def test_characters_that_share_no_animation_play_their_own_first_one():
 @pytest.mark.parametrize(
     ("figure", "key"), [(animated_leg(), "F004.animation"), (leg(), "F004.no-animations")]
 )
-def test_a_missing_animation_is_an_error(figure, key):
+def test_missing_animation_is_refused(figure, key):
     with pytest.raises(RigError) as refused:
         opened(figure, animation="jump")
     assert refused.value.diagnostic.key == key
 
 
-def test_invalid_keys_are_an_error_only_if_requested(tmp_path):
+def test_invalid_keys_are_an_error_only_if_their_animation_is_requested(tmp_path):
     def refuse():
         raise FormatError(Diagnostic("F002.misfit", tmp_path, values={"message": "bad"}))
 

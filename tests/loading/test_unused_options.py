@@ -1,4 +1,4 @@
-"""Options that do not apply to the opened files are reported."""
+"""Options that do not apply to the opened files and are reported."""
 
 from __future__ import annotations
 
@@ -33,15 +33,15 @@ def test_options_of_captures_are_reported_for_other_files(tmp_path, settings, na
     path = tmp_path / "walk.bvh"
     path.write_text(person(100.0))
     assert unused(path, **settings) == [f"F007.unused-{name}"]
-    # A model does not suppress the message: it is read, but has no rigs.
+    # A model does not suppress the message, because it is read but has no choice of rigs.
     assert unused(path, model=bundled_body(), **settings) == [f"F007.unused-{name}"]
 
 
-def test_a_model_without_a_motion_is_reported():
+def test_model_without_a_motion_is_reported():
     assert unused(bundled_body(), model=bundled_body()) == ["F007.unused-model"]
 
 
-def test_spaces_and_shapes_are_those_of_video_motion_capture(tmp_path):
+def test_space_and_shape_options_apply_only_to_video_motion_capture(tmp_path):
     path = wham_file(tmp_path)
     assert unused(path, space="camera", average_shape=True) == []
     write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})

@@ -1,7 +1,6 @@
-"""Reference tables of the manual, generated from the registries.
-
-A page marks where a table belongs with ``<!-- table: NAME -->`` and ``<!-- end -->``.
-``make manual`` writes the tables into the pages, ``test_pages.py`` fails if one is out of date.
+"""Reference tables of the manual, generated from the registries. Pages mark the position of a table
+with ``<!-- table: NAME -->`` and ``<!-- end -->``. ``make manual`` writes the tables into the
+pages, ``test_pages.py`` fails if one is out of date.
 """
 
 from __future__ import annotations
@@ -56,7 +55,7 @@ def codes() -> str:
 
 
 def messages() -> str:
-    """Return a table of the templates of each code; values are named in braces."""
+    """Return a table of the templates of each code, with value names in braces."""
     rows = [(f"`{key}`", code_span(template(text))) for key, text in sorted_messages()]
     return table(("key", "message"), rows)
 
@@ -73,7 +72,7 @@ def sorted_messages() -> list[tuple[str, str]]:
 
 
 def template(text: str) -> str:
-    """Return a message as a reader sees it, with each value as its name in braces."""
+    """Return a message as users see it, with each value as its name in braces."""
     shown = ""
     for literal, name, spec, _ in Formatter().parse(text):
         shown += literal
@@ -177,7 +176,7 @@ def options() -> str:
 
 
 def _title(group: argparse._ArgumentGroup) -> str:
-    """Return a group's title as a heading, without the explanation after its colon."""
+    """Return the title of a group as a heading, without the explanation after the colon."""
     title = (group.title or "").partition(":")[0]
     if title in ("options", "positional arguments"):
         return "Other"
@@ -185,7 +184,7 @@ def _title(group: argparse._ArgumentGroup) -> str:
 
 
 def _names(action: argparse.Action) -> str:
-    """Return an option's spellings with its value."""
+    """Return the spellings of an option with its value."""
     if not action.option_strings:
         return f"`{action.metavar or action.dest}`"
     value = action.metavar or ("" if action.nargs == 0 else action.dest.upper())

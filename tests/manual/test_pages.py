@@ -1,4 +1,4 @@
-"""The manual's pages: complete, up to date, and with working commands."""
+"""The pages of the manual, which must be complete, up to date, and have working commands."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ ALL_COMMANDS = [(path.name, line) for path in PATHS for line in commands(path)]
 
 def test_page_table_is_exactly_the_folder() -> None:
     assert {path.stem for path in FOLDER.glob("*.md")} == set(PAGES)
-    assert not set(PAGES) & set(COMMANDS), "viewer help could mean either"
+    assert not set(PAGES) & set(COMMANDS), "viewer help would be ambiguous"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
 def test_tables_match_the_registries(path: Path) -> None:
     text = path.read_text("utf-8")
-    assert with_tables(text) == text, "stale: type make manual"
+    assert with_tables(text) == text, "stale: run make manual"
 
 
 @pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
@@ -78,7 +78,7 @@ def test_python_examples_run_as_printed(
 
 
 @pytest.mark.parametrize("topic", PAGES)
-def test_a_page_begins_with_its_title_and_fits_a_terminal(topic: str) -> None:
+def test_page_begins_with_its_title_and_fits_a_terminal(topic: str) -> None:
     text = page_text(topic)
     assert text.startswith("# ")
     assert "<!--" not in text and "![" not in text and ".md)" not in text
@@ -97,11 +97,11 @@ def test_reference_is_complete() -> None:
     assert all(f"| `viewer {command}` |" in options for command in COMMANDS)
 
 
-def test_the_readme_is_short() -> None:
+def test_readme_is_short() -> None:
     assert len(README.read_text("utf-8").split()) <= 900
 
 
-def test_an_unknown_topic_suggests_the_nearest_and_lists_all() -> None:
+def test_unknown_topic_suggests_the_nearest_and_lists_all() -> None:
     with pytest.raises(ViewerError) as caught:
         page_text("wieghts")
     assert "did you mean weights?" in str(caught.value)

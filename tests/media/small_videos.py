@@ -1,4 +1,4 @@
-"""Small images for videos, and an independent reader of their frames."""
+"""Small images for videos, and an independent reader of video frames."""
 
 from __future__ import annotations
 

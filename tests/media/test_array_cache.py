@@ -1,4 +1,4 @@
-"""Cached arrays are used only for exactly the bytes that they were computed from."""
+"""Cached arrays, which are used only for exactly the bytes from which they were computed."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ def entry(folder: Path) -> Path:
 
 
 def forbid(monkeypatch: pytest.MonkeyPatch, module: object, name: str) -> None:
-    """Fail if a function is called."""
+    """Make a function fail if it is called."""
     monkeypatch.setattr(module, name, lambda *_, **__: pytest.fail(f"{name} was called"))
 
 
-def test_second_run_parses_nothing(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_second_run_uses_the_cached_array(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     data = b"positions " + TEXT + b"}"
     for _ in range(2):
         values, bad = parse_numbers(data, 10, 10 + len(TEXT))
@@ -62,7 +62,7 @@ def test_changed_text_is_parsed_again(folder: Path) -> None:
     assert parse_numbers(changed, 0, len(changed))[0][34] == 18.5
 
 
-def test_same_checksum_and_length_is_not_enough(folder: Path) -> None:
+def test_equal_checksum_and_length_are_not_sufficient(folder: Path) -> None:
     slot().store(VALUES)
     other = slot(TEXT.replace(b"17.5", b"18.5", 1))
     other.path = entry(folder)  # as if the checksums of both texts were equal
@@ -99,7 +99,7 @@ def test_truncated_entry_is_ignored(folder: Path, size: int) -> None:
     assert slot().load("<f8", 1) is None
 
 
-def test_entry_of_another_version_type_or_shape_is_ignored(
+def test_entry_of_a_different_version_type_or_shape_is_ignored(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     slot().store(VALUES)
@@ -109,7 +109,7 @@ def test_entry_of_another_version_type_or_shape_is_ignored(
     assert slot().load("<f8", 1) is None
 
 
-def test_only_the_user_can_read_or_write_entries(folder: Path) -> None:
+def test_only_the_user_may_read_or_write_entries(folder: Path) -> None:
     slot().store(VALUES)
     assert folder.stat().st_mode & 0o777 == 0o700
     assert entry(folder).stat().st_mode & 0o777 == 0o600
@@ -117,7 +117,7 @@ def test_only_the_user_can_read_or_write_entries(folder: Path) -> None:
     assert slot().load("<f8", 1) is None
 
 
-def test_other_shapes_of_as_many_items_are_ignored(folder: Path) -> None:
+def test_different_shapes_of_equal_size_are_ignored(folder: Path) -> None:
     slot().store(VALUES.reshape(4000, 2))
     data = entry(folder).read_bytes()
     for axes in ((2, 4000), (1 << 62, 0)):
@@ -129,7 +129,7 @@ def test_other_shapes_of_as_many_items_are_ignored(folder: Path) -> None:
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs named pipes")
-def test_pipes_are_not_waited_for(folder: Path) -> None:
+def test_pipes_are_ignored_without_waiting(folder: Path) -> None:
     folder.mkdir()
     os.mkfifo(slot().path)
     assert slot().load("<f8", 1) is None
@@ -156,7 +156,7 @@ def test_unusable_folder_silently_disables_the_cache(
     assert cache_use() == (0, 0)
 
 
-def test_oldest_entries_are_removed_when_there_are_too_many(
+def test_oldest_entries_are_removed_if_there_are_too_many(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     size = 56 + len(TEXT) + VALUES.nbytes
@@ -172,7 +172,7 @@ def test_oldest_entries_are_removed_when_there_are_too_many(
     assert cache_use() == (3, 3 * size)
 
 
-def test_threads_that_write_at_once_leave_one_valid_entry(folder: Path) -> None:
+def test_concurrent_threads_leave_one_valid_entry(folder: Path) -> None:
     threads = [threading.Thread(target=slot().store, args=(VALUES,)) for _ in range(8)]
     for thread in threads:
         thread.start()

@@ -1,4 +1,4 @@
-"""Images decoded together: contents, errors in order, and a common limit of pixels."""
+"""Batched decoding of images: contents, errors in order, and a common limit of pixels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def file(number: int) -> tuple[Path, bytes]:
     return Path(f"{number}.png"), png(np.full((2, 3, 4), number, np.uint8))
 
 
-def test_images_are_returned_in_order_and_errors_in_their_place():
+def test_images_are_returned_in_order_with_errors_at_their_positions():
     files = [file(number) for number in range(20)]
     files[7] = Path("7.png"), files[7][1][:45]
     files[9] = Path("9.png"), b"nothing"
@@ -41,7 +41,7 @@ def test_images_are_returned_in_order_and_errors_in_their_place():
             assert not pixels.flags.writeable
 
 
-def test_no_images_are_decoded_to_none():
+def test_empty_list_of_images_is_decoded():
     assert decode_pictures([]) == []
 
 

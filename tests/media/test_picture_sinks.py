@@ -18,7 +18,7 @@ def plain(color, size=(40, 30)):
 def test_label_is_white_on_a_dark_tag_in_the_lower_left_corner():
     pixels = plain((200, 200, 200, 255), (60, 40))
     write_label(pixels, "17")
-    # Letters of 9 pixels with a margin of 3; the tag's grey of 16 covers the image by 62 %.
+    # The text is 9 pixels high with a margin of 3; the tag's grey of 16 covers the image with 62 %.
     assert pixels[-1, 0].tolist() == [86, 86, 86, 255] == pixels[-15, 0].tolist()
     assert pixels[-16, 0].tolist() == [200, 200, 200, 255]
     assert pixels[-12:-3, 3:16, 0].max() > 220
@@ -49,7 +49,7 @@ def test_images_are_written_one_by_one(tmp_path):
     assert sink.n_bytes == sum(path.stat().st_size for path in paths)
 
 
-def test_finished_images_are_kept_when_the_rest_is_aborted(tmp_path):
+def test_finished_images_are_kept_if_recording_is_aborted(tmp_path):
     sink = PictureSink([tmp_path / "0.png", tmp_path / "1.png"])
     sink.write(0, plain((1, 2, 3, 255)))
     sink.abort()
@@ -60,7 +60,7 @@ def test_finished_images_are_kept_when_the_rest_is_aborted(tmp_path):
     ("name", "words"),
     [("missing/0.png", "does not exist"), ("0.psd", "cannot be written in this format")],
 )
-def test_unwritable_image_is_one_line(tmp_path, name, words):
+def test_unwritable_image_is_refused_in_one_line(tmp_path, name, words):
     with pytest.raises(OutputError, match=words):
         PictureSink([tmp_path / name]).write(0, plain((1, 2, 3, 255)))
 
@@ -82,7 +82,7 @@ def test_sheet_layout_fills_the_image(size, count, wanted):
 def test_sheet_shows_every_frame_in_its_cell(tmp_path):
     path = tmp_path / "sheet.png"
     sink = SheetSink(path, (122, 93), [0, 7, 14])
-    # A gutter of one pixel between two cells of 60 x 46.
+    # There is a gutter of one pixel between two cells of 60 x 46.
     assert (sink.columns, sink.rows, sink.cell, sink.size) == (2, 2, (60, 46), (121, 93))
     colors = [(200, 0, 0, 255), (0, 200, 0, 255), (0, 0, 200, 255)]
     for frame, color in enumerate(colors):
@@ -97,7 +97,7 @@ def test_sheet_shows_every_frame_in_its_cell(tmp_path):
         write_label(expected, str((0, 7, 14)[frame]))
         assert (cell == expected).all()
     assert (sheet[46] == 255).all() and (sheet[:, 60] == 255).all()
-    assert (sheet[47:, 61:] == 255).all()  # no frame
+    assert (sheet[47:, 61:] == 255).all()  # this cell has no frame
 
 
 def test_gutters_of_transparent_frames_are_transparent(tmp_path):
@@ -109,7 +109,7 @@ def test_gutters_of_transparent_frames_are_transparent(tmp_path):
     assert not sheet[:, sink.cell[0] : sink.cell[0] + sink.gutter].any()
 
 
-def test_cells_have_the_aspect_of_what_they_show():
+def test_cells_have_the_aspect_ratio_of_their_frames():
     assert sheet_layout((900, 300), 8, 0.4) == (8, 1)
     assert sheet_layout((900, 600), 8, 4.0) == (2, 4)
 

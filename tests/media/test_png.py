@@ -1,4 +1,4 @@
-"""PNG files contain exactly the given pixels when read by Pillow."""
+"""PNG files, which must contain exactly the given pixels when read by Pillow."""
 
 import io
 import sys
@@ -15,7 +15,7 @@ def noise(height: int, width: int, seed: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (7, 1), (48, 64), (300, 301)])
-def test_png_holds_every_pixel_with_alpha(size: tuple[int, int]) -> None:
+def test_png_contains_every_pixel_with_alpha(size: tuple[int, int]) -> None:
     pixels = noise(*size, seed=sum(size))
     with Image.open(io.BytesIO(encode_png(pixels))) as picture:
         assert picture.mode == "RGBA" or (pixels[..., 3] == 255).all()
@@ -37,7 +37,7 @@ def test_png_of_a_view_into_a_larger_array_is_correct() -> None:
         np.testing.assert_array_equal(np.array(picture), pixels)
 
 
-def test_png_without_isal_holds_every_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_png_without_isal_contains_every_pixel(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "isal", None)
     monkeypatch.setitem(sys.modules, "isal.isal_zlib", None)
     pixels = noise(20, 30, seed=3)

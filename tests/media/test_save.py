@@ -58,7 +58,7 @@ def test_save_applies_the_umask_to_a_new_file(tmp_path, mask, mode):
     before = os.umask(mask)
     try:
         save_bytes(tmp_path / "a.skel", b"new")
-        assert os.umask(mask) == mask  # and leaves the mask itself unchanged
+        assert os.umask(mask) == mask  # the umask is unchanged
     finally:
         os.umask(before)
     assert stat.S_IMODE((tmp_path / "a.skel").stat().st_mode) == mode
@@ -93,7 +93,7 @@ def test_save_refuses_a_missing_folder(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_save_refuses_a_file_as_a_folder(tmp_path):
+def test_save_refuses_a_path_through_a_file(tmp_path):
     (tmp_path / "a").write_bytes(b"old")
     assert refused(tmp_path / "a" / "b.skel") == f"{tmp_path / 'a' / 'b.skel'}: Not a directory"
     assert (tmp_path / "a").read_bytes() == b"old"
@@ -113,7 +113,7 @@ def test_save_refuses_an_invalid_name(tmp_path):
     assert "\n" not in refused(tmp_path / ("x" * 300))
 
 
-def test_save_shows_an_odd_name_on_one_line(tmp_path):
+def test_save_shows_an_unusual_name_on_one_line(tmp_path):
     assert refused(tmp_path / "new\nline" / "a") == (
         f"{tmp_path}/new\\nline/a: the folder {tmp_path}/new\\nline does not exist"
     )
@@ -146,7 +146,7 @@ def test_save_refuses_a_folder_that_cannot_be_written(tmp_path):
     folder.mkdir()
     folder.chmod(0o555)
     if os.access(folder, os.W_OK):
-        # root can write anywhere except in a kernel file system.
+        # Only kernel file systems are not writable for root.
         assert refused("/proc/a.skel").startswith("/proc/a.skel: ")
     else:
         assert refused(folder / "a.skel") == f"{folder / 'a.skel'}: Permission denied"
@@ -220,7 +220,7 @@ def test_file_size_limit_keeps_the_old_file(tmp_path):
         ("a{b", None),
         ("}", None),
         ("\ud800", None),
-        ("\udcc3\udca9", None),  # would be read back as the letter that these bytes encode in UTF-8
+        ("\udcc3\udca9", None),  # these bytes would be read back as a UTF-8 letter
     ],
 )
 def test_as_words_accepts_only_text_that_round_trips(name, words):

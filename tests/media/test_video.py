@@ -1,4 +1,4 @@
-"""Videos: colours, sizes, rates and transparency round-trip; no partial files remain."""
+"""Round trips of videos: colours, sizes, rates and transparency."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_colours_round_trip(tmp_path, suffix):
     frames = decoded(path)
     assert len(frames) == 5
     middles = [frames[2][12, 16], frames[2][12, 48], frames[2][36, 16], frames[2][36, 48]]
-    # Rounding to 8 bits of limited range, twice, and the encoder's loss.
+    # The tolerance covers rounding to 8 bits of limited range, twice, and the loss of the encoder.
     assert np.abs(np.array(middles, dtype=int) - list(COLORS.values())).max() <= 3
 
 
@@ -68,7 +68,7 @@ def test_colours_are_those_of_bt709(tmp_path):
         (120.0, Fraction(120)),
     ],
 )
-def test_rate_and_order_are_kept(tmp_path, rate, exact):
+def test_rate_and_order_of_frames_are_preserved(tmp_path, rate, exact):
     path = tmp_path / "x.mp4"
     write(VideoSink(path, (64, 48), rate), [counting(frame) for frame in range(12)])
     with av.open(str(path)) as container:
@@ -81,7 +81,7 @@ def test_rate_and_order_are_kept(tmp_path, rate, exact):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm"])
-def test_odd_sizes_repeat_the_last_column_and_row(tmp_path, suffix):
+def test_odd_sizes_are_padded_by_repeating_the_last_column_and_row(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     pixels = np.full((31, 33, 4), 255, dtype=np.uint8)
     pixels[:, 32, :3], pixels[30, :, :3] = (200, 0, 0), (0, 0, 200)
@@ -103,7 +103,7 @@ def test_gif_keeps_odd_sizes(tmp_path):
     assert sink.notes == [] and decoded(tmp_path / "x.gif")[0].shape == (31, 33, 3)
 
 
-def test_webm_holds_transparency(tmp_path):
+def test_webm_preserves_transparency(tmp_path):
     path = tmp_path / "x.webm"
     pixels = quarters(64, 48)
     pixels[:24, :32, 3], pixels[24:, 32:, 3] = 0, 100
@@ -113,7 +113,7 @@ def test_webm_holds_transparency(tmp_path):
     with av.open(str(path)) as container:
         stream = container.streams.video[0]
         assert stream.metadata["alpha_mode"] == "1"
-        # FFmpeg's own decoder drops alpha; libvpx's does not.
+        # FFmpeg's built-in decoder drops alpha; that of libvpx does not.
         decoder = av.CodecContext.create("libvpx-vp9", "r")
         packets = [packet for packet in container.demux(stream) if packet.size]
         frames = [frame for packet in packets for frame in decoder.decode(packet)]
@@ -123,7 +123,7 @@ def test_webm_holds_transparency(tmp_path):
     np.testing.assert_allclose(found, (0, 255, 255, 100), atol=3)
 
 
-def test_gif_holds_transparency(tmp_path):
+def test_gif_preserves_transparency(tmp_path):
     path = tmp_path / "x.gif"
     pixels = quarters(64, 48)
     pixels[:24, :32, 3] = 0
@@ -134,12 +134,12 @@ def test_gif_holds_transparency(tmp_path):
         picture.seek(1)
         second = np.array(picture.convert("RGBA"))
     assert first[12, 16, 3] == 0 and (first[12, 48], first[36, 16])[0][3] == 255
-    # The first frame's content there is gone.
+    # The content of the first frame is cleared there.
     assert second[36, 16, 3] == 0 and second[12, 16, 3] == 255
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".gif"])
-def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
+def test_opaque_formats_composite_transparent_pixels_on_black(tmp_path, suffix):
     path = tmp_path / f"x{suffix}"
     pixels = quarters(64, 48)
     pixels[:24, :, 3], pixels[24:, :32, 3] = 0, 128
@@ -154,7 +154,7 @@ def test_opaque_videos_put_transparent_pixels_on_black(tmp_path, suffix):
 
 
 def delays(path: Path) -> list[int]:
-    """Return a GIF's frame delays in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
+    """Return the frame delays of a GIF in 1/100 s, without a decoder (GIF89a, 23.c.vi)."""
     data, found, place = path.read_bytes(), [], 0
     while (place := data.find(b"\x21\xf9\x04", place)) >= 0:
         found.append(int.from_bytes(data[place + 4 : place + 6], "little"))
@@ -194,7 +194,7 @@ def test_gif_colours_come_from_all_sampled_frames(tmp_path):
 
 @pytest.mark.parametrize("transparent", [False, True])
 def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, transparent):
-    """Most pixels do not change between frames, and are not stored again."""
+    """Most pixels do not change between frames and are not stored again."""
     path = tmp_path / "x.gif"
     x, y = np.meshgrid(np.linspace(60, 220, 96), np.linspace(80, 240, 64))
     still = np.stack([x, (x + y) / 2, y, np.full_like(x, 255)], axis=-1).astype(np.uint8)
@@ -219,7 +219,7 @@ def test_gif_of_gradients_with_a_moving_bar_is_correct_in_every_frame(tmp_path, 
             shown = np.array(animation.convert("RGBA")).astype(int)
             assert (shown[..., 3] == pixels[..., 3]).all(), index
             error = np.abs(shown - pixels)[pixels[..., 3] == 255].max(axis=-1)
-            # Ordered dither, and the noise: 80 pixels hardly affect the palette.
+            # The tolerance covers ordered dithering and noise; 80 pixels hardly affect the palette.
             assert error.mean() <= 6 and (error > 60).sum() <= 40, index
 
 
@@ -244,4 +244,5 @@ def test_fallback_encoder_works(tmp_path, monkeypatch):
     sink = VideoSink(path, (64, 48), 25.0)
     write(sink, [quarters(64, 48)] * 3)
     assert sink.encoder == "mpeg4"
-    assert np.abs(decoded(path)[1][12, 16].astype(int) - COLORS["red"]).max() <= 12  # it is coarser
+    # Its quality is lower.
+    assert np.abs(decoded(path)[1][12, 16].astype(int) - COLORS["red"]).max() <= 12

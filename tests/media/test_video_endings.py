@@ -1,4 +1,4 @@
-"""Videos that are refused, aborted or do not fit on the disk: no partial files remain."""
+"""Videos that are refused, aborted or too large for the disk, and leave no partial files."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def names(folder: Path) -> list[str]:
 # Refusals
 
 
-def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
+def test_missing_encoder_is_refused_in_one_line(tmp_path, monkeypatch):
     kind = video_kinds.VideoKind("MP4 video (H.264)", ("no_such", "nor_this"), False, True)
     monkeypatch.setitem(video_kinds.VIDEOS, ".mp4", kind)
     path = tmp_path / "x.mp4"
@@ -39,7 +39,7 @@ def test_missing_encoder_is_one_line(tmp_path, monkeypatch):
     )
 
 
-def test_missing_library_says_what_to_install(tmp_path, monkeypatch):
+def test_missing_library_is_refused_with_the_install_command(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(ViewerError) as caught:
         VideoSink(tmp_path / "x.mp4", (64, 48), 25.0)
@@ -74,7 +74,7 @@ def test_formats_are_listed_for_other_suffixes():
         ("pipe.mp4", "is not a regular file, and a video must be written to one"),
     ],
 )
-def test_unwritable_video_paths_are_refused_at_once(tmp_path, name, words):
+def test_unwritable_video_paths_are_refused_before_recording(tmp_path, name, words):
     (tmp_path / "folder.mp4").mkdir()
     os.mkfifo(tmp_path / "pipe.mp4")
     with pytest.raises(OutputError) as caught:
@@ -82,7 +82,7 @@ def test_unwritable_video_paths_are_refused_at_once(tmp_path, name, words):
     assert str(caught.value).endswith(words)
 
 
-# No broken files remain
+# Complete or no files
 
 
 def test_video_appears_only_when_complete(tmp_path):
@@ -155,7 +155,7 @@ for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
 
 
 @pytest.mark.parametrize("suffix", [".mp4", ".webm", ".gif"])
-def test_full_disk_is_one_line_and_leaves_no_file(tmp_path, suffix):
+def test_full_disk_is_reported_in_one_line_and_leaves_no_file(tmp_path, suffix):
     """A limit on file sizes simulates a full disk."""
     path = tmp_path / f"x{suffix}"
     run = subprocess.run(

@@ -1,4 +1,4 @@
-"""Videos with write errors, at every write and every fill level: one line, no file remains."""
+"""Write errors of videos at every write and fill level: one line is printed and no file is left."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ FULL = "No space left on device"
 
 
 def noisy_frames(n_frames: int, n_more: int = 0) -> list[np.ndarray]:
-    """Return frames that do not compress, and more of a plain colour."""
+    """Return incompressible frames, followed by frames of one colour."""
     noise = np.random.default_rng(1).integers(0, 255, (n_frames, *SIZE[::-1], 4), dtype=np.uint8)
     noise[..., 3] = 255
     return [*noise, *[np.full((*SIZE[::-1], 4), 255, dtype=np.uint8)] * n_more]
 
 
 def record(path: Path, frames: list[np.ndarray]) -> list[str]:
-    """Write a video as the recorder does: its queue still holds frames when one has failed."""
+    """Write a video like the recorder, which still has queued frames after a failure."""
     sink, said = VideoSink(path, SIZE, 25.0), []
     for index, pixels in enumerate(frames):
         try:
@@ -52,7 +52,7 @@ def record(path: Path, frames: list[np.ndarray]) -> list[str]:
 
 
 class Disk:
-    """Stands in for the raw file: full from the n-th write on, of which half still fits."""
+    """A raw file that is full from the n-th write on. Half of that write succeeds."""
 
     def __init__(self, number: int, is_kept: bool = True) -> None:
         self.calls, self.number, self.is_kept = 0, number, is_kept
@@ -156,8 +156,8 @@ for level in range(17):
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_every_disk_fill_level_gives_one_line_or_a_video(tiny_disk, suffix):
-    """In a separate process, as FFmpeg used to crash with a segmentation fault."""
+def test_every_disk_fill_level_results_in_one_message_or_a_video(tiny_disk, suffix):
+    """The test runs in a separate process, because FFmpeg could crash with a segmentation fault."""
     folders = os.pathsep.join([str(ROOT), str(ROOT / "tests" / "media")])
     run = subprocess.run(
         [sys.executable, "-c", _LEVELS, str(tiny_disk), suffix],
@@ -170,5 +170,5 @@ def test_every_disk_fill_level_gives_one_line_or_a_video(tiny_disk, suffix):
     refused = ["1", f"{tiny_disk / 'x'}{suffix}: {FULL}"]
     for row in rows:
         assert row[1:] in (refused, ["0", "", f"x{suffix}"])
-    # The disk holds 16 blocks: one that is full holds no video.
+    # The disk has 16 blocks; a full disk has no room for a video.
     assert rows[16][1:] == refused

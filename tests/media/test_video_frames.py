@@ -1,4 +1,4 @@
-"""Frames of a video by time: in order, in any order, rotated, outside, damaged."""
+"""Frames of a video by time: sequential, in any order, rotated, outside the video, and damaged."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RATE, COUNT, SIZE = 25.0, 60, (64, 48)
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """A video whose frames have the grey value of four times their number."""
+    """A video in which the grey value of a frame is four times its number."""
     path = tmp_path_factory.mktemp("video") / "video.mp4"
     frames = [np.full((SIZE[1], SIZE[0], 4), 4 * n, dtype=np.uint8) for n in range(COUNT)]
     write(VideoSink(path, SIZE, RATE), frames)
@@ -32,7 +32,7 @@ def number(pixels) -> int:
     return round(float(pixels[..., :3].mean()) / 4.0)
 
 
-def test_properties_are_known_at_once(path):
+def test_properties_are_known_without_decoding(path):
     video = VideoFrames(path)
     assert (video.size, video.rate, video.n_frames) == (SIZE, RATE, COUNT)
 
@@ -47,7 +47,7 @@ def test_frames_are_exact_in_any_order(path, keeps_all, monkeypatch):
     assert [number(video.at(n / RATE)) for n in order] == order
 
 
-def test_kept_frames_are_bounded(path, monkeypatch):
+def test_number_of_cached_frames_is_bounded(path, monkeypatch):
     monkeypatch.setattr(video_frames, "_BYTES", 10 * 2 * SIZE[0] * SIZE[1])
     video = VideoFrames(path)
     for n in range(COUNT):
@@ -60,7 +60,7 @@ def test_the_nearest_frame_is_shown_between_frames(path):
     assert [number(video.at(n / RATE)) for n in (6.4, 6.6, 6.49, 7.4)] == [6, 7, 6, 7]
 
 
-def test_there_is_nothing_before_the_first_and_after_the_last_frame(path):
+def test_no_frame_is_before_the_first_or_after_the_last(path):
     video = VideoFrames(path)
     assert video.at(-1.0 / RATE) is None
     assert video.at(COUNT / RATE) is None
@@ -69,7 +69,7 @@ def test_there_is_nothing_before_the_first_and_after_the_last_frame(path):
 
 
 def test_rotated_recordings_are_shown_upright(tmp_path):
-    # The upper half is white; the header then says that the recording is rotated by 90 degrees.
+    # The upper half is white; then the header is changed to a rotation by 90 degrees.
     pixels = np.zeros((SIZE[1], SIZE[0], 4), dtype=np.uint8)
     pixels[: SIZE[1] // 2] = 255
     path = tmp_path / "turned.mp4"
@@ -86,12 +86,12 @@ def test_rotated_recordings_are_shown_upright(tmp_path):
     video = VideoFrames(path)
     assert video.size == (SIZE[1], SIZE[0])
     found = video.at(0.0)
-    # Rotated clockwise, what was above is at the right.
+    # After a clockwise rotation, the upper half is at the right.
     assert found[:, -8:, :3].min() > 240 and found[:, :8, :3].max() < 15
 
 
 @pytest.mark.parametrize("data", [b"", b"no video at all", b"\x00\x00\x00\x18ftypmp42" + bytes(64)])
-def test_other_files_are_refused(tmp_path, data):
+def test_files_of_other_kinds_are_refused(tmp_path, data):
     path = tmp_path / "a.mp4"
     path.write_bytes(data)
     with pytest.raises(FormatError) as found:
@@ -100,7 +100,7 @@ def test_other_files_are_refused(tmp_path, data):
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".bmp"])
-def test_pictures_are_no_videos(tmp_path, suffix):
+def test_pictures_are_refused_as_videos(tmp_path, suffix):
     path = tmp_path / f"a{suffix}"
     Image.new("RGB", (8, 6)).save(path)
     with pytest.raises(FormatError) as found:

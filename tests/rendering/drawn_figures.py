@@ -1,4 +1,4 @@
-"""Figures for rendering tests: random ones with any number of joints, and simple solids."""
+"""Figures for rendering tests: random figures with any number of joints, and simple solids."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ ROTATIONS = (3, 4, 5)
 
 
 def skeleton(parents, offsets, boxes=None) -> Skeleton:
-    """Return a skeleton whose joints all rotate freely about x, y and z."""
+    """Return a skeleton in which all joints rotate freely about x, y and z."""
     n_joints = len(parents)
     return Skeleton(
         names=tuple(f"j{joint}" for joint in range(n_joints)),
@@ -36,7 +36,7 @@ def skeleton(parents, offsets, boxes=None) -> Skeleton:
 
 
 def random_pose(skeleton: Skeleton, rng: np.random.Generator, reach: float = math.pi) -> Pose:
-    """Return a pose with every DOF anywhere within its limits, unlimited ones within +-reach."""
+    """Return a random pose with every DOF within its limits, and unlimited DOFs within +-reach."""
     pose = rest_pose(skeleton)
     low = np.maximum(skeleton.dof_limits[:, 0], -reach)
     high = np.minimum(skeleton.dof_limits[:, 1], reach)
@@ -56,10 +56,9 @@ def random_figure(
     skew=False,
     chain=False,
 ) -> Figure:
-    """Return a cloud of vertices bound at random to a random tree of joints.
-
-    counts: range of influences per vertex; sums: of its weights; empty: fraction of vertices
-    without any; skew: bindings with shear and other scales per axis.
+    """Return a cloud of vertices bound at random to a random tree of joints. counts: range of
+    influences per vertex; sums: range of weight sums; empty: fraction of vertices without
+    influence; skew: bindings with shear and non-uniform scale.
     """
     indices = np.arange(n_joints)
     parents = indices - 1 if chain else np.array([-1, *(rng.integers(0, i) for i in indices[1:])])
@@ -122,7 +121,7 @@ def square(z=0.0, half=1.0, material=None, clockwise=False, uv_scale=1.0) -> Mes
 
 
 def picture(rows) -> Material:
-    """Return a material whose texture has these rows of (r, g, b), the first at the top."""
+    """Return a material with a texture of these rows of (r, g, b), the first at the top."""
     colors = np.array(rows, dtype=np.uint8)
     alpha = np.full((*colors.shape[:2], 1), 255, dtype=np.uint8)
     return Material("paint", Texture("paint.png", np.concatenate([colors, alpha], axis=2)))
@@ -135,7 +134,7 @@ def checker(n=8, first=(230, 200, 60), second=(40, 70, 160)) -> Material:
 
 
 def arm(n_joints=4, sides=16, rings=40, material=None) -> Figure:
-    """Return a tube along +x of length n_joints, a joint a unit, weights blended at the elbows."""
+    """Return a tube along +x with a joint per unit and weights blended at the elbows."""
     x = np.linspace(0.0, n_joints, rings + 1)
     around = np.linspace(0.0, 2.0 * math.pi, sides + 1)
     along, angle = np.meshgrid(x, around, indexing="ij")

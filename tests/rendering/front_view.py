@@ -1,6 +1,6 @@
 """Orthographic front views of small scenes, unlit or evenly lit, so that pixels are predictable.
 
-Squares with a material are drawn in the light of the studio alone.
+Squares with a material are lit only by the studio.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import skin_from_lists
 
 WHITE = (1.0, 1.0, 1.0, 1.0)
-PIXELS = 80  # pixels per side; x and y from -2 to 2, so a unit is 20 pixels
+PIXELS = 80  # pixels per side; x and y are from -2 to 2, so a unit is 20 pixels
 
 
 def front_view(offscreen, scene: Scene, **options) -> np.ndarray:
-    """Return the image of a scene seen from +z, transparent where it is empty."""
+    """Return the image of a scene seen from +z on a transparent background."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     shown = DisplayOptions(background="transparent", grid=False, samples=1)
     for name, value in options.items():
@@ -37,12 +37,12 @@ def pixel(picture, x, y) -> list[int]:
 
 
 def drawn(picture) -> np.ndarray:
-    """Return which pixels are covered: (H, W) bool."""
+    """Return a mask of the covered pixels, (H, W) bool."""
     return picture[..., 3] > 0
 
 
 def grid_figure(n=4, **parts) -> Figure:
-    """Return a square from -1.5 to 1.5 of n x n cells, bound to a root; joint 1 moves nothing."""
+    """Return a square from -1.5 to 1.5 of n x n cells bound to a root; joint 1 has no influence."""
     places = np.linspace(-1.5, 1.5, n + 1)
     y, x = np.meshgrid(places, places, indexing="ij")
     points = np.stack([x.ravel(), y.ravel(), 0 * x.ravel()], axis=1)
@@ -59,13 +59,13 @@ def alone(figure) -> Scene:
 
 
 def dark(**changes) -> Lights:
-    """Return lights with only the studio on."""
+    """Return lights of which only the studio is on."""
     off = Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0)
     return Lights(key=off, rim=off, ambient=0.0, specular=0.0, **changes)
 
 
 def texture(*rows, **changes) -> Texture:
-    """Return a texture with these rows of (r, g, b) or (r, g, b, a), the first at the top."""
+    """Return a texture of these rows of (r, g, b) or (r, g, b, a), the first at the top."""
     pixels = np.array([[(*color, 255)[:4] for color in row] for row in rows], dtype=np.uint8)
     return Texture("paint.png", pixels, **changes)
 

@@ -1,4 +1,4 @@
-"""Golden images of motion: instances, captured points, paths, calibrated cameras."""
+"""Golden images of motion: instances, captured points, motion paths, and calibrated cameras."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
 
-# Positions of the body25 keypoints of a walking person, metres, in the layout's order.
+# Positions of the body25 keypoints of a walking person in metres, in the order of the layout.
 _WALK = [
     [0.0, 1.6, 0.12], [0.0, 1.42, 0.0], [-0.18, 1.4, 0.0], [-0.22, 1.12, 0.1],
     [-0.2, 0.9, 0.28], [0.18, 1.4, 0.0], [0.24, 1.13, -0.1], [0.26, 0.88, -0.05],
@@ -36,7 +36,7 @@ _WALK = [
 
 
 def _colors() -> Scene:
-    """Three arms, two of them with a colour; one has a texture, which takes precedence."""
+    """Return three arms, two with a colour and one with a texture, which takes precedence."""
     plain, textured = arm(3), arm(3, material=checker(8))
     actors = [bent(plain, (1, "z", 0.7)), bent(plain, (1, "z", 0.4)), bent(textured, (1, "z", 0.1))]
     for number, color in ((0, (0.6, 0.05, 0.03)), (2, (0.05, 0.4, 0.05))):
@@ -47,7 +47,7 @@ def _colors() -> Scene:
 
 
 def _instances() -> Scene:
-    """Twelve bodies, each in its own pose, every third with its own colour."""
+    """Return twelve bodies in different poses, every third with a different colour."""
     figure = viewer.load(bundled_body()).actors[0].figure
     rng = np.random.default_rng(4)
     actors = []
@@ -62,7 +62,7 @@ def _instances() -> Scene:
 
 
 def _people() -> Scene:
-    """Two people as body25: one clearly visible, one less confident from head to foot."""
+    """Return two people as body25, one with confidence that decreases from head to foot."""
     layout = keypoint_layout(25)
     actors = []
     for number in range(2):
@@ -81,7 +81,7 @@ def _people() -> Scene:
 
 
 def _fitted() -> Scene:
-    """The bundled body, and keypoints slightly offset from its joints."""
+    """Return the bundled body, and keypoints slightly offset from its joints."""
     body = Actor(viewer.load(bundled_body()).actors[0].figure)
     body.pose.dofs[50] = 0.6
     places = joint_matrices(body.figure, body.pose)[:, :3, 3] + [0.05, 0.0, 0.03]
@@ -91,7 +91,7 @@ def _fitted() -> Scene:
 
 
 def _waving(time: float) -> Scene:
-    """An arm whose joints swing about two axes, two seconds long, at one time."""
+    """Return an arm with joints that swing about two axes for two seconds, posed at one time."""
     times = np.linspace(0.0, 2.0, 9)
     curves = {5: (0.9, 2), 4: (0.5, 1), 8: (0.8, 3), 10: (0.6, 2)}
     channels = tuple(
@@ -104,7 +104,7 @@ def _waving(time: float) -> Scene:
 
 
 def _calibrated() -> Shot:
-    """The fox through a camera with its principal point off centre, that is rolled to one side."""
+    """Return the fox seen by a rolled camera with an off-centre principal point."""
     shot = Shot(posed_fox(), DisplayOptions())
     camera = shot.camera
     lean = np.array([[0.94, -0.34, 0.0], [0.34, 0.94, 0.0], [0.0, 0.0, 1.0]])

@@ -1,6 +1,5 @@
-"""Golden images of scalar quantities: one of each, on a figure that shows it.
-
-Without legends: text looks different with every version of Pillow; see test_legend_picture.py.
+"""Golden images of scalar quantities, one of each on a figure that shows it. They have no legends,
+because text looks different with every version of Pillow; see test_legend_picture.py.
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ def _body() -> Figure:
 
 
 def _posed_body() -> Scene:
-    """Return the body on one leg, an elbow bent, its trunk twisted."""
+    """Return the body on one leg, with a bent elbow and a twisted trunk."""
     actor = Actor(_body())
     skeleton, pose = actor.figure.skeleton, actor.pose
     assert skeleton is not None and pose is not None
@@ -43,7 +42,7 @@ def _posed_body() -> Scene:
 
 
 def _uneven_arm() -> Scene:
-    """Return an arm with three parts, whose weight sums decrease from 1 along it."""
+    """Return an arm with three parts and weight sums that decrease from 1 along the arm."""
     figure = arm(4)
     mesh, skin = figure.mesh, figure.skin
     assert mesh is not None and skin is not None

@@ -1,4 +1,4 @@
-"""The golden images: contents of each, 300 x 300, one function per image."""
+"""The contents of the golden images of 300 x 300 pixels, with one function per image."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LINES = 0.06  # rasterisers cover different pixels with thin lines
 
 @dataclass
 class Shot:
-    """One image: a scene, display options and a camera."""
+    """The contents of one image: a scene, display options and a camera."""
 
     scene: Scene
     options: DisplayOptions = field(default_factory=DisplayOptions)
@@ -46,7 +46,7 @@ class Shot:
 
     @property
     def camera(self) -> Camera:
-        """A camera that fits the scene."""
+        """Return a camera that fits the scene."""
         angles = VIEWS[self.view] if isinstance(self.view, str) else self.view
         camera = Camera(
             azimuth=angles[0],
@@ -70,7 +70,7 @@ def _fox() -> Figure:
 
 
 def posed_fox(seed: int = 0) -> Scene:
-    """Return the fox in its own pose, or with every DOF a third of the way to a random limit."""
+    """Return the fox in its file's pose, or with every DOF a third of the way to a random limit."""
     actor = Actor(_fox())
     if seed:
         skeleton, pose = actor.figure.skeleton, actor.pose
@@ -91,7 +91,7 @@ BEND = (1, "z", 0.7), (2, "z", -0.9), (3, "y", 0.8)
 
 
 def _two_materials() -> Scene:
-    """A ball whose triangles change material at its equator, and again at the south pole."""
+    """Return a ball with material changes at the equator and near the south pole."""
     ball = sphere(24)
     heights = ball.positions[ball.triangles].mean(axis=1)[:, 1]
     order = np.argsort(-heights, kind="stable")
@@ -108,7 +108,7 @@ def _two_materials() -> Scene:
 
 
 def _clamped() -> Scene:
-    """A texture with one colour per corner on a square whose uvs run from -1 to 2."""
+    """Return a square with uvs from -1 to 2 and a texture of one colour per corner."""
     corners = [[(230, 40, 40), (40, 190, 60)], [(50, 70, 230), (240, 220, 60)]]
     mesh = square(material=picture(corners))
     return scene_of(
@@ -124,7 +124,7 @@ def _clamped() -> Scene:
 
 
 def _odd_boxes() -> Scene:
-    """Boxes that are flat, inverted or both, on a bent chain."""
+    """Return a bent chain with boxes that are flat, inverted or both."""
     figure = arm(4)
     skeleton = figure.skeleton
     assert skeleton is not None

@@ -1,4 +1,4 @@
-"""An arm that moves along x, with a frame missing, and a moving camera."""
+"""An arm that moves along x with a missing frame, and a moving camera."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.scene import Actor
 RATE, SPEED, MISSING = 10.0, 2.0, 5
 FILMED, SIZE = 5, (160, 120)
 K = np.array([[300.0, 0.0, 79.5], [0.0, 300.0, 59.5], [0.0, 0.0, 1.0]])
-_UPRIGHT = np.diag([1.0, -1.0, -1.0])  # looks along -z, y up in the scene
+_UPRIGHT = np.diag([1.0, -1.0, -1.0])  # looks along -z with y up
 
 
 def moving_arm(turns: bool = True) -> Actor:
@@ -39,9 +39,8 @@ def moving_arm(turns: bool = True) -> Actor:
 
 
 def moving_camera() -> CameraView:
-    """Return a camera 5 in front of the origin that moves by 0.2 and rotates by 3 degrees a frame.
-
-    It moves to the right and rotates to the left, so the origin stays in the picture.
+    """Return a camera 5 in front of the origin that moves by 0.2 and rotates by 3 degrees per
+    frame. It moves to the right and rotates to the left, so the origin stays in the picture.
     """
     frames = np.arange(FILMED)
     turns = axis_rotations(1, np.radians(3.0) * frames)

@@ -1,19 +1,19 @@
-"""Image comparison: exact on one rasteriser, structural between two."""
+"""Comparison of images, exact for one rasteriser and structural between two."""
 
 from __future__ import annotations
 
 import numpy as np
 
-SAME_DIFFERENCE = 2  # of 255, in any channel ...
-SAME_SHARE = 0.0005  # ... except for this fraction of the pixels
+SAME_DIFFERENCE = 2  # maximum difference in any channel, of 255
+SAME_SHARE = 0.0005  # fraction of pixels that may differ more
 OTHER_SSIM_ERROR = 0.02  # 1 - mean structural similarity of the luma
-OTHER_SILHOUETTE = 0.005  # fraction of pixels covered in one image but not in the other
+OTHER_SILHOUETTE = 0.005  # fraction of pixels covered in only one of two images
 
-_WINDOW = 8  # side of SSIM's windows, pixels
+_WINDOW = 8  # side of the windows of SSIM in pixels
 
 
 def differing_share(first, second) -> float:
-    """Return the fraction of pixels with a channel that differs by more than SAME_DIFFERENCE."""
+    """Return the fraction of pixels in which a channel differs by more than SAME_DIFFERENCE."""
     difference = np.abs(first.astype(np.int16) - second.astype(np.int16)).max(axis=-1)
     return float((difference > SAME_DIFFERENCE).mean())
 
@@ -36,7 +36,7 @@ def ssim_error(first, second) -> float:
 
 
 def silhouette_share(first, second) -> float:
-    """Return the fraction of pixels that are covered (alpha at least half) in only one image."""
+    """Return the fraction of pixels that only one image covers, with an alpha of at least half."""
     return float(((first[..., 3] >= 128) != (second[..., 3] >= 128)).mean())
 
 
@@ -60,7 +60,7 @@ def complaints(
 
 
 def _on_grey(pixels):
-    """Return the colours over mid-grey, so that transparent pixels have a colour too."""
+    """Return the colours over mid-grey, which gives transparent pixels a colour."""
     alpha = pixels[..., 3:].astype(np.float64) / 255.0
     return pixels[..., :3] * alpha + 128.0 * (1.0 - alpha)
 

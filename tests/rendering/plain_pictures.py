@@ -1,4 +1,4 @@
-"""Small images without perspective or shading, and their covered pixels."""
+"""Small images without perspective or shading, and queries of their covered pixels."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rig.scene import scene_box
 
 WHITE = (255, 255, 255)
-N = 100  # pixels a side
+N = 100  # pixels per side
 
 
 def lights(ambient=1.0, key=0.0, azimuth=0.0, inclination=0.0, **changes) -> Lights:
-    """Return white ambient light and a white light of strength ``key`` from the camera's side."""
+    """Return white ambient light and a white light of strength ``key`` from the camera."""
     return Lights(
         key=Light(azimuth, inclination, (1.0, 1.0, 1.0), key),
         rim=Light(0.0, 0.0, (1.0, 1.0, 1.0), 0.0),
@@ -23,7 +23,7 @@ def lights(ambient=1.0, key=0.0, azimuth=0.0, inclination=0.0, **changes) -> Lig
 
 
 def plain(**changes) -> DisplayOptions:
-    """Return options without grid, background and shading: base colours as they are."""
+    """Return options without grid, background and shading, so that base colours are unchanged."""
     return DisplayOptions(
         **{"background": "transparent", "grid": False, "samples": 1, "lights": lights(), **changes}
     )
@@ -46,13 +46,13 @@ def draw(offscreen, scene, options=None, camera=None, selected=-1, size=(N, N)):
 
 
 def covered(pixels) -> tuple[int, int, int, int]:
-    """Return first row, last row, first column, last column of the covered pixels."""
+    """Return first row, last row, first column and last column of the covered pixels."""
     rows, columns = np.nonzero(pixels[..., 3] >= 128)
     return rows.min(), rows.max(), columns.min(), columns.max()
 
 
 def srgb(linear: float) -> float:
-    """Encode by the standard, IEC 61966-2-1, 0 to 255."""
+    """Encode linear light as sRGB by IEC 61966-2-1, 0 to 255."""
     value = 12.92 * linear if linear <= 0.0031308 else 1.055 * linear ** (1 / 2.4) - 0.055
     return 255.0 * value
 

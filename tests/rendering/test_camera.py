@@ -1,4 +1,4 @@
-"""The orbit camera: projected points, by hand and with plain numpy."""
+"""The orbit camera: projected points, calculated by hand and with plain numpy."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ ANGLES = [(0, 0), (35, 15), (-120, -60), (180, 0), (90, 90), (-30, -90), (10, 89
 
 
 def project(camera: Camera, points, aspect: float = 1.0, box=BOX):
-    """Return normalised device coordinates: x right, y up, z depth, each -1 to 1."""
+    """Return normalised device coordinates: x right, y up, z depth, each from -1 to 1."""
     points = np.atleast_2d(np.asarray(points, dtype=float))
     clip = camera.projection_matrix(aspect, box) @ camera.view_matrix()
     x = np.column_stack([points, np.ones(len(points))]) @ clip.T
@@ -67,7 +67,7 @@ def test_eye_position_follows_the_angles(up, azimuth, inclination, wanted):
         ("bottom", (1, 0, 0), (0, 0, 1)),
     ],
 )
-def test_views_show_the_side_they_are_named_after(view, right, up):
+def test_named_views_show_their_side(view, right, up):
     azimuth, inclination = VIEWS[view]
     camera = Camera(azimuth=azimuth, inclination=inclination)
     found = camera_axes(camera)
@@ -86,7 +86,7 @@ def test_z_up_shows_z_upwards():
 
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize(("azimuth", "inclination"), ANGLES)
-def test_view_matrix_is_a_rigid_motion_that_puts_the_target_ahead(up, azimuth, inclination):
+def test_view_matrix_is_a_rigid_motion_with_the_target_ahead(up, azimuth, inclination):
     target = np.array([1.0, -2.0, 3.0])
     camera = Camera(target, 5.0, azimuth, inclination, up=up)
     view = camera.view_matrix()
@@ -97,14 +97,14 @@ def test_view_matrix_is_a_rigid_motion_that_puts_the_target_ahead(up, azimuth, i
     np.testing.assert_allclose(view[:3, :3], np.stack(camera_axes(camera)), atol=1e-9)
 
 
-def test_the_poles_are_reached_without_a_jump():
+def test_poles_are_reached_without_a_jump():
     for sign in (1, -1):
         at = Camera(azimuth=40.0, inclination=90.0 * sign).view_matrix()
         near = Camera(azimuth=40.0, inclination=(90.0 - 1e-6) * sign).view_matrix()
         np.testing.assert_allclose(at, near, atol=1e-6)
 
 
-def test_perspective_matrix_has_its_textbook_entries():
+def test_perspective_matrix_has_the_textbook_entries():
     """fov 90: cot(45) = 1, over the aspect across."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     matrix = camera.projection_matrix(2.0, BOX)
@@ -114,7 +114,7 @@ def test_perspective_matrix_has_its_textbook_entries():
 
 
 def test_perspective_projects_a_known_point_correctly():
-    """3 ahead and 1.5 up at a half angle of 45 degrees is halfway up; 1 to the right is a third."""
+    """At a half angle of 45 degrees, 1.5 up at 3 ahead is halfway up; 1 to the right is a third."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     np.testing.assert_allclose(project(camera, [1.0, 1.5, 1.0])[0, :2], [1 / 3, 0.5], atol=1e-9)
     np.testing.assert_allclose(
@@ -123,7 +123,7 @@ def test_perspective_projects_a_known_point_correctly():
 
 
 def test_orthographic_projection_ignores_depth():
-    """Half the height seen at the target is 4 tan 45 = 4."""
+    """Half of the visible height at the target is 4 tan 45 = 4."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0, orthographic=True)
     for depth in (-1.0, 0.0, 1.0):
         np.testing.assert_allclose(
@@ -154,7 +154,9 @@ def test_depth_covers_the_box_in_order(orthographic, distance):
 @pytest.mark.parametrize("orthographic", [False, True])
 @pytest.mark.parametrize("aspect", [0.3, 1.0, 2.5])
 @pytest.mark.parametrize(("azimuth", "inclination"), ANGLES)
-def test_fit_shows_every_point_and_wastes_little(up, orthographic, aspect, azimuth, inclination):
+def test_fit_shows_every_point_with_little_free_space(
+    up, orthographic, aspect, azimuth, inclination
+):
     rng = np.random.default_rng(3)
     points = rng.normal(size=(200, 3)) * [1.0, 3.0, 0.5] + [100.0, -50.0, 7.0]
     box = np.stack([points.min(axis=0), points.max(axis=0)])
@@ -167,7 +169,7 @@ def test_fit_shows_every_point_and_wastes_little(up, orthographic, aspect, azimu
 
 
 def test_fit_distance_matches_hand_calculation():
-    """Two points 1 from the middle, seen at 45 degrees half angle, with 8 % of room."""
+    """Two points are 1 from the middle, seen at a half angle of 45 degrees with a margin of 8 %."""
     points = np.array([[-1.0, 5.0, 0.0], [1.0, 5.0, 0.0]])
     for orthographic in (False, True):
         camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, orthographic=orthographic)
@@ -179,7 +181,7 @@ def test_fit_distance_matches_hand_calculation():
 
 
 def test_fit_steps_back_for_points_in_front():
-    """A point 3 nearer than the middle needs 3 more."""
+    """A point 3 nearer than the middle increases the distance by 3."""
     points = np.array([[1.0, 0.0, 3.0], [-1.0, 0.0, -3.0]])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0)
     fit(camera, points, 1.0)
@@ -188,7 +190,7 @@ def test_fit_steps_back_for_points_in_front():
 
 @pytest.mark.parametrize("points", [np.zeros((0, 3)), np.ones((1, 3)), np.ones((5, 3))])
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_fit_of_nothing_or_one_point_keeps_a_usable_distance(points, orthographic):
+def test_fit_of_no_point_or_one_point_has_a_usable_distance(points, orthographic):
     camera = Camera(orthographic=orthographic)
     fit(camera, points, 1.0)
     assert camera.distance == 1.0
@@ -228,7 +230,7 @@ def test_orbit_keeps_target_and_distance():
 
 
 def test_pan_by_one_moves_by_the_height_of_the_view():
-    """At distance 4 and 45 degrees half angle 8 units are seen."""
+    """At a distance of 4 and a half angle of 45 degrees, 8 units are visible."""
     camera = Camera(distance=4.0, azimuth=0.0, inclination=0.0, fov=90.0)
     pan(camera, 1.0, 0.5)
     np.testing.assert_allclose(camera.target, [8.0, 4.0, 0.0], atol=1e-12)
@@ -239,8 +241,8 @@ def test_pan_moves_the_scene_with_the_pointer(orthographic):
     camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 30.0, 20.0, orthographic=orthographic)
     point = camera.target.copy()
     pan(camera, -0.25, -0.1)
-    # A quarter of the height is half a unit of device coordinates, upwards; horizontally divided by
-    # the aspect 2.
+    # A quarter of the height is half a unit of device coordinates upwards; horizontally it is
+    # divided by the aspect 2.
     np.testing.assert_allclose(project(camera, point, aspect=2.0)[0, :2], [0.25, 0.2], atol=1e-9)
 
 
@@ -267,7 +269,7 @@ def test_zoom_never_reaches_zero_or_infinity():
         assert np.isfinite(camera.view_matrix()).all()
 
 
-def test_copy_shares_nothing():
+def test_copy_shares_no_array():
     camera = Camera(np.array([1.0, 2.0, 3.0]), 4.0, 5.0, 6.0, 7.0, True, "z")
     twin = camera.copy()
     assert (twin.distance, twin.azimuth, twin.inclination) == (4.0, 5.0, 6.0)
@@ -283,13 +285,13 @@ FACING += [("z", front) for front in ("+x", "-x", "+y", "-y")]
 
 
 @pytest.mark.parametrize(("up", "front"), FACING)
-def test_front_view_lies_on_the_front_axis(up, front):
+def test_front_view_is_on_the_front_axis(up, front):
     camera = facing_camera(front, up)
     look_from(camera, "front")
     np.testing.assert_allclose(camera_axes(camera)[2], AXES[front], atol=1e-12)
     look_from(camera, "back")
     np.testing.assert_allclose(camera_axes(camera)[2], np.negative(AXES[front]), atol=1e-12)
-    # left x up is the front, so up x front is the left
+    # left x up = front, so up x front = left
     left = np.cross(AXES[f"+{up}"], AXES[front])
     look_from(camera, "left")
     np.testing.assert_allclose(camera_axes(camera)[2], left, atol=1e-12)
@@ -306,7 +308,7 @@ def test_first_view_is_35_degrees_from_the_front(up, front):
     assert -180 <= camera.azimuth <= 180 and camera.inclination == 15
 
 
-def test_default_front_gives_the_default_view():
+def test_default_front_results_in_the_default_view():
     for up, front in (("y", "+z"), ("z", "-y")):
         camera, plain = facing_camera(front, up), Camera(up=up)
         assert (camera.azimuth, camera.inclination) == (plain.azimuth, plain.inclination)

@@ -1,4 +1,4 @@
-"""The colour map: perceived lightness rises from one end to the other."""
+"""The colour map, in which perceived lightness rises from one end to the other."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 
 from viewer.rendering.colormap import colormap
 
-# sRGB to CIE XYZ, IEC 61966-2-1; then OKLab's lightness (Ottosson 2020), from XYZ.
+# Matrices from sRGB to CIE XYZ (IEC 61966-2-1), and from XYZ to the lightness of OKLab (Ottosson
+# 2020).
 TO_XYZ = np.array([[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]])
 TO_LMS = np.array(
     [
@@ -19,7 +20,7 @@ TO_LIGHTNESS = np.array([0.2104542553, 0.7936177850, -0.0040720468])
 
 
 def linear(pixels):
-    """Decode sRGB."""
+    """Decode sRGB to linear light."""
     share = pixels[:, :3] / 255.0
     return np.where(share <= 0.04045, share / 12.92, ((share + 0.055) / 1.055) ** 2.4)
 
@@ -41,12 +42,12 @@ def test_lightness_rises_evenly_from_dark_to_bright():
     assert found[0] < 0.25
     assert found[-1] > 0.9
     assert (np.diff(found) > 0.0).all()
-    # A step of one in 255 of one channel is up to 0.01 in the dark.
+    # A step of 1/255 in one channel is up to 0.01 for dark colours.
     even = np.linspace(found[0], found[-1], len(found))
     assert np.abs(found - even).max() < 0.03
 
 
-def test_no_two_colours_are_the_same_and_all_are_opaque():
+def test_all_colours_are_distinct_and_opaque():
     pixels = colormap()
     assert pixels.shape == (256, 4)
     assert pixels.dtype == np.uint8

@@ -1,4 +1,4 @@
-"""Cameras that frame a whole motion, also as a turntable, and find their follow target."""
+"""Cameras that frame a whole motion, also as a turntable, and the target of following cameras."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def recording_of(*actors, times=(0.0, 0.2, 0.4, 1.0), **changes) -> Recording:
 
 
 def is_seen(camera: Camera, points: np.ndarray) -> bool:
-    """Return whether all points are within the image, by the camera's matrices alone."""
+    """Return whether all points are within the image, using only the camera's matrices."""
     box = np.array([points.min(axis=0), points.max(axis=0)])
     matrix = camera.projection_matrix(ASPECT, box) @ camera.view_matrix()
     clip = np.concatenate([points, np.ones((len(points), 1))], axis=1) @ matrix.T
@@ -80,7 +80,7 @@ def test_framing_does_not_change_the_scene():
     assert (actor.pose.figure_translation == before.figure_translation).all()
 
 
-def test_frames_without_people_do_not_count():
+def test_frames_without_people_are_ignored():
     _, box = frame_motion(recording_of(moving_arm(), times=(0.55, 0.2)))
     wanted = all_points([0.2])
     np.testing.assert_allclose(box, [wanted.min(axis=0), wanted.max(axis=0)], atol=1e-12)
@@ -92,10 +92,10 @@ def test_still_scene_is_fitted_as_posed():
     actor = moving_arm()
     actor.pose.figure_translation[:] = (9.0, 0.0, 0.0)
     _, box = frame_motion(recording_of(actor, moves=False))
-    assert box[0, 0] == pytest.approx(9.0)  # the arm begins at x = 0
+    assert box[0, 0] == pytest.approx(9.0)  # the arm starts at x = 0
 
 
-def test_following_camera_fits_what_stays_around_it():
+def test_following_camera_fits_the_motion_relative_to_its_target():
     straight = moving_arm(turns=False)
     follow = Follow(0, 0, np.array([0.0, 0.0, 0.0]))
     points, box = frame_motion(recording_of(straight, follow=follow))
@@ -107,7 +107,7 @@ def test_following_camera_fits_what_stays_around_it():
 
 @pytest.mark.parametrize("up", ["y", "z"])
 @pytest.mark.parametrize("orthographic", [False, True])
-def test_orbiting_camera_keeps_everything_in_view(up, orthographic):
+def test_orbiting_camera_keeps_all_points_in_view(up, orthographic):
     points = np.random.default_rng(1).uniform(-1, 1, (500, 3)) * [8.0, 1.0, 0.5]
     camera = Camera(up=up, azimuth=90.0, orthographic=orthographic)
     fit_turntable(camera, points, ASPECT, 360.0)
@@ -118,7 +118,7 @@ def test_orbiting_camera_keeps_everything_in_view(up, orthographic):
         assert is_seen(turned, points)
 
 
-def test_camera_that_does_not_orbit_is_fitted_as_usual():
+def test_camera_that_does_not_orbit_is_fitted_to_the_view():
     points = np.random.default_rng(1).uniform(-1, 1, (50, 3))
     camera, plain = Camera(), Camera()
     fit_turntable(camera, points, ASPECT, 0.0)
@@ -127,7 +127,7 @@ def test_camera_that_does_not_orbit_is_fitted_as_usual():
 
 
 @pytest.mark.parametrize("count", [1, 1000, 1001, 45_000])
-def test_outermost_points_reach_as_far_in_every_direction(count):
+def test_outermost_points_have_the_same_extent_in_every_direction(count):
     rng = np.random.default_rng(count)
     points = rng.normal(size=(count, 3)) * [5.0, 1.0, 2.0] + [100.0, 0.0, -7.0]
     chosen = outermost(points)
@@ -141,7 +141,7 @@ def test_outermost_points_reach_as_far_in_every_direction(count):
     assert missed.max() <= 0.005 * size
 
 
-# Whom to follow
+# Targets to follow
 
 
 def captured(person: int | None = None) -> Actor:
@@ -168,7 +168,7 @@ def captured(person: int | None = None) -> Actor:
         ("arm:j1", 0, 1, (1.5, 0, 0)),
     ],
 )
-def test_name_finds_actor_or_joint(name, actor, joint, origin):
+def test_target_is_found_by_the_name_of_an_actor_or_joint(name, actor, joint, origin):
     first = Actor(arm(3))
     first.pose.figure_translation[0] = 0.5
     follow = find_follow(Scene([first, captured(4)]), name)
@@ -176,7 +176,7 @@ def test_name_finds_actor_or_joint(name, actor, joint, origin):
     np.testing.assert_allclose(follow.origin, origin, atol=1e-12)
 
 
-def test_name_may_match_several():
+def test_name_may_match_several_actors():
     scene = Scene([Actor(arm(3)), captured(4), Actor(arm(2)), captured(7)])
     assert follow_candidates(scene, "j1") == [(0, 1), (2, 1)]
     assert follow_candidates(scene, "arm") == [(0, 0), (2, 0)]
@@ -195,7 +195,7 @@ def test_joint_names_may_contain_a_colon():
 
 
 @pytest.mark.parametrize("name", ["leg", "leg/j1", "", "/", ":", "none:j1", ":j1"])
-def test_unknown_name_lists_the_actors(name):
+def test_unknown_name_is_refused_with_a_list_of_actors(name):
     with pytest.raises(RigError) as caught:
         find_follow(Scene([Actor(arm(3)), captured()]), name)
     assert str(caught.value) == (
@@ -213,7 +213,7 @@ def test_unknown_name_lists_the_actors(name):
         ("mixamorig:Hps", "did you mean mixamorig:Hips?"),
     ],
 )
-def test_unknown_joint_suggests_the_nearest_of_its_actor(name, hint):
+def test_unknown_joint_is_refused_with_the_nearest_of_its_actor(name, hint):
     figure = arm(2)
     names = ("mixamorig:Hips", "mixamorig:Spine")
     named = replace(figure, name="fox", skeleton=replace(figure.skeleton, names=names))

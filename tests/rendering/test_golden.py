@@ -1,4 +1,4 @@
-"""Golden images, and tests of the comparison itself."""
+"""Comparison with golden images, and tests of the comparison."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Scene, scene_box
 
 SHOTS = {**STILL_SHOTS, **MOTION_SHOTS, **SCALAR_SHOTS}
-KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for images that differ
+KEEP = os.environ.get("VIEWER_GOLDEN_FAILED")  # a folder for differing images
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +111,7 @@ def changed_scenes() -> dict[str, Shot]:
 
 
 class Fixed(Shot):
-    """A shot whose camera stays where the whole arm's is."""
+    """Return a shot with the camera of the whole arm."""
 
     @property
     def camera(self):
@@ -120,18 +120,18 @@ class Fixed(Shot):
 
 @pytest.mark.parametrize("name", changed_scenes())
 @pytest.mark.parametrize("same_rasteriser", [True, False])
-def test_the_metric_detects_changes(offscreen, name, same_rasteriser):
+def test_metric_detects_changes(offscreen, name, same_rasteriser):
     wanted = draw(offscreen, Shot(Scene([bent(arm(4), *BEND)]), options()))
     shot = changed_scenes()[name]
     found = draw(offscreen, Fixed(shot.scene, shot.options))
     assert complaints(found, wanted, same_rasteriser) != []
 
 
-def test_the_metric_detects_one_missing_triangle(offscreen):
-    """The tolerance between rasterisers hides it; that for the same one does not."""
+def test_metric_detects_one_missing_triangle(offscreen):
+    """The tolerance for different rasterisers hides it; that for the same rasteriser does not."""
     figure = arm(4, sides=8, rings=16)
     wanted = draw(offscreen, Shot(Scene([bent(figure, *BEND)]), options()))
-    # In one ring, the triangle nearest to the camera and highest.
+    # The triangle is the one of a ring that is nearest to the camera and highest.
     posed, _ = viewer.deform(figure, bent(figure, *BEND).pose)
     _, up, backward = camera_axes(Fixed(Scene([]), options()).camera)
     middles = posed[figure.mesh.triangles].mean(axis=1)
@@ -144,12 +144,12 @@ def test_the_metric_detects_one_missing_triangle(offscreen):
     assert complaints(draw(offscreen, shot), wanted, same_rasteriser=True) != []
 
 
-def test_the_metric_accepts_the_same_image(offscreen):
+def test_metric_accepts_the_same_image(offscreen):
     pixels = draw(offscreen, SHOTS["arm-texture"]())
     assert complaints(pixels, pixels.copy(), True) == complaints(pixels, pixels.copy(), False) == []
 
 
-def test_the_metric_accepts_rounding():
+def test_metric_accepts_rounding():
     rng = np.random.default_rng(0)
     wanted = rng.integers(2, 253, (300, 300, 4)).astype(np.uint8)
     found = wanted + rng.integers(-2, 3, wanted.shape)
@@ -163,7 +163,8 @@ def test_ssim_error_is_zero_for_equal_and_large_for_different_images():
     assert ssim_error(first, first) == pytest.approx(0.0, abs=1e-12)
     assert ssim_error(first, second) > 0.9
     inverted = first.copy()
-    inverted[..., :3] = 255 - first[..., :3]  # covariance is minus the variance: SSIM near -1
+    # The covariance is minus the variance, so SSIM is near -1.
+    inverted[..., :3] = 255 - first[..., :3]
     assert ssim_error(first, inverted) > 1.5
 
 
@@ -174,14 +175,14 @@ def test_ssim_error_of_uniform_images_is_that_of_their_means():
     assert ssim_error(first, second) == pytest.approx(1 - 40_006.5025 / 50_006.5025, abs=1e-9)
 
 
-def test_silhouette_fraction_counts_pixels_in_only_one_image():
+def test_silhouette_fraction_counts_pixels_covered_in_one_image_only():
     first, second = np.zeros((2, 10, 10, 4), dtype=np.uint8)
     first[:5, :, 3] = 255
     second[:4, :, 3] = 255
     assert silhouette_share(first, second) == pytest.approx(0.1)
 
 
-def test_a_mesh_and_its_figure_are_distinguished_by_size(offscreen):
+def test_images_of_different_size_are_refused(offscreen):
     pixels = draw(offscreen, SHOTS["ball"]())
     assert complaints(pixels[:-1], pixels, True) == ["size (299, 300, 4) instead of (300, 300, 4)"]
     assert isinstance(SHOTS["ball"]().scene.actors[0].figure, Figure)

@@ -1,4 +1,4 @@
-"""Pixels of materials: the metallic-roughness formula, normal maps, opacity, sides, matcaps."""
+"""Pixels of materials: metallic-roughness formula, normal maps, opacity, sides, and matcaps."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def offscreen():
 
 @pytest.fixture
 def furnace(offscreen):
-    """A renderer whose studio has the same radiance everywhere, 0.5."""
+    """A renderer with a studio of uniform radiance 0.5."""
     with np.load(resource("assets", "studio", "studio.npz")) as stored:
         light = stored["light"]
     with offscreen.context:
@@ -58,7 +58,7 @@ def furnace(offscreen):
 @pytest.mark.parametrize("metallic", [0.0, 1.0])
 @pytest.mark.parametrize("roughness", [0.1, 0.5, 1.0])
 def test_white_surfaces_vanish_in_a_white_furnace(furnace, metallic, roughness):
-    """No energy is lost or added: every pixel of a white sphere has the radiance of the room."""
+    """No energy is lost or added: every pixel of a white sphere has the studio's radiance."""
     material = Material("", None, WHITE, metallic, roughness, is_physical=True)
     ball = replace(sphere(radius=1.0, rings=24, sides=48), materials=(material,))
     ball = replace(ball, triangle_materials=np.zeros(ball.n_triangles, np.int32))
@@ -69,7 +69,7 @@ def test_white_surfaces_vanish_in_a_white_furnace(furnace, metallic, roughness):
 
 
 def sampled(light: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """Return an octahedral map with a border of one texel at directions, bilinearly."""
+    """Return the bilinear samples of an octahedral map with a border of one texel at directions."""
     d = directions / np.abs(directions).sum(axis=1, keepdims=True)
     fold = (1.0 - np.abs(d[:, [2, 0]])) * np.where(d[:, [0, 2]] < 0.0, -1.0, 1.0)
     uv = np.where(d[:, 1:2] < 0.0, fold, d[:, [0, 2]])
@@ -81,7 +81,7 @@ def sampled(light: np.ndarray, directions: np.ndarray) -> np.ndarray:
 
 
 def reference(normals, metallic, roughness, base, key):
-    """Return linear colours of a sphere seen along -z, by the formulas that pbr.glsl names."""
+    """Return the linear colours of a sphere seen along -z, by the formulas cited in pbr.glsl."""
     with np.load(resource("assets", "studio", "studio.npz")) as stored:
         light, table = stored["light"].astype(float), stored["split_sum"].astype(float)
     n_v = normals[:, 2:3]
@@ -119,7 +119,7 @@ def reference(normals, metallic, roughness, base, key):
 
 
 def toned(color):
-    """Khronos PBR Neutral without its toe."""
+    """Apply Khronos PBR Neutral without its toe."""
     peak = color.max(axis=1, keepdims=True)
     lowered = np.where(peak > 0.8, 1.0 - 0.04 / np.maximum(peak - 0.6, 0.2), peak)
     kept = 1.0 / (0.15 * (peak - lowered) + 1.0)
@@ -127,7 +127,7 @@ def toned(color):
 
 
 @pytest.mark.parametrize(("metallic", "roughness"), [(0.0, 0.35), (1.0, 0.5), (0.5, 0.8)])
-def test_a_sphere_has_the_colours_of_the_formula(offscreen, metallic, roughness):
+def test_sphere_has_the_colours_of_the_formula(offscreen, metallic, roughness):
     base = np.array([0.8, 0.4, 0.1])
     material = Material("", None, (*base, 1.0), metallic, roughness, is_physical=True)
     ball = replace(sphere(radius=1.6, rings=64, sides=128), materials=(material,))
@@ -143,7 +143,7 @@ def test_a_sphere_has_the_colours_of_the_formula(offscreen, metallic, roughness)
     a, i = math.radians(30.0), math.radians(40.0)
     key = np.array([math.cos(i) * math.sin(a), math.sin(i), math.cos(i) * math.cos(a)])
     wanted = encoded(toned(reference(normals, metallic, roughness, base, key)))
-    # Interpolated normals on 128 sides, and eight bits.
+    # The tolerance covers interpolated normals on 128 sides, and eight bits.
     assert np.abs(shown[inside][:, :3] - wanted).max() <= 3.0
 
 
@@ -164,7 +164,7 @@ def test_figures_are_shaded_by_their_materials(offscreen):
     assert np.abs(shiny.astype(int) - rough).max() > 5
 
 
-def test_unlit_and_emissive_colours_are_shown_as_they_are(furnace):
+def test_unlit_and_emissive_colours_are_unchanged(furnace):
     unlit = Material("", None, (0.25, 0.5, 0.75, 1.0), unlit=True, is_physical=True)
     assert np.allclose(pixel(draw(furnace, unlit), 0, 0)[:3], encoded([0.25, 0.5, 0.75]), atol=1)
     glowing = Material(
@@ -180,7 +180,7 @@ def test_toon_surfaces_mix_two_colours_by_the_angle_of_the_key_light(offscreen):
         "", None, (0.5, 0.5, 0.5, 1.0), unlit=True, is_physical=True,
         shade_color=(1.0, 0.25, 0.0), shade_texture=half,
     )  # fmt: skip
-    # The light comes from 60 degrees to the side of the normal: the cosine is 0.5.
+    # The light is at 60 degrees from the normal, so the cosine is 0.5.
     off = Light(60.0, 0.0, (1.0, 1.0, 1.0), 0.0)
     lights = Lights(key=off, rim=off, ambient=0.0, specular=0.0)
     wanted = {
@@ -193,8 +193,8 @@ def test_toon_surfaces_mix_two_colours_by_the_angle_of_the_key_light(offscreen):
         assert np.allclose(pixel(shown, 0, 0)[:3], encoded(color), atol=1)
 
 
-def test_maps_multiply_their_factors_by_their_channel(furnace):
-    """Black metal reflects almost nothing; occlusion removes the room's light."""
+def test_factors_are_multiplied_by_the_channels_of_their_maps(furnace):
+    """Black metal reflects almost nothing; occlusion removes the light of the studio."""
     half = texture([(0, 128, 255)], channel=1)
     occluded = Material("", None, WHITE, occlusion_texture=half, is_physical=True)
     found = pixel(draw(furnace, occluded), 0, 0)
@@ -214,7 +214,7 @@ def test_maps_multiply_their_factors_by_their_channel(furnace):
     )
 
 
-def test_base_colours_tint_textures_and_textures_can_be_off(offscreen):
+def test_base_colours_tint_textures_and_textures_can_be_switched_off(offscreen):
     material = Material(
         "", texture([(255, 255, 255)]), (1.0, 0.5, 0.0, 1.0), unlit=True, is_physical=True
     )
@@ -236,7 +236,8 @@ def test_textures_are_placed_wrapped_and_taken_from_the_second_set(offscreen):
 
     assert seen() == [red, green, blue, white]
     assert seen(uv_set=1) == [white, green, blue, red]
-    # Repeated twice: the lower left quarter is a whole image, whose middle texels change.
+    # The image is repeated twice, so the lower left quarter is a whole image with a change in its
+    # middle.
     moved = [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]]
     assert seen(transform=moved, wrap=("repeat", "clamp")) == [green, red, white, blue]
     assert seen(transform=moved, wrap=("clamp", "clamp")) == [green, green, white, white]
@@ -249,7 +250,7 @@ def test_textures_are_placed_wrapped_and_taken_from_the_second_set(offscreen):
 # Opacity and sides
 
 
-def test_masks_cut_and_blends_mix(offscreen):
+def test_masks_discard_pixels_and_blending_mixes_them(offscreen):
     both = texture([(255, 0, 0, 100), (255, 0, 0, 200)], is_smooth=False)
     cut = Material("", both, alpha_mode="mask", unlit=True, is_physical=True)
     shown = draw(offscreen, cut)
@@ -261,8 +262,8 @@ def test_masks_cut_and_blends_mix(offscreen):
     assert pixel(draw(offscreen, glass), -0.5, 0) == [255, 0, 0, 100]
 
 
-def test_blended_surfaces_are_drawn_last_and_far_ones_first(offscreen):
-    """The list begins with the nearest; glass over glass over a wall, in encoded colours."""
+def test_blended_surfaces_are_drawn_last_and_from_far_to_near(offscreen):
+    """The list starts with the nearest: glass over glass over a wall, in encoded colours."""
 
     def glass(color, alpha, z, mode="blend"):
         material = Material(
@@ -281,7 +282,7 @@ def test_blended_surfaces_are_drawn_last_and_far_ones_first(offscreen):
     assert np.allclose(pixel(shown, 0, 0), [128, 64, 64, 255], atol=1)
 
 
-def test_back_faces_of_single_sided_materials_are_left_out(offscreen):
+def test_back_faces_of_single_sided_materials_are_not_drawn(offscreen):
     material = Material("", None, WHITE, double_sided=False)
     for clockwise, alpha in ((False, 255), (True, 0)):
         figure = Figure("square", square(material=material, clockwise=clockwise))
@@ -291,7 +292,7 @@ def test_back_faces_of_single_sided_materials_are_left_out(offscreen):
 # Normals and matcaps
 
 
-def test_flat_normal_maps_change_nothing(offscreen):
+def test_flat_normal_maps_have_no_effect(offscreen):
     material = Material("", None, (0.8, 0.4, 0.2, 1.0), is_physical=True)
     bent = replace(material, normal_texture=texture([FLAT]))
     pictures = [draw(offscreen, one, lights=Lights()).astype(int) for one in (material, bent)]
@@ -299,7 +300,7 @@ def test_flat_normal_maps_change_nothing(offscreen):
 
 
 def bumpy(**changes) -> Material:
-    """Return a material whose normals are (0.6, 0, 0.8) in tangent space."""
+    """Return a material with normals of (0.6, 0, 0.8) in tangent space."""
     return Material("", normal_texture=texture([(204, 128, 230)]), **changes)
 
 
@@ -309,7 +310,7 @@ def test_normal_maps_bend_normals_along_u_and_v(offscreen):
         shown = draw(offscreen, bumpy(normal_scale=scale), shading="normals")
         expected = encoded((0.5 * np.array(wanted) + 0.5) ** 2)
         assert np.allclose(pixel(shown, 0.3, 0.2)[:3], expected, atol=2)
-    # With u upwards, the same map bends them up.
+    # With u upwards, the same map bends the normals upwards.
     mesh = square(material=bumpy())
     shown = front_view(
         offscreen, alone(Figure("s", replace(mesh, uvs=mesh.uvs[:, ::-1]))), shading="normals"
@@ -317,15 +318,15 @@ def test_normal_maps_bend_normals_along_u_and_v(offscreen):
     assert np.allclose(pixel(shown, 0.3, 0.2)[:3], encoded(np.array([0.5, 0.8, 0.9]) ** 2), atol=2)
 
 
-def test_normal_maps_follow_mirrored_coordinates_and_turn_over_on_the_back(offscreen):
-    """Bumps that point along u: to the left where u grows to the left, and dents from behind."""
+def test_normal_maps_follow_mirrored_coordinates_and_are_inverted_on_the_back(offscreen):
+    """Bumps point along u, to the left if u increases to the left; from behind they are dents."""
     mesh = square(material=bumpy())
     mirrored = Figure("s", replace(mesh, uvs=mesh.uvs * [-1.0, 1.0]))
     shown = front_view(offscreen, alone(mirrored), shading="normals")
     wanted = encoded((0.5 * np.array([-0.6, 0.0, 0.8]) + 0.5) ** 2)
     assert np.allclose(pixel(shown, 0.3, 0.2)[:3], wanted, atol=2)
-    # Rotated by half a turn about y, u grows to the left, and the normal (0.6, 0, 0.8) of the
-    # front becomes -(-0.6, 0, -0.8).
+    # After a rotation by 180 degrees about y, u increases to the left, and the normal (0.6, 0, 0.8)
+    # of the front becomes -(-0.6, 0, -0.8).
     behind = Actor(Figure("s", mesh), placement=np.diag([-1.0, 1.0, -1.0, 1.0]))
     shown = front_view(offscreen, Scene([behind]), shading="normals")
     wanted = encoded((0.5 * np.array([0.6, 0.0, 0.8]) + 0.5) ** 2)
@@ -351,7 +352,7 @@ def test_matcaps_are_looked_up_by_the_normal(offscreen, name):
 # Backgrounds
 
 
-def test_backgrounds_are_white_or_the_studio(furnace):
+def test_background_is_white_or_the_studio(furnace):
     scene = alone(painted(Material(), 0.0))
     white = front_view(furnace, scene, background="white")
     assert pixel(white, 1.8, 1.8) == [255, 255, 255, 255]
@@ -359,8 +360,8 @@ def test_backgrounds_are_white_or_the_studio(furnace):
     assert np.allclose(pixel(studio, 1.8, 1.8), [*[encoded(0.5)] * 3, 255], atol=1)
 
 
-def test_the_studio_stands_upright_behind_the_scene(offscreen):
-    """An orthographic horizontal camera sees the back of the room: the map at -z, +y up."""
+def test_studio_is_upright_behind_the_scene(offscreen):
+    """An orthographic horizontal camera sees the studio's map at -z, with +y up."""
     shown = front_view(offscreen, scene_of(square()), background="environment", lights=dark())
     with np.load(resource("assets", "studio", "studio.npz")) as stored:
         light = stored["light"].astype(float)
@@ -372,8 +373,8 @@ def test_the_studio_stands_upright_behind_the_scene(offscreen):
         assert np.allclose(pixel(shown, x, y)[:3], encoded(toned(blurred))[0], atol=3)
 
 
-def test_transparent_pictures_catch_the_shadow_in_their_alpha(offscreen):
-    """Translucent black under the ball where the light is occluded, nothing far from it."""
+def test_transparent_pictures_contain_the_shadow_in_their_alpha(offscreen):
+    """Pixels below the ball are translucent black, and those far from it are transparent."""
     camera = Camera(azimuth=0.0, inclination=40.0, distance=6.0)
     pictures = []
     for quality in ("draft", "normal"):

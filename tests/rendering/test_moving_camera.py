@@ -1,4 +1,4 @@
-"""Moving calibrated cameras: their matrices over time, frusta, and the freed camera."""
+"""Moving calibrated cameras: matrices over time, frusta, and release from the calibrated view."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 
 
 def drawn_pixel(camera) -> np.ndarray:
-    """Return the pixel at which a camera's matrices draw the point; pixel centres are integers."""
+    """Return the pixel of the point by the camera's matrices; pixel centres are integers."""
     matrix = camera.projection_matrix(SIZE[0] / SIZE[1], BOX) @ camera.view_matrix()
     clip = matrix @ np.append(POINT, 1.0)
     x, y = clip[:2] / clip[3]
@@ -26,26 +26,26 @@ def drawn_pixel(camera) -> np.ndarray:
 
 
 @pytest.mark.parametrize("frame", range(FILMED))
-def test_a_point_is_drawn_at_its_pixel_in_every_frame(frame):
+def test_point_is_drawn_at_its_pixel_in_every_frame(frame):
     view = moving_camera()
     camera = camera_from_view(view, SIZE, "y", seconds=frame / RATE)
     assert_allclose(drawn_pixel(camera), pixel(view, frame, POINT), atol=1e-9)
     assert camera.fixed is view
 
 
-def test_time_moves_the_camera_and_the_place_from_which_it_continues():
+def test_time_moves_the_camera_and_released_camera_keeps_the_position():
     view = moving_camera()
     camera = camera_from_view(view, SIZE, "y")
     follow_view(camera, SIZE, 0.4, BOX)
     assert_allclose(drawn_pixel(camera), pixel(view, 4, POINT), atol=1e-9)
     camera.fixed = None
     assert_allclose(eye(camera), [0.8, 0.5, 5.0], atol=1e-9)
-    # It rotated by 12 degrees to the left, about +y.
+    # The camera has rotated by 12 degrees to the left, about +y.
     backward = camera.rotation()[2]
     assert_allclose(backward, [np.sin(np.radians(12)), 0, np.cos(np.radians(12))], atol=1e-9)
 
 
-def test_a_free_camera_keeps_its_place():
+def test_released_camera_keeps_its_position():
     camera = camera_from_view(moving_camera(), SIZE, "y")
     camera.fixed = None
     before = camera.view_matrix()
@@ -53,14 +53,14 @@ def test_a_free_camera_keeps_its_place():
     assert_allclose(camera.view_matrix(), before, atol=0)
 
 
-def test_frusta_stand_where_the_camera_is_at_the_time_of_the_scene():
+def test_frusta_are_at_the_camera_position_of_the_scene_time():
     view, options = moving_camera(), DisplayOptions(cameras=True)
     scene = Scene([], views=(view,), time=0.3)
     (drawn,) = drawn_cameras(scene, None, options)
     assert_allclose(-drawn.rotation.T @ drawn.translation, [0.6, 0.5, 5.0], atol=1e-12)
     assert drawn_cameras(scene, view, options) == []
     framed = with_cameras(scene, options, np.zeros((1, 3)))
-    assert framed[:, 0].max() >= 0.8  # the end of its way
+    assert framed[:, 0].max() >= 0.8  # the last frame of the camera
 
 
 def test_recorded_frames_follow_the_time():

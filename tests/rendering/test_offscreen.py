@@ -1,4 +1,4 @@
-"""Images without a window: sizes, samples, several contexts, threads, memory."""
+"""Images without a window: sizes, samples, several contexts, threads, and memory."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def draw(offscreen: Offscreen, scene: Scene, size=(64, 48), samples=4):
     return offscreen.render(scene, size, default_camera(scene, size), options, scene_box(scene))
 
 
-def test_render_returns_rows_from_the_top(scene):
+def test_rows_are_returned_from_the_top(scene):
     pixels = viewer.render(scene, size=(64, 48))
     assert (pixels.shape, pixels.dtype) == ((48, 64, 4), np.uint8)
     assert (pixels[..., 3] == 255).all()
@@ -45,12 +45,12 @@ def test_render_returns_rows_from_the_top(scene):
     assert pixels[0, :, :3].mean() < pixels[-1, :, :3].mean()
 
 
-def test_render_twice_gives_the_same_pixels(scene):
+def test_rendering_twice_returns_the_same_pixels(scene):
     np.testing.assert_array_equal(viewer.render(scene, (64, 48)), viewer.render(scene, (64, 48)))
 
 
 def test_size_and_samples_may_change_between_images(scene):
-    """A released framebuffer that is still bound makes the next one fail."""
+    """A released framebuffer that is still bound would make the next one fail."""
     for size in ((64, 48), (32, 32), (100, 20), (64, 48)):
         for samples in (1, 4):
             options = DisplayOptions(samples=samples)
@@ -64,11 +64,11 @@ def test_unsupported_sizes_are_refused(scene, size):
     assert viewer.render(scene, (8, 8)).shape == (8, 8, 4)
 
 
-def test_an_image_of_one_pixel_is_rendered(scene):
+def test_image_of_one_pixel_is_rendered(scene):
     assert viewer.render(scene, (1, 1)).shape == (1, 1, 4)
 
 
-def test_a_very_wide_image_shows_the_whole_figure(scene):
+def test_very_wide_image_shows_the_whole_figure(scene):
     options = DisplayOptions(background="transparent", grid=False)
     alpha = viewer.render(scene, (2000, 10), options=options)[..., 3]
     assert alpha.any()
@@ -84,7 +84,7 @@ def test_samples_are_a_power_of_two(scene, asked, drawn):
         assert offscreen.renderer.notes == ([] if drawn is None else [note])
 
 
-def test_too_many_samples_are_noted_once(scene):
+def test_too_many_samples_are_reported_once(scene):
     with Offscreen() as offscreen:
         for _ in range(2):
             draw(offscreen, scene, samples=4096)
@@ -92,7 +92,7 @@ def test_too_many_samples_are_noted_once(scene):
         assert offscreen.renderer.notes == [f"4096 samples per pixel requested, {limit} drawn"]
 
 
-def test_one_sample_is_not_noted(scene):
+def test_single_sample_is_not_reported(scene):
     with Offscreen() as offscreen:
         draw(offscreen, scene, samples=1)
         assert offscreen.renderer.notes == []
@@ -112,7 +112,7 @@ def test_two_offscreen_renderers_alternate(scene):
     np.testing.assert_array_equal(viewer.render(scene, (64, 48)), wanted)
 
 
-def test_another_context_can_be_made_current_again(scene):
+def test_different_context_can_be_made_current_again(scene):
     mine = headless_context()
     buffer = mine.buffer(b"mine")
     viewer.render(scene, (8, 8))
@@ -122,7 +122,7 @@ def test_another_context_can_be_made_current_again(scene):
 
 
 def in_threads(work, count: int) -> list[object]:
-    """Run ``work`` in several threads at once; return the errors."""
+    """Run ``work`` in several threads concurrently; return the errors."""
     problems: list[object] = []
 
     def run() -> None:
@@ -139,7 +139,7 @@ def in_threads(work, count: int) -> list[object]:
     return problems
 
 
-def test_threads_draw_at_the_same_time(scene):
+def test_threads_can_draw_concurrently(scene):
     wanted = viewer.render(scene, (64, 48))
 
     def work() -> None:
@@ -149,7 +149,7 @@ def test_threads_draw_at_the_same_time(scene):
     assert in_threads(work, 3) == []
 
 
-def test_an_offscreen_may_be_used_by_one_thread_after_another(scene):
+def test_offscreen_may_be_used_by_one_thread_after_another(scene):
     wanted = viewer.render(scene, (64, 48))
     offscreen = Offscreen()
 
@@ -163,7 +163,7 @@ def test_an_offscreen_may_be_used_by_one_thread_after_another(scene):
 
 
 def run_alone(code: str) -> str:
-    """Run code in a fresh process and return its output; its error stream must be empty."""
+    """Run code in a new process and return its output; its error stream must be empty."""
     head = f"import sys; sys.path[:0] = [{str(ROOT)!r}, {str(ROOT / 'tests')!r}]\n"
     result = subprocess.run(
         [sys.executable, "-c", head + code],
@@ -192,8 +192,8 @@ scene = Scene([Actor(figure)])
 
 
 @LINUX
-def test_many_renders_do_not_leak_memory():
-    """Poses, sizes, actors and options change all the time."""
+def test_repeated_rendering_does_not_leak_memory():
+    """Poses, sizes, actors and options change in every round."""
     code = """
 for i in range(180):
     if i % 10 == 0:
@@ -209,7 +209,7 @@ print(resident() - before)
 
 @LINUX
 def test_contexts_are_freed_with_their_threads():
-    # Without shadows, whose map alone would make a context 16 MB larger.
+    # Shadows are off, because their map would make a context 16 MB larger.
     code = """
 draft = DisplayOptions(quality="draft")
 def work():
@@ -222,10 +222,10 @@ for i in range(15):
         before = resident()
 print(resident() - before)
 """
-    assert float(run_alone(MEMORY + code)) < 20.0  # MB; a context is 7
+    assert float(run_alone(MEMORY + code)) < 20.0  # MB; a context has 7 MB
 
 
-def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
+def test_texture_above_the_limit_is_reduced_with_a_note(ctx):
     limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
     notes: list[str] = []
     pixels = np.zeros((1, limit + 2, 4), dtype=np.uint8)
@@ -240,10 +240,10 @@ def test_a_texture_above_the_limit_is_shrunk_with_a_note(ctx):
     texture.release()
 
 
-def test_a_note_about_a_texture_reaches_the_renderer(monkeypatch):
+def test_note_about_a_texture_reaches_the_renderer(monkeypatch):
     scene = scene_of(square(material=checker(129)))
     with Offscreen() as offscreen:
-        offscreen.context.info["GL_MAX_TEXTURE_SIZE"]  # fills the cache that is changed here
+        offscreen.context.info["GL_MAX_TEXTURE_SIZE"]  # fills the cache that the test changes
         monkeypatch.setitem(offscreen.context.info, "GL_MAX_TEXTURE_SIZE", 1024)
         offscreen.render(scene, (32, 32), Camera(), DisplayOptions(samples=1), scene_box(scene))
         assert offscreen.renderer.notes == [
@@ -252,7 +252,7 @@ def test_a_note_about_a_texture_reaches_the_renderer(monkeypatch):
         ]
 
 
-def test_more_joints_than_a_texture_holds_are_refused(ctx):
+def test_more_joints_than_fit_into_a_texture_are_refused(ctx):
     limit = ctx.info["GL_MAX_TEXTURE_SIZE"]
     with pytest.raises(RenderError, match=rf"^{256 * (limit + 1)} joints need a texture of 768 x "):
         matrix_texture(ctx, 256 * (limit + 1))
@@ -261,14 +261,17 @@ def test_more_joints_than_a_texture_holds_are_refused(ctx):
 @pytest.mark.parametrize(
     ("samples", "words"),
     [
-        # 64 x 48 pixels: 4 samples of colour and depth and the picture, 36 bytes a pixel.
+        # 64 x 48 pixels with 4 samples of colour and depth, plus the picture, are 36 bytes per
+        # pixel.
         (4, ("64 x 48", "4 samples", "needs 0.111 MB", "--samples 1) needs 0.0246 MB", "smaller")),
-        # Without multisampling, 4 bytes of colour and 4 of depth.
+        # Without multisampling, a pixel has 4 bytes of colour and 4 of depth.
         (1, ("64 x 48", "needs 0.0246 MB", "smaller")),
     ],
 )
 @pytest.mark.parametrize("how", ["refused", "out of memory"])
-def test_an_image_without_memory_reports_its_size(ctx, monkeypatch, samples, words, how):
+def test_image_without_enough_memory_is_refused_with_its_size(
+    ctx, monkeypatch, samples, words, how
+):
     made = []
 
     def no_room(context, doing):
@@ -278,7 +281,7 @@ def test_an_image_without_memory_reports_its_size(ctx, monkeypatch, samples, wor
         raise moderngl.Error("the framebuffer is not complete (INCOMPLETE_ATTACHMENT)")
 
     class Lavish:
-        """A context that creates everything except framebuffers, for lack of memory."""
+        """A context that fails to create framebuffers for lack of memory."""
 
         def __getattr__(self, name):
             if name == "framebuffer" and how == "refused" and made[1 if samples > 1 else 0 :]:
@@ -306,8 +309,8 @@ def test_memory_counts_samples_depth_and_image(size, samples, n_bytes):
     assert target_bytes(size, samples) == n_bytes
 
 
-def test_the_largest_multisampled_image_is_refused_with_its_memory(ctx):
-    """16384 x 16384 pixels are within llvmpipe's limits, four samples of each are not."""
+def test_largest_multisampled_image_is_refused_with_its_memory(ctx):
+    """16384 x 16384 pixels are within the limits of llvmpipe, but not with four samples each."""
     if "llvmpipe" not in ctx.info["GL_RENDERER"] or ctx.info["GL_MAX_RENDERBUFFER_SIZE"] != 16384:
         pytest.skip("other limits")
     with pytest.raises(RenderError) as caught:
@@ -316,7 +319,7 @@ def test_the_largest_multisampled_image_is_refused_with_its_memory(ctx):
     assert ctx.error == "GL_NO_ERROR"
 
 
-def test_a_target_is_reused_for_the_same_size_and_samples(scene):
+def test_target_is_reused_for_the_same_size_and_samples(scene):
     with Offscreen() as offscreen, offscreen.context:
         first = offscreen.target((64, 48), 4)
         assert offscreen.target((64, 48), 4) is first

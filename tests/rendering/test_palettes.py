@@ -1,4 +1,4 @@
-"""Palettes: neighbours are distinguishable, also with colour vision deficiency."""
+"""Palettes with distinguishable neighbours, also for colour vision deficiencies."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, par
 from viewer.rendering.part_colors import part_colors
 from viewer.rig.srgb import decode_srgb, encode_srgb
 
-# Vienot, Brettel and Mollon 1999, for linear sRGB; the palettes themselves use Machado 2009.
+# Vienot, Brettel and Mollon 1999 for linear sRGB; the palettes were designed with Machado 2009.
 PROTAN = [[0.11238, 0.88762, 0.0], [0.11238, 0.88762, 0.0], [0.00401, -0.00401, 1.0]]
 DEUTAN = [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]]
 EYES = {"usual": np.eye(3), "no long cones": np.array(PROTAN), "no middle": np.array(DEUTAN)}
@@ -64,7 +64,7 @@ def test_neighbouring_joints_differ(name, eyes):
     for joint, parent in enumerate(parents):
         siblings = [other for other in range(joint) if parents[other] == parent]
         for other in [*siblings, *([parent] if parent >= 0 else [])]:
-            # A step of 0.02 is just noticeable between adjacent areas.
+            # A difference of 0.02 is just noticeable between adjacent areas.
             assert np.linalg.norm(colors[joint] - colors[other]) > 0.05, (joint, other)
 
 
@@ -83,7 +83,7 @@ def test_more_joints_than_colours_use_them_equally():
     assert joint_palette(np.zeros(0, dtype=int)).shape == (0, 4)
 
 
-def test_counts_go_from_dark_grey_over_rising_colours():
+def test_count_colours_rise_from_dark_grey():
     palette = count_palette(4)
     assert palette.shape == (5, 4)
     assert tuple(palette[0, :3]) == NOTHING
@@ -105,7 +105,7 @@ def test_zero_colour_is_not_in_any_colour_map():
         assert np.linalg.norm(lab(pixels) - grey, axis=1).min() > 0.05
 
 
-def test_difference_map_is_white_in_the_middle_and_darkens_to_both_sides():
+def test_difference_map_is_white_in_the_middle_and_darker_to_both_sides():
     pixels = diverging_map(255)
     assert (pixels[127, :3] == pixels[127, 0]).all() and pixels[127, 0] > 240
     lightness = lab(pixels)[:, 0]
@@ -122,11 +122,11 @@ def test_sides_of_the_difference_map_are_distinguishable(eyes):
         assert np.linalg.norm(colors[50 - step] - colors[50 + step]) > 0.08
 
 
-def test_colour_conversions():
+def test_colour_conversions_match_published_values():
     values = np.linspace(0.0, 1.0, 11)
     np.testing.assert_allclose(decode_srgb(encode_srgb(values)), values, atol=1e-4)
     assert decode_srgb(np.array(0.5)) == pytest.approx(0.21404114)
     assert encode_srgb(np.array([-1.0, 2.0])).tolist() == [0.0, pytest.approx(1.0)]
-    # White, and red with the values of Ottosson 2020.
+    # White, and red with the values in Ottosson 2020.
     np.testing.assert_allclose(oklab(np.ones(3)), [1, 0, 0], atol=1e-3)
     np.testing.assert_allclose(oklab(np.array([1.0, 0, 0])), [0.628, 0.2249, 0.1258], atol=1e-3)

@@ -19,7 +19,7 @@ from viewer.rig.annotations import BodyParts, ReducedMesh
 from viewer.rig.scene import scene_box
 
 NAMES = ("left", "right", "belt")
-# Okabe and Ito's first colours, as published.
+# The first colours of Okabe and Ito, as published.
 GREY, SKY, ORANGE = (153, 153, 153), (86, 180, 233), (230, 159, 0)
 
 
@@ -30,14 +30,14 @@ def offscreen():
 
 
 def striped():
-    """Return a grid whose columns of vertices belong to left, left, belt, right, right."""
+    """Return a grid with columns of vertices in the parts left, left, belt, right, right."""
     figure = grid_figure(4)
     column = np.arange(figure.mesh.n_vertices) % 5
     return replace(figure, body_parts=BodyParts(NAMES, np.array([0, 0, 2, 1, 1])[column]))
 
 
 def near(found, wanted, tolerance=6):
-    """Compare colours; the published ones are decoded by a power of 2.2 rather than exactly."""
+    """Compare colours; the published colours are decoded approximately, by a power of 2.2."""
     return np.abs(np.array(found)[..., :3] - wanted).max() <= tolerance
 
 
@@ -57,7 +57,7 @@ def test_figure_without_parts_is_plain(offscreen):
     assert np.abs(picture[drawn(picture)][:, :3] - expected).max() <= 1.0
 
 
-def test_figures_with_and_without_parts_do_not_interfere(offscreen):
+def test_figures_with_and_without_parts_are_drawn_together(offscreen):
     both = alone(striped())
     other = scene_of(square(z=-1.0, half=1.9)).actors[0]
     both.actors.append(other)
@@ -67,13 +67,13 @@ def test_figures_with_and_without_parts_do_not_interfere(offscreen):
     assert near(pixel(picture, 1.8, 1.8), plain, 2)
 
 
-def test_hidden_parts_are_not_drawn_but_their_borders_are(offscreen):
+def test_hidden_parts_are_not_drawn_except_for_border_triangles(offscreen):
     scene = alone(striped())
     whole = drawn(front_view(offscreen, scene))
     assert whole.sum() == 60 * 60
     for hidden, right_edge in (((1,), 0.75), ((1, 2), 0.0)):
         found = drawn(front_view(offscreen, scene, hidden_parts=hidden))
-        # Triangles with one corner in a visible part remain: up to the next column.
+        # Triangles with one corner in a visible part remain, up to the next column.
         across = np.flatnonzero(found.any(axis=0))
         assert across[0] == 10
         assert across[-1] + 1 == 40 + 20 * right_edge
@@ -82,17 +82,17 @@ def test_hidden_parts_are_not_drawn_but_their_borders_are(offscreen):
     assert drawn(front_view(offscreen, scene)).sum() == 60 * 60
 
 
-def test_hiding_everything_draws_no_edges_either(offscreen):
+def test_hiding_all_parts_also_hides_edges(offscreen):
     scene = alone(striped())
     picture = front_view(offscreen, scene, hidden_parts=(0, 1, 2), wireframe=True)
     assert not drawn(picture).any()
 
 
-def test_hidden_parts_of_a_figure_without_parts_hide_nothing(offscreen):
+def test_hidden_parts_do_not_affect_a_figure_without_parts(offscreen):
     assert drawn(front_view(offscreen, alone(grid_figure()), hidden_parts=(0,))).sum() == 60 * 60
 
 
-def test_triangles_with_a_corner_outside_hidden_parts_are_kept():
+def test_triangles_with_a_corner_outside_hidden_parts_are_drawn():
     figure = striped()
     corners = np.array([[0, 1, 5], [3, 4, 9], [1, 2, 3], [2, 7, 12], [0, 4, 2]])
     wanted = {(): [1, 1, 1, 1, 1], (0,): [0, 1, 1, 1, 1], (1, 2): [1, 0, 1, 0, 1]}
@@ -101,7 +101,7 @@ def test_triangles_with_a_corner_outside_hidden_parts_are_kept():
 
 
 def coarse():
-    """Return a grid whose coarser mesh is one triangle, its lower right half."""
+    """Return a grid with a reduced mesh of one triangle, the lower right half."""
     return replace(striped(), reduced=ReducedMesh([24, 0, 4], [[1, 2, 0]]))
 
 
@@ -111,13 +111,13 @@ def test_reduced_mesh_is_drawn_on_request(offscreen):
     found = drawn(front_view(offscreen, scene, reduced=True))
     assert 0.45 < found.sum() / 3600 < 0.55
     rows, columns = np.nonzero(found)
-    # Below the diagonal: x greater than y, with rows counted from the top.
+    # The triangle is below the diagonal: x greater than y, with rows counted from the top.
     assert (columns + rows >= 78).all()
 
 
 def test_reduced_mesh_follows_the_pose(offscreen):
     scene = alone(coarse())
-    scene.actors[0].pose.dofs[2] = np.pi  # the root about z: the upper left half
+    scene.actors[0].pose.dofs[2] = np.pi  # the root about z, which shows the upper left half
     rows, columns = np.nonzero(drawn(front_view(offscreen, scene, reduced=True)))
     assert len(rows) > 1500
     assert (columns + rows <= 80).all()
@@ -127,12 +127,12 @@ def test_reduced_mesh_obeys_hidden_parts_and_has_colours(offscreen):
     scene = alone(coarse())
     picture = front_view(offscreen, scene, reduced=True, shading="parts")
     assert near(pixel(picture, 1.4, 0.0), SKY, 12)
-    # Its corners are of the parts left and right.
+    # The corners of the triangle are in the parts left and right.
     assert drawn(front_view(offscreen, scene, reduced=True, hidden_parts=(1,))).any()
     assert not drawn(front_view(offscreen, scene, reduced=True, hidden_parts=(0, 1))).any()
 
 
-def test_figure_without_a_reduced_mesh_draws_its_own(offscreen):
+def test_figure_without_a_reduced_mesh_draws_its_mesh(offscreen):
     assert drawn(front_view(offscreen, alone(grid_figure()), reduced=True)).sum() == 60 * 60
 
 
@@ -152,7 +152,7 @@ def test_fewer_triangles_go_through_the_pipeline(offscreen):
     scene = alone(coarse())
     whole = primitives(offscreen, scene)
     assert whole - primitives(offscreen, scene, reduced=True) == 32 - 1
-    # Without "right" the last of four columns goes: eight triangles.
+    # Without "right", the eight triangles of the last column are omitted.
     assert whole - primitives(offscreen, scene, hidden_parts=(1,)) == 8
 
 

@@ -40,13 +40,13 @@ def click(offscreen, scene: Scene, x, y, camera=None, size=(PIXELS, PIXELS), **o
         )
 
 
-def test_a_triangle_of_the_mesh_is_found(offscreen):
-    """The grid's cells are 0.75 wide from -1.5 on, two triangles each, row after row from below."""
+def test_triangle_of_the_mesh_is_found(offscreen):
+    """The cells are 0.75 wide from -1.5 on, with two triangles each, row by row from below."""
     scene = Scene([Actor(grid_figure())])
     for triangle in range(32):
         cell, upper = divmod(triangle, 2)
         row, column = divmod(cell, 4)
-        # Triangles are (first, right, diagonal) below the diagonal, the other above it.
+        # The first triangle of a cell is below its diagonal, the second above it.
         inside = (0.25, 0.6) if upper else (0.6, 0.25)
         x, y = (-1.5 + 0.75 * (at + part) for at, part in zip((column, row), inside, strict=True))
         found = click(offscreen, scene, x, y)
@@ -54,7 +54,7 @@ def test_a_triangle_of_the_mesh_is_found(offscreen):
         assert found.point == pytest.approx([x, y, 0.0], abs=4.0 / PIXELS)
 
 
-def test_nothing_is_picked_on_the_background(offscreen):
+def test_background_picks_no_object(offscreen):
     scene = Scene([Actor(grid_figure())])
     assert click(offscreen, scene, 1.8, 1.8) is None
     assert click(offscreen, Scene([]), 0.0, 0.0) is None
@@ -69,7 +69,7 @@ def test_pick_tolerance_is_three_pixels(offscreen):
     assert click(offscreen, scene, 4 * 73.5 / PIXELS - 2, 0.0) is None
 
 
-def test_the_nearer_actor_hides_the_other(offscreen):
+def test_nearer_actor_hides_the_farther_one(offscreen):
     far, near = Actor(grid_figure()), Actor(grid_figure())
     near.placement[:3, 3] = 1.0, 0.0, 0.5
     scene = Scene([far, near])
@@ -81,14 +81,14 @@ def test_the_nearer_actor_hides_the_other(offscreen):
 
 
 def test_perspective_depth_is_exact(offscreen):
-    """A square at z = -1 seen from (0, 0, 2) with 90 degrees: pixel (60.5, 40.5) of 80."""
+    """A square at z = -1 is seen from (0, 0, 2) at 90 degrees; the pixel is (60.5, 40.5) of 80."""
     scene = Scene([Actor(Figure("wall", square(z=-1.0, half=5.0)))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0)
     with offscreen.context:
         found = offscreen.renderer.pick(
             scene, camera, DisplayOptions(), (80, 80), 60.2, 40.9, scene_box(scene)
         )
-    # The pixel's middle is 20.5 / 40 of half the width, which at distance 3 is 3.
+    # The pixel centre is 20.5 / 40 of half the width, which is 3 at a distance of 3.
     assert found.point == pytest.approx([3 * 20.5 / 40, -3 * 0.5 / 40, -1.0], abs=1e-5)
 
 
@@ -105,20 +105,20 @@ def test_images_of_any_aspect_ratio_are_picked_correctly(offscreen):
                 size[1] / 4,
                 scene_box(scene),
             )
-            # A quarter of the image's height above its centre: 1 of 2 units.
+            # The position is a quarter of the height above the centre, 1 of 2 units.
             pixel = 4.0 / size[1]
             assert found.point == pytest.approx([0.0, 1.0, 0.0], abs=pixel)
 
 
-def test_posed_meshes_are_picked_where_they_are_drawn(offscreen):
+def test_posed_meshes_are_picked_at_their_drawn_position(offscreen):
     scene = Scene([bent(arm(3), (1, "z", np.pi / 2))])
     scene.actors[0].placement[0, 3] = -1.0
-    # The first segment reaches from -1 to 0, the others go up from there.
+    # The first segment extends from -1 to 0, the others upwards from there.
     assert click(offscreen, scene, 0.0, 1.0).point[1] == pytest.approx(1.0, abs=0.05)
     assert click(offscreen, scene, 1.0, 0.0) is None
 
 
-def test_no_actor_is_skinned_again(offscreen, monkeypatch):
+def test_picking_skins_no_actor_again(offscreen, monkeypatch):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     offscreen.render(scene, (80, 80), parallel(), DisplayOptions(), scene_box(scene))
     before = offscreen.renderer.posed_mesh(scene.actors[0]).n_updates
@@ -127,8 +127,8 @@ def test_no_actor_is_skinned_again(offscreen, monkeypatch):
     assert offscreen.renderer.posed_mesh(scene.actors[0]).n_updates == before
 
 
-def test_boxes_of_joints_are_found_over_the_skin_too(offscreen):
-    """Boxes of the arm reach from 0.1 to 0.9 of each unit, and 0.12 up and down."""
+def test_boxes_of_joints_are_also_found_over_the_skin(offscreen):
+    """The boxes of the arm extend from 0.1 to 0.9 of each unit, and 0.12 up and down."""
     scene = Scene([Actor(arm(2))])
     for show in ("skeleton", "both"):
         for joint in (0, 1):
@@ -139,7 +139,7 @@ def test_boxes_of_joints_are_found_over_the_skin_too(offscreen):
     assert click(offscreen, scene, 0.5, 0.0).joint == -1
 
 
-def test_a_skeleton_alone_is_found(offscreen):
+def test_skeleton_without_a_mesh_is_found(offscreen):
     boxes = np.tile([[-0.2] * 3, [0.2] * 3], (2, 1, 1))
     figure = Figure("bones", None, skeleton([-1, 0], [[-1.0, 0, 0], [2.0, 0, 0]], boxes))
     scene = Scene([Actor(figure)])
@@ -161,7 +161,7 @@ def test_markers_of_keypoints_are_found_through_the_surface(offscreen):
     assert click(offscreen, scene, 0.0, 0.0).actor == 0
 
 
-def test_captured_points_and_the_nearer_end_of_limbs_are_found(offscreen):
+def test_captured_points_and_the_nearer_ends_of_limbs_are_found(offscreen):
     layout = PointLayout("three", ("a", "b", "c"), [[0, 1], [1, 2]], [-1, 0, 1])
     actor = Actor(Figure("points", points=layout))
     actor.points = np.array([[-1.0, 0, 0, 1], [1.0, 0, 0, 0.5], [1.0, 1.5, 0, 0.0]])
@@ -170,21 +170,21 @@ def test_captured_points_and_the_nearer_end_of_limbs_are_found(offscreen):
     for x, keypoint in ((-1.0, 0), (1.0, 1), (-0.4, 0), (0.4, 1)):
         found = click(offscreen, scene, x, 0.0, size=(400, 400))
         assert (found.actor, found.joint, found.triangle, found.keypoint) == (1, -1, -1, keypoint)
-    assert click(offscreen, scene, 1.0, 1.0).actor == 0  # c was not seen, nor is its limb there
+    assert click(offscreen, scene, 1.0, 1.0).actor == 0  # c is undetected, so its limb is not drawn
 
 
-def test_a_keypoint_within_two_pixels_comes_before_the_surface_behind_it(offscreen):
+def test_keypoint_within_two_pixels_takes_precedence_over_the_surface_behind_it(offscreen):
     layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), [0, 0])
     actor = Actor(Figure("points", points=layout))
     actor.points = np.array([[-1.0, 0, 1.0, 1], [1.0, 0, 1.0, 1]])
     scene = Scene([Actor(grid_figure()), actor])
-    # Radii are 0.012 of their distance of 2: 2.4 pixels of 0.01, so its last row is 1.5 above.
+    # Radii are 0.012 of the distance of 2, or 2.4 pixels of 0.01, so the last row is 1.5 above.
     for pixels, who in ((0.0, 1), (3.5, 1), (4.5, 0)):
         assert click(offscreen, scene, 1.0, 0.01 * pixels, size=(400, 400)).actor == who
 
 
 @pytest.mark.parametrize("count", [3, 12])
-def test_instances_are_told_apart(offscreen, monkeypatch, count):
+def test_instances_are_distinguished(offscreen, monkeypatch, count):
     monkeypatch.setattr(instance_pass, "FEWEST", 4)
     figure = arm(2)
     actors = []

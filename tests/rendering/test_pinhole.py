@@ -1,4 +1,4 @@
-"""Calibrated cameras: points project to the pixels given by OpenCV's formula."""
+"""Calibrated cameras, for which points project to the pixels of OpenCV's formula."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ K = np.array([[800.0, 0.0, 300.0], [0.0, 820.0, 260.0], [0.0, 0.0, 1.0]])
 
 
 def camera_view(**changes) -> CameraView:
-    """Return a camera 5 in front of the origin of a y-up scene, looking along -z, upright."""
+    """Return an upright camera 5 in front of the origin of a y-up scene, looking along -z."""
     parts = {
         "name": "01",
         "intrinsic": K,
@@ -35,9 +35,8 @@ def camera_view(**changes) -> CameraView:
 
 
 def pixel(view: CameraView, point, size) -> np.ndarray:
-    """Return a scene point projected by our matrices, in pixels from the centre of the first one.
-
-    OpenGL's window coordinates start at the image's lower left corner.
+    """Return a scene point projected by our matrices, in pixels from the centre of the first pixel.
+    OpenGL's window coordinates start at the lower left corner of the image.
     """
     camera = Camera(fixed=view)
     clip = camera.projection_matrix(size[0] / size[1], BOX) @ camera.view_matrix() @ [*point, 1.0]
@@ -79,7 +78,7 @@ def test_every_point_projects_by_the_intrinsic_matrix():
             assert found == pytest.approx(seen[:2] / seen[2], abs=1e-8)
 
 
-def test_a_larger_image_shows_the_same_view():
+def test_larger_image_shows_the_same_view():
     point = (0.4, -0.3, 0.2)
     small, large = (pixel(camera_view(), point, size) for size in ((640, 480), (1920, 1440)))
     assert large + 0.5 == pytest.approx(3.0 * (small + 0.5))
@@ -92,10 +91,10 @@ def test_images_of_another_aspect_ratio_are_letterboxed():
     assert pixel(camera_view(), point, (640, 500)) == pytest.approx(small + np.array([0.0, 10.0]))
 
 
-def test_without_a_size_the_principal_point_is_in_the_middle():
+def test_principal_point_is_in_the_middle_without_a_size():
     assert picture_size(camera_view(size=None)) == (600.0, 520.0)
     assert picture_size(camera_view(size=None, intrinsic=2.0 * K)) == (600.0, 520.0)
-    # Half a pixel, as pixels are counted from the first one's middle.
+    # Half a pixel is subtracted, because pixels are counted from the centre of the first pixel.
     assert pixel(camera_view(size=None), (0, 0, 0), (600, 520)) == pytest.approx([300.0, 260.0])
     with pytest.raises(RigError) as caught:
         picture_size(camera_view(size=None, intrinsic=np.diag([800.0, 800.0, 1.0])))
@@ -105,7 +104,7 @@ def test_without_a_size_the_principal_point_is_in_the_middle():
 
 
 def test_rendered_points_match_the_projection():
-    """Two captured points, 1 apart, and a square's corners."""
+    """Two captured points, 1 apart, and the corners of a square."""
     layout = PointLayout("two", ("a", "b"), np.zeros((0, 2)), [-1, -1])
     dots = Actor(Figure("dots", points=layout))
     dots.points = np.array([[0.3, 0.2, 0.1, 1.0], [-0.7, 0.2, 0.1, 1.0]])
@@ -116,18 +115,19 @@ def test_rendered_points_match_the_projection():
         alone = offscreen.render(Scene([wall]), (640, 480), camera, options, BOX)
         marks = offscreen.render(Scene([dots]), (640, 480), camera, options, BOX)
     rows, columns = np.nonzero(alone[..., 3])
-    # Corners at +-0.5, 8 away: 300 +- 50 and 260 +- 51.25, whose ends may be counted or not.
+    # Corners at +-0.5 and a distance of 8 are at 300 +- 50 and 260 +- 51.25; the ends may be
+    # covered or not.
     assert (columns.min(), columns.max()) in ((250, 350), (250, 349), (251, 350), (251, 349))
     assert (rows.min(), rows.max()) == (209, 311)
     rows, columns = np.nonzero(marks[..., 3])
     right = columns > 300
-    # Seen at 300 + 800 * 0.3 / 4.9 and 260 - 820 * 0.2 / 4.9.
+    # The point is at 300 + 800 * 0.3 / 4.9 and 260 - 820 * 0.2 / 4.9.
     assert (columns[right].mean(), rows[right].mean()) == pytest.approx((348.98, 226.53), abs=0.5)
-    # And at 300 - 800 * 0.7 / 4.9.
+    # The other point is at 300 - 800 * 0.7 / 4.9.
     assert (columns[~right].mean(), rows[~right].mean()) == pytest.approx((185.71, 226.53), abs=0.5)
 
 
-def test_depth_range_covers_the_scene_from_inside_too():
+def test_depth_range_covers_the_scene_also_from_inside():
     for distance in (0.5, 3.0, 30.0):
         view = camera_view(translation=[0.0, 0.0, distance])
         camera = Camera(fixed=view)
@@ -138,7 +138,7 @@ def test_depth_range_covers_the_scene_from_inside_too():
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
-def test_leaving_the_fixed_view_stays_where_it_was(up):
+def test_leaving_the_fixed_view_keeps_the_camera_position(up):
     """The resulting orbit camera has the same position and viewing direction."""
     start = Camera(np.array([0.3, 0.2, -0.1]), 4.0, 40.0, -20.0, up=up)
     right, upward, backward = camera_axes(start)
@@ -157,7 +157,7 @@ def test_leaving_the_fixed_view_stays_where_it_was(up):
     assert camera.azimuth == pytest.approx(50.0)
 
 
-def test_a_camera_facing_away_can_still_orbit():
+def test_camera_facing_away_can_orbit():
     view = camera_view(rotation=np.diag([-1.0, -1.0, 1.0]), translation=[0.0, 0.0, 4.0])
     away = camera_view(rotation=np.eye(3), translation=[0.0, 0.0, 0.0])
     for one in (view, away):
@@ -167,11 +167,11 @@ def test_a_camera_facing_away_can_still_orbit():
 
 def test_wide_images_keep_the_horizontal_field_of_view():
     camera = camera_from_view(camera_view(), (480, 480), "y")
-    # 640 columns fit into the width, so 640 rows are seen.
+    # The 640 columns fit into the width, so 640 rows are visible.
     assert camera.fov == pytest.approx(math.degrees(2 * math.atan(320 / 820)))
 
 
-def test_a_fixed_camera_is_never_parallel():
+def test_fixed_camera_is_never_orthographic():
     camera = Camera(orthographic=True, fixed=camera_view())
     assert not camera.is_parallel
     camera.fixed = None
@@ -179,7 +179,7 @@ def test_a_fixed_camera_is_never_parallel():
 
 
 def test_distortion_matches_hand_calculation():
-    """Corner of the image with K = diag(100, 100, 1), the principal point at (50, 50)."""
+    """The corner of the image with K = diag(100, 100, 1) and the principal point at (50, 50)."""
     k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
 
     def error(*coefficients):
@@ -188,18 +188,19 @@ def test_distortion_matches_hand_calculation():
 
     assert error() == 0.0
     assert error(0.0, 0.0, 0.0, 0.0, 0.0) == 0.0
-    # Corners at +-0.5: r^2 = 0.5. k1 = 0.1 moves both axes by 0.5 * 0.05, 2.5 pixels.
+    # The corners are at +-0.5, so r^2 = 0.5. k1 = 0.1 moves both axes by 0.5 * 0.05, 2.5 pixels.
     assert error(0.1) == pytest.approx(2.5 * math.sqrt(2))
     assert error(0.0, 0.2) == pytest.approx(2.5 * math.sqrt(2))
     assert error(0.0, 0.0, 0.0, 0.0, 0.4) == pytest.approx(2.5 * math.sqrt(2))
-    # p1 at (0.5, 0.5): dx = 2 p1 / 4, dy = p1 (0.5 + 0.5): 0.5 and 1 pixels for p1 = 0.01.
+    # At (0.5, 0.5), p1 adds dx = 2 p1 / 4 and dy = p1 (0.5 + 0.5), which are 0.5 and 1 pixels for
+    # p1 = 0.01.
     assert error(0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
     assert error(0.0, 0.0, 0.0, 0.01) == pytest.approx(math.hypot(0.5, 1.0))
-    # k4 = 1 divides by 1.5: each axis loses a third of its 50 pixels.
+    # k4 = 1 divides by 1.5: the 50 pixels of each axis are reduced by a third.
     assert error(0, 0, 0, 0, 0, 1.0) == pytest.approx(50 / 3 * math.sqrt(2))
 
 
-def test_a_camera_very_far_away_keeps_a_depth_range():
+def test_camera_very_far_away_has_a_depth_range():
     for distance in (1e9, 1e20, 1e38):
         camera = Camera(fixed=camera_view(translation=[0.0, 0.0, distance]))
         matrix = camera.projection_matrix(1.0, BOX)
@@ -209,7 +210,7 @@ def test_a_camera_very_far_away_keeps_a_depth_range():
 
 
 def test_distortion_with_a_zero_denominator_is_infinite():
-    """Corners at r^2 = 0.5, so k4 = -2 makes the divisor 1 - 2 * 0.5 = 0."""
+    """The corners have r^2 = 0.5, so k4 = -2 makes the divisor 1 - 2 * 0.5 = 0."""
     k = np.array([[100.0, 0.0, 50.0], [0.0, 100.0, 50.0], [0.0, 0.0, 1.0]])
     view = camera_view(intrinsic=k, size=(101, 101), distortion=[0.0] * 5 + [-2.0])
     assert distortion_error(view) > 1e9

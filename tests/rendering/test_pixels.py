@@ -1,4 +1,4 @@
-"""Single pixels against hand calculation: orientation, colours, transparency."""
+"""Single pixels, compared with hand calculation: orientation, colours, and transparency."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ RED, GREEN, BLUE, YELLOW = (220, 30, 30), (30, 200, 40), (40, 50, 230), (230, 21
 # Positions
 
 
-def test_a_square_covers_the_expected_pixels(offscreen):
-    """-1 to 1 of -2 to 2 on 100 pixels: columns 25 to 74."""
+def test_square_covers_the_expected_pixels(offscreen):
+    """-1 to 1 of -2 to 2 on 100 pixels are columns 25 to 74."""
     assert covered(draw(offscreen, scene_of(square()))) == (25, 74, 25, 74)
 
 
 def test_perspective_covers_the_expected_pixels(offscreen):
-    """1 unit nearer, from distance 2, doubles the size: -0.5 to 0.5 looks like -1 to 1."""
+    """At a distance of 2, 1 unit nearer doubles the size, so -0.5 to 0.5 looks like -1 to 1."""
     camera = front(orthographic=False)
     assert covered(draw(offscreen, scene_of(square(1.0, 0.5)), camera=camera)) == (25, 74, 25, 74)
 
@@ -48,8 +48,8 @@ def test_placement_moves_an_actor(offscreen):
     assert covered(draw(offscreen, scene)) == (25, 34, 75, 84)
 
 
-def test_a_figure_far_from_the_origin_is_drawn_where_it_is(offscreen):
-    """10,000 units away float32 has steps of 0.001; a 0.02 unit square keeps its pixels."""
+def test_figure_far_from_the_origin_is_drawn_at_its_position(offscreen):
+    """10,000 units away, float32 has steps of 0.001; a square of 0.02 units keeps its pixels."""
     mesh = square(half=0.01)
     far = np.array([10_000.0, 5_000.0, -8_000.0])
     moved = replace(mesh, positions=mesh.positions + far)
@@ -57,7 +57,7 @@ def test_a_figure_far_from_the_origin_is_drawn_where_it_is(offscreen):
     assert covered(draw(offscreen, scene_of(moved), camera=camera)) == (25, 74, 25, 74)
 
 
-def test_the_nearer_surface_hides_the_farther(offscreen):
+def test_nearer_surface_hides_the_farther_one(offscreen):
     back, ahead = square(-0.5, 1.0, picture([[RED]])), square(0.5, 0.5, picture([[GREEN]]))
     for order in ((back, ahead), (ahead, back)):
         pixels = draw(offscreen, scene_of(*order))
@@ -65,7 +65,7 @@ def test_the_nearer_surface_hides_the_farther(offscreen):
         assert near(pixels[30, 30], RED)
 
 
-def test_two_actors_are_drawn_and_a_hidden_one_is_not(offscreen):
+def test_visible_actors_are_drawn_and_hidden_actors_are_not(offscreen):
     scene = scene_of(square(half=0.3), square(half=0.3))
     scene.actors[0].placement[0, 3], scene.actors[1].placement[0, 3] = -1.0, 1.0
     alpha = draw(offscreen, scene)[..., 3]
@@ -75,34 +75,34 @@ def test_two_actors_are_drawn_and_a_hidden_one_is_not(offscreen):
     assert (alpha[50, 25], alpha[50, 75]) == (255, 0)
 
 
-# Both sides
+# Both sides of surfaces
 
 
-def test_a_clockwise_mesh_looks_like_a_counter_clockwise_one(offscreen):
+def test_clockwise_mesh_looks_like_a_counter_clockwise_one(offscreen):
     options = plain(lights=Lights())
     first = draw(offscreen, scene_of(square()), options)
     second = draw(offscreen, scene_of(square(clockwise=True)), options)
     np.testing.assert_array_equal(first, second)
 
 
-def test_a_clockwise_ball_looks_like_a_counter_clockwise_one(offscreen):
+def test_clockwise_ball_looks_like_a_counter_clockwise_one(offscreen):
     ball = sphere(20)
     turned = replace(ball, triangles=ball.triangles[:, ::-1], triangle_materials=None)
     for flat in (False, True):
         options = plain(lights=Lights(), flat=flat)
         first, second = (draw(offscreen, scene_of(mesh), options) for mesh in (ball, turned))
-        # The same surface, rasterised from another corner: one step of rounding.
+        # The same surface is rasterised from a different corner, which causes one step of rounding.
         assert np.abs(first.astype(int) - second).max() <= 2
 
 
-def test_a_surface_is_lit_the_same_from_behind(offscreen):
+def test_surface_is_lit_equally_from_behind(offscreen):
     options = plain(lights=lights(0.1, 0.6, azimuth=20.0))
     ahead = draw(offscreen, scene_of(square()), options, front())
     behind = draw(offscreen, scene_of(square()), options, front(azimuth=180.0))
     assert np.abs(ahead.astype(int) - behind).max() <= 1
 
 
-def test_normals_that_point_inwards_light_the_same(offscreen):
+def test_inward_normals_are_lit_equally(offscreen):
     ball = sphere(20)
     inward = replace(ball, normals=-ball.normals)
     options = plain(lights=Lights())
@@ -110,7 +110,7 @@ def test_normals_that_point_inwards_light_the_same(offscreen):
     assert (np.abs(first.astype(int) - second).max(axis=2) > 2).mean() < 0.01
 
 
-def test_nothing_is_culled_unless_asked(offscreen):
+def test_back_faces_are_culled_only_on_request(offscreen):
     for clockwise, visible in ((False, True), (True, False)):
         scene = scene_of(square(clockwise=clockwise))
         assert draw(offscreen, scene)[50, 50, 3] == 255
@@ -118,7 +118,7 @@ def test_nothing_is_culled_unless_asked(offscreen):
         assert bool(culled[50, 50, 3]) is visible
 
 
-def test_a_normal_of_length_zero_is_shaded_as_its_triangle(offscreen):
+def test_normal_of_length_zero_is_replaced_by_that_of_its_triangle(offscreen):
     mesh = square()
     options = plain(lights=lights(0.0, 0.5))
     zero = replace(mesh, normals=np.zeros((4, 3)))
@@ -134,8 +134,8 @@ def test_a_normal_of_length_zero_is_shaded_as_its_triangle(offscreen):
     ("linear", "byte"),
     [(0.0, 0), (0.002, 7), (0.0031308, 10), (0.05, 63), (0.21404, 128), (0.5, 188), (0.8, 231)],
 )
-def test_linear_light_becomes_the_srgb_byte(offscreen, linear, byte):
-    """Bytes by hand: 12.92 x below 0.0031308, else 1.055 x^(1/2.4) - 0.055."""
+def test_linear_light_is_encoded_as_srgb(offscreen, linear, byte):
+    """The expected bytes are 12.92 x below 0.0031308, otherwise 1.055 x^(1/2.4) - 0.055."""
     assert abs(srgb(linear) - byte) <= 0.51
     options = plain(lights=lights(linear))
     pixels = draw(offscreen, scene_of(square(material=picture([[WHITE]]))), options)
@@ -148,7 +148,7 @@ def test_unlit_texture_colours_are_unchanged(offscreen):
         assert near(pixels[50, 50], color, tolerance=1)
 
 
-def test_a_mesh_without_texture_has_the_skin_colour(offscreen):
+def test_mesh_without_texture_has_the_skin_colour(offscreen):
     wanted = [srgb(channel) for channel in SKIN_COLOR]
     meshes = [
         square(),
@@ -170,8 +170,8 @@ def test_diffuse_light_follows_the_cosine(offscreen, azimuth, cosine):
     assert near(pixels[50, 50], [srgb(0.1 + 0.6 * cosine)] * 3, tolerance=1)
 
 
-def test_the_highlight_follows_blinn_phong(offscreen):
-    """Light 60 degrees aside, eye ahead: the halfway vector is at 30, cos^s = 0.75^(s/2)."""
+def test_highlight_follows_blinn_phong(offscreen):
+    """With light from 60 degrees, the halfway vector is at 30, and cos^s = 0.75^(s/2)."""
     shiny = lights(0.0, 0.5, azimuth=60.0, specular=0.4, shininess=8.0)
     pixels = draw(offscreen, scene_of(square(material=picture([[WHITE]]))), plain(lights=shiny))
     assert near(pixels[50, 50], [srgb(0.5 * (0.5 + 0.4 * 0.75**4))] * 3, tolerance=1)
@@ -188,8 +188,8 @@ def test_lights_follow_the_camera_or_the_scene(offscreen):
         assert bool(differing < 0.02) is same
 
 
-def test_a_light_of_the_scene_comes_from_its_azimuth(offscreen):
-    """Azimuth 90 is +x: seen from the front the right half is bright."""
+def test_scene_light_comes_from_its_azimuth(offscreen):
+    """Azimuth 90 is +x, so the right half is bright when seen from the front."""
     setting = lights(0.0, 1.0, azimuth=90.0, follow_camera=False)
     pixels = draw(offscreen, scene_of(sphere(24)), plain(lights=setting))
     assert pixels[50, 65, 0] > 100
@@ -213,7 +213,7 @@ def test_default_lights_read_as_two_colours(offscreen):
 # Textures
 
 
-def test_v_0_is_the_bottom_row_of_the_texture(offscreen):
+def test_v_of_0_is_the_bottom_row_of_the_texture(offscreen):
     mesh = square(material=picture([[RED, GREEN], [BLUE, YELLOW]]))
     pixels = draw(offscreen, scene_of(mesh))
     assert near(pixels[27, 27], RED)
@@ -233,7 +233,7 @@ def test_textures_are_clamped_not_repeated(offscreen):
 
 
 def test_every_run_of_triangles_has_its_own_material(offscreen):
-    """Three squares side by side: textures 0 and 1, then none, then 0 again."""
+    """Squares side by side have textures 0 and 1, then none, then 0 again."""
     squares = [square(half=0.2) for _ in range(4)]
     positions = np.concatenate(
         [
@@ -255,14 +255,14 @@ def test_every_run_of_triangles_has_its_own_material(offscreen):
         assert near(pixels[50, column], color)
 
 
-def test_a_texture_seen_from_afar_is_averaged_in_linear_light(offscreen):
-    """Half black, half white is linear 0.5: sRGB 188, not 128."""
+def test_distant_texture_is_averaged_in_linear_light(offscreen):
+    """Half black and half white is linear 0.5, which is sRGB 188, not 128."""
     fine = np.add.outer(np.arange(256), np.arange(256)) % 2
     mesh = square(half=0.5, material=picture(np.where(fine[..., None], 255, 0) * np.ones(3, int)))
     assert near(draw(offscreen, scene_of(mesh))[50, 50], [188] * 3, tolerance=4)
 
 
-def test_checker_needs_no_texture(offscreen):
+def test_checker_pattern_needs_no_texture(offscreen):
     pixels = draw(offscreen, scene_of(square()), plain(shading="checker"))
     square_colors = {tuple(pixels[row, 50, :3]) for row in range(26, 74)}
     assert len(square_colors) > 2
@@ -271,6 +271,6 @@ def test_checker_needs_no_texture(offscreen):
 
 
 def test_normals_are_shown_as_colours(offscreen):
-    """Towards the eye is (0.5, 0.5, 1) before squaring and encoding: 0.25, 0.25, 1 linear."""
+    """A normal towards the eye is (0.5, 0.5, 1) before squaring, (0.25, 0.25, 1) linear."""
     pixels = draw(offscreen, scene_of(square()), plain(shading="normals"))
     assert near(pixels[50, 50], [srgb(0.25), srgb(0.25), 255])

@@ -1,4 +1,4 @@
-"""Pixels of display options: shading, grid, background, boxes, highlights, samples."""
+"""Pixels of display options: shading, grid, background, boxes, highlights, and samples."""
 
 from __future__ import annotations
 
@@ -28,21 +28,21 @@ def test_flat_shading_has_one_colour_per_triangle(offscreen):
     assert counts[0] > 2 * counts[1]
 
 
-def test_wireframe_draws_the_diagonal_dark_and_leaves_the_middle(offscreen):
+def test_wireframe_draws_dark_edges_and_keeps_the_colour_between_them(offscreen):
     scene = scene_of(square(material=picture([[WHITE]])))
     options = plain(wireframe=True)
     pixels = draw(offscreen, scene, options)
     dark = pixels[..., 0] < 160
-    # From the lower left to the upper right corner, one pixel per row.
+    # The diagonal runs from the lower left to the upper right corner, one pixel per row.
     diagonal = [dark[row, 98 - row : 101 - row].any() for row in range(27, 73)]
     assert np.mean(diagonal) > 0.95
-    # The tone curve shows 1 as 0.9: see test_tone.py.
+    # The tone curve maps 1 to 0.9; see test_tone.py.
     assert near(pixels[35, 35], [srgb(0.9)] * 3)
     assert near(pixels[65, 65], [srgb(0.9)] * 3)
 
 
 def test_vertex_normals_stick_out_by_a_fiftieth_of_the_size(offscreen):
-    """A ball of radius 1 has size 2 sqrt 3: lines end 0.069 outside, 1.7 pixels."""
+    """A ball of radius 1 has a size of 2 sqrt 3, so lines end 0.069 or 1.7 pixels outside."""
     options = plain(normals=True)
     without = draw(offscreen, scene_of(sphere(12)))
     with_lines = draw(offscreen, scene_of(sphere(12)), options)
@@ -52,7 +52,7 @@ def test_vertex_normals_stick_out_by_a_fiftieth_of_the_size(offscreen):
     assert cyan.sum() > 50
 
 
-def test_wireframe_is_switched_off_again(offscreen):
+def test_wireframe_can_be_switched_off(offscreen):
     scene = scene_of(square(material=picture([[WHITE]])))
     wanted = draw(offscreen, scene)
     draw(offscreen, scene, plain(wireframe=True, normals=True))
@@ -64,32 +64,32 @@ def test_gradient_runs_from_dark_above_to_light_below(offscreen):
     pixels = draw(offscreen, scene, plain(background="gradient"))
     heights = pixels[..., :3].astype(float).mean(axis=(1, 2))
     assert (np.diff(heights) > 0).all()
-    # The rows' middles are half a pixel from the ends.
+    # The centres of the first and last rows are half a pixel from the ends.
     assert near(pixels[0, 50], 255 * np.array([0.36, 0.43, 0.52]), tolerance=3)
     assert near(pixels[-1, 50], 255 * np.array([0.80, 0.83, 0.86]), tolerance=3)
     assert (pixels[..., 3] == 255).all()
 
 
-def test_a_background_colour_is_drawn_as_given(offscreen):
+def test_background_colour_is_drawn_as_given(offscreen):
     pixels = draw(offscreen, Scene([]), plain(background="#336699"))
     assert near(pixels, (0x33, 0x66, 0x99), tolerance=1)
     assert (pixels[..., 3] == 255).all()
 
 
 @pytest.mark.parametrize("text", ["blue", "#12345", "#1234567", "#12345g", "", "336699"])
-def test_an_invalid_background_is_refused(offscreen, text):
+def test_invalid_background_is_refused(offscreen, text):
     with pytest.raises(ViewerError, match=r'background: expected "gradient", .* or "#'):
         draw(offscreen, Scene([]), plain(background=text))
 
 
-def test_a_transparent_background_has_alpha_0(offscreen):
+def test_transparent_background_has_alpha_0(offscreen):
     pixels = draw(offscreen, scene_of(square()))
     assert (pixels[:20] == 0).all()
     assert (pixels[30:70, 30:70, 3] == 255).all()
 
 
 def test_edges_have_straight_alpha(offscreen):
-    """A half-covered pixel has half alpha and the colour of the figure, not a darker one."""
+    """A half-covered pixel has half alpha and the unchanged colour of the figure."""
     ball = replace(sphere(32), uvs=None)
     options = plain(samples=4)
     pixels = draw(offscreen, scene_of(ball), options)
@@ -100,11 +100,11 @@ def test_edges_have_straight_alpha(offscreen):
     assert partial.sum() > 50
     wanted = np.array([srgb(channel) for channel in SKIN_COLOR])
     error = np.abs(pixels[partial][:, :3] - wanted).max(axis=1)
-    # Stored premultiplied in 8 bits, then divided by alpha.
+    # Colours are stored premultiplied in 8 bits, then divided by alpha.
     assert (error <= 1.0 + 255.0 / alpha[partial]).all()
 
 
-def test_grid_lines_are_drawn_only_if_asked(offscreen):
+def test_grid_lines_are_drawn_only_on_request(offscreen):
     scene = scene_of(sphere(16))
     camera = front(inclination=30.0, orthographic=False, distance=3.0)
     without, with_grid = (
@@ -115,8 +115,8 @@ def test_grid_lines_are_drawn_only_if_asked(offscreen):
     assert (with_grid[~outside] == 255).all()
 
 
-def test_the_grid_hides_nothing(offscreen):
-    """It lies under the figure: from below, the figure is visible between and behind its lines."""
+def test_grid_does_not_hide_the_figure(offscreen):
+    """The grid is below the figure, which is visible from below between and behind the lines."""
     scene = scene_of(sphere(16))
     camera = front(inclination=-50.0, distance=3.0)
     with_grid = draw(offscreen, scene, plain(grid=True), camera)
@@ -144,7 +144,7 @@ def test_boxes_cover_the_expected_pixels(offscreen, box, wanted):
     assert pixels[pixels[..., 3] > 0][:, :3].max(axis=1).min() > 80
 
 
-def test_a_flat_box_is_lit_from_both_sides(offscreen):
+def test_flat_box_is_lit_from_both_sides(offscreen):
     scene = Scene([Actor(box_figure([[-1, -1, 0], [1, 1, 0]]))])
     options = plain(lights=lights(0.1, 0.6))
     ahead, behind = (
@@ -155,14 +155,14 @@ def test_a_flat_box_is_lit_from_both_sides(offscreen):
 
 
 def test_boxes_follow_the_pose(offscreen):
-    """A box along x, rotated by 90 degrees about z, stands upright."""
+    """A box along x that is rotated by 90 degrees about z is upright."""
     figure = box_figure([[0, -0.1, -0.1], [1, 0.1, 0.1]])
     first, last, left, right = covered(draw(offscreen, Scene([bent(figure, (0, "z", np.pi / 2))])))
     assert abs(first - 25) <= 1 and abs(last - 49) <= 1
     assert abs(left - 47) <= 1 and abs(right - 52) <= 1
 
 
-def test_the_selected_joint_is_highlighted_alone(offscreen):
+def test_only_the_selected_joint_is_highlighted(offscreen):
     figure = arm(3)
     camera = front(target=np.array([1.5, 0.0, 0.0]))
     scene = Scene([Actor(figure)])
@@ -171,13 +171,13 @@ def test_the_selected_joint_is_highlighted_alone(offscreen):
     after = draw(offscreen, scene, options, camera, selected=1)
     changed = (before != after).any(axis=2)
     columns = np.nonzero(changed.any(axis=0))[0]
-    # Joint 1's box is 1.1 to 1.9, 0.4 from the centre: columns 40 to 59.
+    # The box of joint 1 is from 1.1 to 1.9, 0.4 from the centre, in columns 40 to 59.
     assert (columns.min(), columns.max()) == (40, 59)
     red, green, blue = after[50, 50, :3].astype(int)
     assert red > green + 40 > blue + 80
 
 
-def test_bind_pose_shows_the_mesh_unposed(offscreen):
+def test_bind_pose_shows_the_unposed_mesh(offscreen):
     figure = arm(3)
     posed = Scene([bent(figure, (1, "z", 1.0))])
     camera = front(target=np.array([1.5, 0.0, 0.0]))
@@ -193,15 +193,15 @@ def both_figure() -> Figure:
     return Figure("both", square(half=0.25), skeleton([-1, 0], np.zeros((2, 3)), boxes))
 
 
-def test_both_draws_the_boxes_as_one_translucent_layer(offscreen):
-    """Each of the two boxes has two faces along a ray: it is still one layer."""
+def test_showing_both_draws_the_boxes_as_one_translucent_layer(offscreen):
+    """Each of the two boxes has two faces along a ray, but they are drawn as one layer."""
     scene = Scene([Actor(both_figure())])
     pixels = draw(offscreen, scene, plain(show="both", skeleton_opacity=0.4))
-    assert set(np.unique(pixels[..., 3])) == {0, 102, 255}  # nothing, 0.4 of 255, the square
+    assert set(np.unique(pixels[..., 3])) == {0, 102, 255}  # background, 0.4 of 255, and the square
     assert (pixels[45:55, 45:55, 3] == 255).all()
 
 
-def test_both_tints_the_skin_with_the_nearest_boxes(offscreen):
+def test_showing_both_tints_the_skin_with_the_nearest_boxes(offscreen):
     scene = Scene([Actor(both_figure())])
     box = draw(offscreen, scene, plain(show="skeleton"))[50, 50, :3].astype(float)
     both = draw(offscreen, scene, plain(show="both", skeleton_opacity=0.4))[50, 50, :3]
@@ -209,7 +209,7 @@ def test_both_tints_the_skin_with_the_nearest_boxes(offscreen):
     assert np.abs(both - wanted).max() <= 1.5
 
 
-def test_both_leaves_nothing_behind(offscreen):
+def test_showing_both_restores_the_gl_state(offscreen):
     """Masks and depth tests are restored for the next image."""
     scene = Scene([Actor(both_figure())])
     wanted = draw(offscreen, scene_of(sphere(16)))
@@ -217,16 +217,16 @@ def test_both_leaves_nothing_behind(offscreen):
     np.testing.assert_array_equal(draw(offscreen, scene_of(sphere(16))), wanted)
 
 
-def test_skin_of_a_figure_without_a_mesh_is_its_skeleton(offscreen):
+def test_figure_without_a_mesh_shows_its_skeleton_as_skin(offscreen):
     scene = Scene([Actor(box_figure([[-1, -1, -1], [1, 1, 1]]))])
     assert covered(draw(offscreen, scene, plain())) == (25, 74, 25, 74)
 
 
-def test_skeleton_of_a_figure_without_one_is_its_mesh(offscreen):
+def test_figure_without_a_skeleton_shows_its_mesh_as_skeleton(offscreen):
     assert covered(draw(offscreen, scene_of(square()), plain(show="skeleton"))) == (25, 74, 25, 74)
 
 
-def test_one_sample_has_hard_edges_and_four_have_soft_ones(offscreen):
+def test_one_sample_has_hard_edges_and_four_samples_have_soft_edges(offscreen):
     if offscreen.context.max_samples < 4:
         pytest.skip("no multisampling here")
     scene = scene_of(sphere(24))
@@ -245,5 +245,5 @@ def test_more_samples_than_supported_use_the_maximum(offscreen):
     )
 
 
-def test_an_empty_scene_is_a_background(offscreen):
+def test_empty_scene_shows_only_the_background(offscreen):
     assert not draw(offscreen, Scene([])).any()

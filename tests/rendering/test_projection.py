@@ -1,4 +1,4 @@
-"""Projected points: by hand for a camera on an axis, and behind it."""
+"""Projected points in front of and behind a camera on an axis, calculated by hand."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ SIZE = (200, 100)
 
 @pytest.fixture
 def view():
-    """A camera at (0, 0, 4) that looks along -z, half as wide as far at 90 degrees."""
+    """Return a view of a camera at (0, 0, 4) that looks along -z with 90 degrees."""
     return view_of(Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=4.0), SIZE, BOX)
 
 
 def test_pixels_are_those_of_a_pinhole(view):
-    # tan(45 deg) = 1: at a distance of 4 a unit is 50 / 4 pixels, from the centre (100, 50).
+    # Since tan(45 deg) = 1, a unit at a distance of 4 is 50 / 4 pixels from the centre (100, 50).
     points = np.array([[0.0, 0.0, 0.0], [1.0, 2.0, 0.0], [1.0, 1.0, 2.0], [-2.0, -1.0, -1.0]])
     found = project(view, SIZE, points)
     wanted = [[100, 50], [112.5, 25], [125, 25], [80, 60]]
@@ -46,7 +46,7 @@ def test_pixels_unproject_to_points_at_a_given_depth(orthographic):
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=4.0, orthographic=orthographic)
     view, points = view_of(camera, SIZE, BOX), np.array([[0.0, 0.0, 0.0], [1.0, 1.0, 2.0]])
     found = unproject(view, SIZE, points, np.array([[112.5, 25.0], [100.0, 75.0]]))
-    # 12.5 pixels a unit at the target; at z = 2 half as much is visible, except with an
+    # A unit is 12.5 pixels at the target; at z = 2 half as much is visible, except with an
     # orthographic camera.
     assert_allclose(found, [[1, 2, 0], [0, -2 if orthographic else -1, 2]], atol=1e-12)
 
@@ -58,7 +58,7 @@ def test_segment_in_front_keeps_both_ends(view):
 
 
 def test_segment_that_ends_behind_the_eye_keeps_its_direction(view):
-    # In the plane x = y it projects to a line to the right and upwards, however it is clipped.
+    # In the plane x = y, the segment projects to a line to the right and upwards for any clipping.
     ends, seen = project_segments(
         view, SIZE, np.array([[1.0, 1.0, 0.0]]), np.array([[1.0, 1.0, 9.0]])
     )
@@ -85,5 +85,5 @@ def test_segment_behind_the_eye_is_not_visible(view):
     ],
 )
 def test_marks_grow_with_the_image(size, scale):
-    # 720 x 1440 counts as 540 pixels high, which is below the minimum for marks.
+    # 720 x 1440 counts as a height of 540 pixels, which is below the minimum for marks.
     assert picture_scale(size) == pytest.approx(scale)

@@ -1,4 +1,4 @@
-"""The recorder: frames match single images, use copies, and end cleanly at any time."""
+"""The recorder: frames that match single images, unchanged scenes, and a clean end at any time."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ TIMES = np.array([0.0, 0.1, 0.2, 0.35, 0.7, 1.0])
 
 
 class Kept:
-    """A sink that keeps its frames, and can be made to fail."""
+    """A sink that stores its frames and can be made to fail."""
 
     def __init__(self, workers=1, n_samples=0, fails_at=None, problem=FULL):
         self.workers, self.n_samples, self.fails_at = workers, n_samples, fails_at
@@ -78,7 +78,7 @@ def run(offscreen, recording, sink) -> list[Progress]:
 
 
 def one_by_one(offscreen, recording, cameras=None) -> list[np.ndarray]:
-    """Return single images: posed here, rendered without the recorder."""
+    """Return single images that are posed here and rendered without the recorder."""
     pictures = []
     actor = moving_arm()
     for index, seconds in enumerate(recording.times):
@@ -112,7 +112,7 @@ def test_recording_does_not_change_the_scene(offscreen, scene):
 
 
 def test_absent_actors_are_not_drawn(offscreen, scene):
-    """Frame 5 of the motion, at 0.5 s, is missing, and lasts until 0.6 s."""
+    """Frame 5 of the motion, from 0.5 s to 0.6 s, is missing."""
     options = DisplayOptions(background="transparent", grid=False)
     sink = Kept()
     recording = recording_of(scene, options=options)
@@ -126,7 +126,7 @@ def test_absent_actors_are_not_drawn(offscreen, scene):
     assert filled.frames[1].any()
 
 
-def test_still_scene_keeps_its_pose(offscreen, scene):
+def test_static_scene_keeps_its_pose(offscreen, scene):
     scene.actors[0].pose.dofs[5] = 0.7
     sink = Kept()
     recording = recording_of(scene, moves=False)
@@ -146,7 +146,7 @@ def test_turntable_is_a_seamless_loop(offscreen):
         camera.azimuth += 45.0 * frame  # the eighth step would be the first frame again
         wanted = offscreen.render(scene, SIZE, camera, recording.options, recording.box)
         differs = (sink.frames[frame] != wanted).any(axis=2)
-        assert differs.mean() < 0.01  # 530 and 170 degrees differ in the last bit
+        assert differs.mean() < 0.01  # 530 and 170 degrees differ in the last bit of the sine
     assert recording.camera.azimuth == 170.0
 
 
@@ -158,17 +158,17 @@ def test_camera_follows_its_target(offscreen, scene):
     recording.times = np.array([0.0, 0.3, 0.4])
     fixed, followed = Kept(), Kept()
     run(offscreen, recording, fixed)
-    recording.follow = Follow(0, 1, np.array([1.0, 0.0, 0.0]))  # where joint 1 begins
+    recording.follow = Follow(0, 1, np.array([1.0, 0.0, 0.0]))  # the position of joint 1
     run(offscreen, recording, followed)
     assert (fixed.frames[0] != fixed.frames[2]).any()
     assert (fixed.frames[0] == followed.frames[0]).all()
     for frame in (1, 2):
         differs = (followed.frames[frame] != followed.frames[0]).any(axis=2)
-        assert differs.mean() < 0.02  # summation in another order changes edges in the last bit
+        assert differs.mean() < 0.02  # a different order of summation changes edges in the last bit
 
 
-def test_camera_waits_where_an_actor_is_absent(offscreen, scene):
-    marker = Actor(arm(2))  # stands still
+def test_camera_does_not_move_while_its_actor_is_absent(offscreen, scene):
+    marker = Actor(arm(2))  # the camera does not move
     recording = recording_of(Scene([moving_arm(turns=False), marker]))
     recording.times = np.array([0.4, 0.55])
     recording.follow = Follow(0, 0, np.zeros(3))
@@ -176,7 +176,7 @@ def test_camera_waits_where_an_actor_is_absent(offscreen, scene):
     sink = Kept()
     run(offscreen, recording, sink)
     camera = recording.camera.copy()
-    camera.target = camera.target + np.array([0.8, 0.0, 0.0])  # as at 0.4 s
+    camera.target = camera.target + np.array([0.8, 0.0, 0.0])  # same as at 0.4 s
     wanted = offscreen.render(Scene([marker]), SIZE, camera, recording.options, recording.box)
     assert (sink.frames[1] == wanted).all()
 
@@ -197,7 +197,7 @@ def test_sampled_frames_are_rendered_before_the_first_frame(offscreen, scene):
         assert (seen == sink.frames[frame]).all()
 
 
-def test_more_samples_than_frames_are_all_frames(offscreen, scene):
+def test_more_samples_than_frames_sample_all_frames(offscreen, scene):
     sink = Kept(n_samples=12)
     run(offscreen, recording_of(scene), sink)
     assert len(sink.seen) == len(TIMES)
@@ -211,7 +211,7 @@ def test_frames_are_written_while_rendering(offscreen, scene):
 
 
 @pytest.mark.parametrize("n_frames", [0, 1, 2])
-def test_recordings_of_few_frames(offscreen, scene, n_frames):
+def test_recordings_of_few_frames_are_written(offscreen, scene, n_frames):
     recording, sink = recording_of(scene), Kept()
     recording.times = TIMES[:n_frames]
     run(offscreen, recording, sink)
@@ -232,11 +232,11 @@ def test_failing_sink_ends_the_recording(offscreen, scene, at):
     with pytest.raises(OutputError, match="disk full"):
         run(offscreen, recording_of(scene), sink)
     assert sink.ended == ["abort"]
-    run(offscreen, recording_of(scene), after := Kept())  # nothing is left behind
+    run(offscreen, recording_of(scene), after := Kept())  # no frame remains
     assert after.ended == ["close"]
 
 
-def test_interruption_aborts(offscreen, scene):
+def test_interruption_aborts_the_sink(offscreen, scene):
     sink = Kept(fails_at=3, problem=KeyboardInterrupt())
     with pytest.raises(KeyboardInterrupt):
         run(offscreen, recording_of(scene), sink)
@@ -244,7 +244,7 @@ def test_interruption_aborts(offscreen, scene):
 
 
 @pytest.mark.parametrize("n_steps", [1, 3, 6])
-def test_closing_the_generator_cancels(offscreen, scene, n_steps):
+def test_closing_the_generator_aborts_the_sink(offscreen, scene, n_steps):
     sink = Kept()
     before = threading.active_count()
     with offscreen.context:
@@ -273,7 +273,7 @@ def test_other_scenes_may_be_rendered_between_steps(offscreen, scene):
             assert (sink.frames[index] == wanted).all(), index
 
 
-def test_few_frames_are_queued_however_slow_the_sink(offscreen, scene):
+def test_few_frames_are_queued_for_a_slow_sink(offscreen, scene):
     class Slow(Kept):
         def write(self, frame, pixels):
             gate.wait(10)
@@ -286,7 +286,7 @@ def test_few_frames_are_queued_however_slow_the_sink(offscreen, scene):
     with offscreen.context:
         for progress in record(recording, offscreen.renderer, sink):
             drawn = progress.done
-            if drawn == 3:  # one being written, two queued; the next must wait too
+            if drawn == 3:  # one is being written and two are queued; the next must wait
                 threading.Timer(0.2, gate.set).start()
             assert drawn - len(sink.frames) <= 4
     assert drawn == 12 == len(sink.frames)

@@ -1,4 +1,4 @@
-"""Mapping of values to colours: ranges that are robust to outliers."""
+"""Mapping of values to colours, with ranges that are robust to outliers."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from viewer.rig.scalars import SCALARS, compute
 from viewer.rig.skin import skin_from_lists
 
 
-def test_largest_percent_of_values_is_left_out():
+def test_largest_one_percent_of_values_is_ignored():
     # The 99th percentile of 1 to 1000 is 990 or slightly more; the sign does not matter.
     numbers = np.arange(1.0, 1001.0)
     low, high = typical_span(numbers)
@@ -23,14 +23,14 @@ def test_largest_percent_of_values_is_left_out():
     assert typical_span(numbers) == (-500.0, high)
 
 
-def test_zero_values_do_not_count():
-    # 50 of 10,000 vertices move: nearly all values are 0, the range is that of the 50.
+def test_zero_values_are_ignored():
+    # Only 50 of 10,000 vertices move, so nearly all values are 0; the range is that of the 50.
     numbers = np.zeros(10_000)
     numbers[:50] = np.linspace(-20, 30, 50)
     assert typical_span(numbers) == (-20.0, 30.0)
 
 
-def test_small_samples_are_all_typical():
+def test_all_values_of_small_samples_are_typical():
     assert typical_span(np.array([0.0, -3.0, 7.0])) == (-3.0, 7.0)
     assert typical_span(np.zeros(5)) == (0.0, 0.0)
     assert typical_span(np.arange(100.0)) == (0.0, 99.0)
@@ -47,7 +47,7 @@ def test_only_automatic_strain_ranges_are_robust(name):
 
 
 def test_one_outlier_does_not_flatten_the_other_colours():
-    # The weights of joint 1 increase to the right; one vertex has weight 1.
+    # The weights of joint 1 increase to the right; a single vertex has weight 1.
     figure = grid_figure(40)
     x = (figure.mesh.positions[:, 0] + 1.5) / 3.0
     weights = 0.5 * x**2

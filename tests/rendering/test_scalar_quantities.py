@@ -1,4 +1,4 @@
-"""Scalar quantities: values on the GPU, their range, and their rendered colours."""
+"""Scalar quantities: values on the GPU, their range, and rendered colours."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ def offscreen():
 
 
 def rising(largest=1.0):
-    """Return a scene whose view "correctives" rises from 0 at the left edge to the right one's."""
+    """Return a scene in which "correctives" rises from 0 at the left edge to the right edge."""
     figure = grid_figure()
     offsets = np.zeros((9, figure.mesh.n_vertices, 3))
-    # A rotation by 180 degrees about z drives row 0 with -2.
+    # A rotation by 180 degrees about z results in a weight of -2 in row 0.
     offsets[0, :, 1] = largest * (figure.mesh.positions[:, 0] + 1.5) / 6.0
     scene = alone(grid_figure(correctives=Correctives(offsets)))
     scene.actors[0].pose.dofs[5] = np.pi
@@ -60,7 +60,7 @@ def test_colours_of_the_map_run_from_zero_to_the_largest_value(offscreen, larges
     picture = view_of(offscreen, rising(largest))
     pixels = colormap()[:, :3].astype(int)
     for x in (-1.4, -0.7, 0.0, 0.7, 1.4):
-        # Pixel centres are 0.025 from the requested position, eight rows of 256.
+        # Pixel centres are 0.025 from the requested position, or eight rows of 256.
         row = round(255 * (x + 1.5) / 3.0)
         near = pixels[max(row - 8, 0) : row + 9]
         assert np.abs(near - pixel(picture, x, 0.5)[:3]).max(axis=1).min() <= 6
@@ -82,7 +82,7 @@ def test_figure_without_differences_is_dark_all_over(offscreen):
     assert np.abs(found - colormap()[0, :3]).max() <= 3
 
 
-def test_view_follows_the_pose(offscreen):
+def test_values_follow_the_pose(offscreen):
     scene = rising()
     before = view_of(offscreen, scene)
     scene.actors[0].pose.dofs[5] = 0.0
@@ -97,7 +97,7 @@ def test_view_of_an_arm_is_brightest_at_its_twisted_elbow(offscreen):
     picture = view_of(offscreen, Scene([actor]), "methods")
     brightness = picture[..., :3] @ LUMA * drawn(picture)
     _, column = np.unravel_index(brightness.argmax(), brightness.shape)
-    # The elbow between joints 1 and 2 is at x = 2, half a unit right of the middle.
+    # The elbow between joints 1 and 2 is at x = 2, half a unit to the right of the middle.
     assert abs((column + 0.5) / 20 - 2.0 - 0.5) < 0.3
 
 
@@ -131,7 +131,7 @@ def test_every_split_vertex_has_the_value_of_its_vertex(buffers, name):
     assert buffers.range == (numbers.min(), numbers.max())
 
 
-def test_values_are_computed_only_after_a_change(buffers, monkeypatch):
+def test_values_are_recomputed_only_after_a_change(buffers, monkeypatch):
     calls = []
     original = scalars.compute
 
@@ -172,7 +172,7 @@ def test_weight_values_are_computed_once_for_all_poses(buffers):
     assert versions == [1, 1, 1, 2]
 
 
-def test_missing_joint_has_no_weight(buffers):
+def test_missing_joint_has_a_weight_of_zero(buffers):
     buffers.update("weight:nobody", None, Skinning())
     assert buffers.range == (0.0, 0.0)
     assert not values_of(buffers).any()
@@ -187,7 +187,7 @@ def test_values_scale_with_the_figure(buffers):
     assert buffers.range[1] == pytest.approx(2.0 * before)
 
 
-def test_bind_pose_has_values_of_zero_and_a_range(buffers):
+def test_bind_pose_has_zero_values_and_a_range(buffers):
     buffers.update("pruning", posed(buffers.mesh.figure), Skinning(max_influences=1))
     buffers.update("pruning", None, Skinning(max_influences=1))
     assert not values_of(buffers).any()
@@ -209,7 +209,7 @@ def test_rest_pose_values_differ_from_posed_ones(buffers):
 
 
 def two_joints(influences):
-    """Return a scene of a square from -1.5 to 1.5 whose corners list these influences."""
+    """Return a scene of a square from -1.5 to 1.5 with these influences of its corners."""
     corners = [[-1.5, -1.5, 0], [1.5, -1.5, 0], [1.5, 1.5, 0], [-1.5, 1.5, 0]]
     surface = Mesh(
         np.array(corners), np.tile([0.0, 0, 1], (4, 1)), np.array([[0, 1, 2], [0, 2, 3]])
@@ -230,7 +230,7 @@ def near(found, wanted, by=6):
     return np.abs(np.array(found[:3], int) - np.array(wanted[:3], int)).max() <= by
 
 
-def test_weight_is_dark_grey_only_where_the_whole_triangle_has_none(offscreen):
+def test_weight_is_dark_grey_only_on_triangles_without_weight(offscreen):
     # Only the lower right corner is influenced by joint 2: the upper left triangle is not.
     rows = [[(0, 1.0)], [(2, 1.0)], [(0, 1.0)], [(0, 1.0)]]
     picture = shown(offscreen, two_joints(rows), "weight:j2")
@@ -260,13 +260,13 @@ def test_fixed_range_is_in_the_unit_of_the_legend(offscreen):
     assert offscreen.renderer.legend.unit == "mm"
 
 
-def test_isolines_lie_at_tenths_of_the_range(offscreen):
+def test_isolines_are_at_tenths_of_the_range(offscreen):
     scene = two_joints(LEFT_TO_RIGHT)
     plain = shown(offscreen, scene, "weight:j1")
     lined = shown(offscreen, scene, "weight:j1", isolines=True)
     changed = (np.abs(plain.astype(int) - lined).sum(axis=2) > 12).any(axis=0)
     columns = np.flatnonzero(changed)
-    # A tenth is 0.3 units, six pixels; none at the edges, where the weight is 0 or 1.
+    # A tenth is 0.3 units or six pixels; there is no line at the edges, where the weight is 0 or 1.
     lines = (columns + 0.5) / 20 - 2.0
     tenths = (lines + 1.5) / 0.3
     assert set(np.round(tenths)) == set(range(1, 10))
@@ -281,7 +281,7 @@ def test_isolines_are_on_by_default_for_weights_only(offscreen):
     np.testing.assert_array_equal(usual, shown(offscreen, scene, "entropy"))
 
 
-def test_region_of_one_value_has_no_isoline(offscreen):
+def test_area_with_one_value_has_no_isoline(offscreen):
     rows = [[(0, 0.5), (1, 0.5)]] * 4
     picture = shown(offscreen, two_joints(rows), "weight:j1", isolines=True)
     found = picture[drawn(picture)]
@@ -294,7 +294,7 @@ def test_dominant_joints_meet_in_a_sharp_border(offscreen):
     row = picture[40, drawn(picture)[40]]
     is_first = np.array([near(found, colors[0]) for found in row])
     is_second = np.array([near(found, colors[1]) for found in row])
-    # In the middle; at most two pixels have neither colour.
+    # The border is in the middle, and at most two pixels have neither colour.
     assert is_first[:29].all() and is_second[31:].all()
     assert (is_first | is_second).sum() >= 58
 
@@ -307,7 +307,7 @@ def test_each_corner_of_a_triangle_shows_its_category(offscreen):
         assert near(pixel(picture, x, y), colors[joint]), (x, y)
 
 
-def test_count_between_two_others_is_not_shown(offscreen):
+def test_interpolated_counts_are_not_shown(offscreen):
     one, three = [(0, 1.0)], [(0, 0.4), (1, 0.3), (2, 0.3)]
     picture = shown(offscreen, two_joints([one, three, three, one]), "influences")
     colors = count_palette(3)
@@ -316,7 +316,7 @@ def test_count_between_two_others_is_not_shown(offscreen):
     assert near(row[5], colors[1]) and near(row[-5], colors[3])
 
 
-def test_vertex_without_influence_is_grey_among_dominant_joints(offscreen):
+def test_vertex_without_influence_is_grey_in_the_dominant_joint_view(offscreen):
     picture = shown(offscreen, two_joints([[], [], [], []]), "dominant")
     assert near(pixel(picture, 0.2, 0.1), NOTHING, 1)
 
@@ -331,7 +331,7 @@ def test_parts_have_the_colours_of_the_part_shading(offscreen):
         assert near(pixel(one, x, 0.1), pixel(other, x, 0.1), 12)
 
 
-def test_selected_joint_is_shown_by_a_view_without_a_joint(offscreen):
+def test_view_without_a_joint_shows_the_selected_joint(offscreen):
     scene = two_joints(LEFT_TO_RIGHT)
     wanted = shown(offscreen, scene, "weight:j1")
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
@@ -347,7 +347,7 @@ def test_selected_joint_is_shown_by_a_view_without_a_joint(offscreen):
     np.testing.assert_array_equal(found, wanted)
 
 
-def test_selected_joint_has_a_reserved_name():
+def test_name_of_the_selected_joint_is_reserved():
     actor = two_joints(LEFT_TO_RIGHT).actors[0]
     assert name_for("weight", actor, 2) == "weight:j2"
     assert name_for("weight:j0", actor, 2) == "weight:j0"
@@ -356,7 +356,7 @@ def test_selected_joint_has_a_reserved_name():
     assert name_for("weight", alone(grid_figure()).actors[0], 7) == "weight"
 
 
-def test_same_colour_means_the_same_value_on_all_figures(offscreen):
+def test_same_colour_means_same_value_on_all_figures(offscreen):
     small, large = rising(0.5).actors[0], rising(1.0).actors[0]
     both = Scene([small, large])
     how = Skinning(correctives=False)
@@ -380,7 +380,8 @@ def test_figure_without_the_quantity_is_drawn_normally(offscreen):
     half = together.shape[1] // 2
     np.testing.assert_array_equal(together[:, :half], apart[0][:, :half])
     np.testing.assert_array_equal(together[:, half:], apart[1][:, half:])
-    # With the figure that has it hidden: the other is unchanged, and the legend keeps its title.
+    # If the figure with correctives is hidden, the other is unchanged and the legend keeps its
+    # title.
     having.visible = False
     alone_now = front_view(offscreen, Scene([having, lacking]), scalar="correctives", **colors)
     np.testing.assert_array_equal(alone_now[:, half:], apart[1][:, half:])

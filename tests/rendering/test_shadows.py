@@ -1,4 +1,4 @@
-"""Shadows on the ground and on figures, contact shadows, ambient occlusion, averaged passes."""
+"""Shadows on ground and figures, contact shadows, ambient occlusion, and averaged passes."""
 
 from __future__ import annotations
 
@@ -41,13 +41,13 @@ def draw(offscreen, scene, options, camera, box=GROUND, size=(N, N)):
 def plate(height: float, half: float = 0.25) -> Mesh:
     """Return a horizontal square above the origin."""
     upright = square(half=half, material=WHITE)
-    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y becomes -z, z becomes y
+    turn = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # y is mapped to -z, and z to y
     positions = upright.positions @ turn.T + [0.0, height, 0.0]
     return replace(upright, positions=positions, normals=upright.normals @ turn.T)
 
 
 def from_above() -> object:
-    """Return a camera that sees -2 to 2 of x and z, a unit is 25 pixels; x is right."""
+    """Return a camera that sees -2 to 2 of x and z, with x to the right and 25 pixels per unit."""
     return front(inclination=90.0)
 
 
@@ -55,12 +55,12 @@ def with_shadows(**changes) -> DisplayOptions:
     return plain(**{"quality": "normal", **changes})
 
 
-def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
-    """Light from +x: a plate from -0.25 to 0.25 at height 1 darkens x from -1.25 to -0.75."""
+def test_shadow_of_a_plate_is_cast_by_light_at_45_degrees(offscreen):
+    """With light from +x, a plate from -0.25 to 0.25 at height 1 darkens x from -1.25 to -0.75."""
     light = lights(0.2, 1.0, azimuth=90.0, inclination=45.0, follow_camera=False)
     pixels = draw(offscreen, scene_of(plate(1.0)), with_shadows(lights=light), from_above())
     alpha = pixels[..., 3].astype(float)
-    shadow = alpha[:, :40]  # the plate itself begins at column 43
+    shadow = alpha[:, :40]  # the plate starts at column 43
     dark = shadow > 0.5 * shadow.max()
     rows, columns = np.nonzero(dark)
     assert 60 < shadow.max() < 200
@@ -70,7 +70,7 @@ def test_shadow_of_a_plate_lies_where_light_at_45_degrees_throws_it(offscreen):
 
 
 def test_shadow_falls_on_another_figure(offscreen):
-    """Below a plate, light from straight above reaches a larger plate only around it."""
+    """Light from above reaches the larger, lower plate only around the smaller one."""
     light = lights(0.2, 0.6, inclination=90.0, follow_camera=False)
     scene = scene_of(plate(1.0), plate(0.4, half=1.0))
     options = with_shadows(lights=light)
@@ -79,8 +79,8 @@ def test_shadow_falls_on_another_figure(offscreen):
     shaded = draw(offscreen, scene, options, camera)
     changed = np.abs(lit[..., :3].astype(int) - shaded[..., :3]).max(axis=2) > 40
     solid = (lit[..., 3] == 255) & (shaded[..., 3] == 255)
-    # The shadow has a sixteenth of the large plate's area; the upper plate covers none of it
-    # from this angle: 0.6 / tan 60 = 0.35 units aside, against half a width of 0.25.
+    # The shadow has a sixteenth of the large plate's area. From this angle, the upper plate does
+    # not cover it: its offset is 0.6 / tan 60 = 0.35 units, its half width 0.25.
     share = (changed & solid).sum() / solid.sum()
     assert 0.02 < share < 0.09
 
@@ -99,25 +99,25 @@ def test_surfaces_do_not_shadow_themselves(offscreen):
     assert (difference > 6).mean() < 0.01
 
 
-def test_contact_shadow_is_darkest_below_and_needs_no_light(offscreen):
+def test_contact_shadow_is_darkest_below_the_figure_and_needs_no_light(offscreen):
     options = with_shadows(lights=lights(0.2, 0.0))
     alpha = {
         height: draw(offscreen, scene_of(plate(height)), options, from_above())[50, :, 3]
         for height in (0.005, 1.0)
     }
-    outside = alpha[0.005][57:].astype(int)  # from 0.28 on
+    outside = alpha[0.005][57:].astype(int)  # starting at 0.28
     assert outside[0] > 8 and outside[-1] == 0 and (np.diff(outside) <= 0).all()
     assert (alpha[1.0][57:] == 0).all()
 
 
-def test_ground_below_the_camera_only(offscreen):
+def test_ground_is_drawn_only_below_the_camera(offscreen):
     light = lights(0.2, 1.0, azimuth=90.0, inclination=45.0, follow_camera=False)
     camera = front(inclination=-60.0)
     with_ground = draw(offscreen, scene_of(plate(1.0)), with_shadows(lights=light), camera)
     assert set(np.unique(with_ground[..., 3])) == {0, 255}
 
 
-def test_occlusion_darkens_a_corner_and_no_open_plane(offscreen):
+def test_occlusion_darkens_a_corner_but_not_an_open_plane(offscreen):
     options = plain(quality="final", shadows=False, passes=4, lights=lights(0.5))
     wall, floor = square(half=1.0, material=WHITE), plate(-1.0, half=1.0)
     floor = replace(floor, positions=floor.positions + np.array([0.0, 0.0, 1.0]))
@@ -133,7 +133,7 @@ def test_occlusion_darkens_a_corner_and_no_open_plane(offscreen):
 
 
 def test_averaged_alpha_is_that_of_supersampling(offscreen):
-    """Sixteen passes of one sample against 64: coverage to a sixteenth, on average exactly."""
+    """Sixteen passes of one sample match 64 samples to 1/16 of coverage, on average exactly."""
     scene, camera = scene_of(sphere(32)), front()
     fine = draw(offscreen, scene, plain(), camera, size=(8 * N, 8 * N))[..., 3].astype(float)
     wanted = fine.reshape(N, 8, N, 8).mean(axis=(1, 3))
@@ -151,7 +151,7 @@ def test_averaged_alpha_is_that_of_supersampling(offscreen):
     assert np.abs(often[partial][:, :3] - inner).max() <= 8
 
 
-def test_passes_one_by_one_are_the_picture_of_all(offscreen):
+def test_separate_passes_have_the_average_of_all_passes(offscreen):
     scene, camera, options = scene_of(sphere(24)), front(), plain(quality="final", passes=3)
     wanted = draw(offscreen, scene, options, camera)
     with offscreen.context:
@@ -191,7 +191,7 @@ def test_spheres_of_joints_contain_all_vertices(seed):
 
 
 def test_software_draws_fewer_passes_of_large_pictures(offscreen):
-    """8.3 megapixels are 0.85 units of work per pass: only 2 of 8 passes would be too few."""
+    """8.3 megapixels are 0.85 units of work per pass; 2 of 8 passes would be too few."""
     scene = Scene([])
     found = {}
     for size in ((640, 480), (2400, 1800), (3840, 2160), (8000, 8000)):
@@ -208,7 +208,7 @@ def test_software_draws_fewer_passes_of_large_pictures(offscreen):
     }
 
 
-def test_the_time_of_a_pass_is_measured_once_and_stated_if_all_take_long(offscreen):
+def test_time_of_a_pass_is_measured_once_and_reported_if_all_passes_are_slow(offscreen):
     scene, camera, times = scene_of(sphere(8)), front(), []
     for options in (plain(), plain(quality="final", passes=4)):
         once = offscreen.render(scene, (N, N), camera, options, GROUND)
@@ -236,12 +236,12 @@ def on_ground(n_joints) -> Scene:
 
 @pytest.mark.parametrize("quality", ["normal", "final"])
 def test_figures_of_a_single_joint_have_the_same_shadows(offscreen, quality):
-    """Joints in one place have no extent; the mesh has."""
+    """Coincident joints have no extent, but the mesh has."""
     light = lights(0.3, 1.0, azimuth=60.0, inclination=45.0, follow_camera=False)
     options, camera = with_shadows(quality=quality, lights=light), front(inclination=40.0)
     areas = [
         (draw(offscreen, on_ground(count), options, camera)[..., 3] % 255 > 20).sum()
         for count in (0, 1)
     ]
-    # The shadow map is fitted to spheres around the joints, so its texels are other ones.
+    # The shadow map is fitted to spheres around the joints, so its texels differ.
     assert areas[0] > 50 and areas[1] == pytest.approx(areas[0], rel=0.25)

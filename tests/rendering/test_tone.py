@@ -1,4 +1,4 @@
-"""Scene-linear light on the screen: tone curve and hemisphere ambient light."""
+"""Scene-linear light on the screen, with the tone curve and hemisphere ambient light."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def test_bright_light_follows_the_tone_curve(offscreen, light):
 
 
 def test_scalar_colours_have_no_tone_curve(offscreen):
-    """A normal towards the eye is full blue."""
+    """A normal towards the eye is pure blue."""
     assert draw(offscreen, scene_of(WHITE), plain(shading="normals"))[50, 50, 2] == 255
 
 
 @pytest.mark.parametrize("tilt", [-60.0, 0.0, 30.0, 75.0])
 def test_ambient_light_follows_the_height_of_the_normal(offscreen, tilt):
-    """Light on a slope is ground + (sky - ground) (1 + sin tilt) / 2."""
+    """The light on a slope is ground + (sky - ground) (1 + sin tilt) / 2."""
     sky, ground = np.array([0.2, 0.4, 0.7]), np.array([0.5, 0.3, 0.1])
     angle = math.radians(tilt)
     turned = np.array([[1, 0, 0], [0, math.cos(angle), math.sin(angle)],

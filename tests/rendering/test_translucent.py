@@ -1,4 +1,4 @@
-"""Translucent actors: one layer, regardless of what is inside or behind."""
+"""Translucent actors, drawn as one layer regardless of surfaces inside or behind them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def middle(pixels):
     return pixels[pixels.shape[0] // 2, pixels.shape[1] // 2].tolist()
 
 
-def test_translucent_actor_shows_what_is_opaque_behind_it_but_not_its_own_back(offscreen):
+def test_translucent_actor_shows_opaque_actors_behind_it_but_not_its_back(offscreen):
     scene = scene_of(sphere(), square(z=-2.0, half=3.0))
     options = plain(background="#000000")
     front_only = middle(draw(offscreen, scene_of(sphere()), options))
@@ -22,7 +22,7 @@ def test_translucent_actor_shows_what_is_opaque_behind_it_but_not_its_own_back(o
     scene.actors[0].opacity = 0.25
     seen = middle(draw(offscreen, scene, options))
     expected = 0.25 * np.array(front_only[:3]) + 0.75 * np.array(behind[:3])
-    np.testing.assert_allclose(seen[:3], expected, atol=2)  # of 255: rounding of both images
+    np.testing.assert_allclose(seen[:3], expected, atol=2)  # of 255, for rounding of both images
 
 
 def test_translucent_actors_do_not_show_through_each_other(offscreen):

@@ -38,13 +38,13 @@ def channel(joint: int, path: str, times, values, interpolation: str = "linear",
 
 
 def clip_of(*channels: TransformChannel, name: str = "wave", end: float | None = None):
-    """Return a clip from the first key to the last."""
+    """Return a clip that spans the first to the last key."""
     ends = [time for one in channels for time in one.times[[0, -1]]]
     return TransformClip(name, channels, min(ends), max(ends) if end is None else end)
 
 
 def leg(**parts) -> Figure:
-    """Return three joints stacked a unit apart, with two triangles and two blend shapes.
+    """Return a leg of three joints stacked a unit apart, with two triangles and two blend shapes.
 
     The knee is rotated at rest by 90 degrees about x; the foot is mirrored and enlarged.
     """
@@ -69,7 +69,7 @@ def leg(**parts) -> Figure:
 
 
 def wave() -> TransformClip:
-    """Return a clip with all paths and interpolations, whose channels end at different times."""
+    """Return a clip with all paths and interpolations, in which channels end at different times."""
     slopes = np.zeros((3, 2, 3))
     slopes[1] = [[1.0, 0, 0], [0, 2, 0]]
     return clip_of(
@@ -83,7 +83,7 @@ def wave() -> TransformClip:
 
 
 def bow() -> TransformClip:
-    """Return a shorter clip that only rotates the foot, at frames of 24 per second."""
+    """Return a shorter clip that only rotates the foot, with keys at 24 frames per second."""
     times = np.array([0.0, 1, 5]) / 24.0
     return clip_of(channel(2, "rotation", times, [about(1, a) for a in (0, 10, -50)]), name="bow")
 
@@ -95,7 +95,7 @@ def animated_leg(*clips: TransformClip) -> Figure:
 
 
 def animation(clip: TransformClip) -> Animation:
-    """Return a clip as an animation that is read on first use."""
+    """Return a clip as an animation that is read when it is first used."""
     return Animation(clip.name, clip.start, clip.end, lambda: clip)
 
 

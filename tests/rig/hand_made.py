@@ -1,4 +1,4 @@
-"""Small rigs for tests of the maths, and a plain reference implementation."""
+"""Small rigs for tests of the maths, and a simple reference implementation of skinning."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def skeleton(parents, dofs=(), names=None, offsets=None, boxes=None) -> Skeleton
 
 
 def mesh(positions, normals=None, triangles=((0, 0, 0),)) -> Mesh:
-    """Build a mesh whose normals all point along +z if none are given."""
+    """Build a mesh; normals default to +z."""
     positions = np.array(positions, dtype=float).reshape(-1, 3)
     normals = np.tile([0.0, 0.0, 1.0], (len(positions), 1)) if normals is None else normals
     return Mesh(positions, normals, np.array(triangles, dtype=np.int32).reshape(-1, 3))
@@ -62,7 +62,7 @@ def turn_z(angle):
 
 
 def plain_kinematics(parents, local):
-    """Multiply each joint's chain of matrices separately, from the joint up to its root."""
+    """Multiply the matrices of each joint's chain separately, from the joint up to its root."""
     world = []
     for joint in range(len(parents)):
         product = np.eye(4)
@@ -74,7 +74,7 @@ def plain_kinematics(parents, local):
 
 
 def plain_skinning(positions, normals, influences, palette):
-    """Skin vertex by vertex and influence by influence, literally by the formula."""
+    """Skin vertex by vertex and influence by influence, following the formula literally."""
     out_positions, out_normals = [], []
     for position, normal, pairs in zip(positions, normals, influences, strict=True):
         if not any(weight != 0.0 for _, weight in pairs):

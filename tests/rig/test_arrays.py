@@ -28,7 +28,7 @@ def test_frozen_keeps_a_read_only_array():
     assert frozen("x", values, (2,)) is values
 
 
-def test_frozen_array_refuses_writing():
+def test_frozen_array_cannot_be_written():
     with pytest.raises(ValueError, match="read-only"):
         frozen("x", [1.0], (1,))[0] = 2.0
 
@@ -50,7 +50,7 @@ def test_frozen_converts_lists_and_types():
         ([[0.0, -np.inf]], (1, 2), "x: expected finite numbers, found -inf at index 0, 1"),
     ],
 )
-def test_frozen_error_gives_the_name_and_the_value(values, shape, message):
+def test_error_of_frozen_states_the_name_and_the_value(values, shape, message):
     with pytest.raises(RigError) as caught:
         frozen("x", values, shape)
     assert str(caught.value) == message

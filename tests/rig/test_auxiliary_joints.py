@@ -1,4 +1,4 @@
-"""Auxiliary joints are in no list, label or count; their vertices count as the ancestor's."""
+"""Auxiliary joints, which lists, labels and counts replace by their ancestors."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ from viewer.rig.skinning import Skinning
 
 @pytest.fixture
 def figure():
-    """A hip with an auxiliary joint below it, which carries the knee and moves a vertex."""
+    """A hip with an auxiliary child, which is the parent of the knee and moves a vertex."""
     parents = np.array([-1, 0, 1, 1], dtype=np.int32)
     joints = np.array([[0.0, 0, 0], [0, 0, 0], [0, 1, 0], [0, 0, 0]])
     skeleton = ball_skeleton(("hip", "", "knee", ""), parents, joints)
@@ -34,19 +34,19 @@ def figure():
     return Figure("leg", mesh, skeleton, skin)
 
 
-def test_lists_leave_them_out(figure):
+def test_lists_omit_auxiliary_joints(figure):
     skeleton = figure.skeleton
     assert shown_joints(skeleton).tolist() == [0, 2]
     assert shown_joint_of(skeleton).tolist() == [0, 0, 2, 0]
     assert shown_parents(skeleton).tolist() == [-1, 0, 0, 0]
 
 
-def test_labels_are_those_of_their_ancestors(figure):
+def test_labels_of_auxiliary_joints_are_those_of_their_ancestors(figure):
     assert joint_labels(figure.skeleton) == ("hip", "hip", "knee", "hip")
     assert joint_label(figure.skeleton, 3) == "hip"
 
 
-def test_their_influences_are_those_of_their_ancestors(figure):
+def test_influences_of_auxiliary_joints_are_those_of_their_ancestors(figure):
     facts = vertex_facts(figure, None, Skinning(), 0)
     assert facts.names == ("hip",)
     assert facts.weights.tolist() == [1.0]

@@ -1,4 +1,4 @@
-"""Weighted offsets: blend shapes, pose correctives, and joints that follow the mesh."""
+"""Weighted offsets: blend shapes, pose correctives, and joints regressed from the mesh."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,7 @@ def test_displacement_is_the_weighted_sum():
     assert found.tolist() == [[2, 4, -4], [8, 4, 0]]
 
 
-def test_missing_weights_count_as_zero():
+def test_missing_weights_are_zero():
     assert shapes().displacement(np.array([3.0])).tolist() == [[3, 0, 0], [0, 6, 0]]
     assert shapes().displacement(np.zeros(0)).tolist() == [[0, 0, 0]] * 2
 
@@ -74,7 +74,7 @@ def counted(values):
     return Deferred(values.shape, values.dtype, load), loads
 
 
-def test_deferred_offsets_are_read_once_and_only_for_a_weight_that_is_not_zero():
+def test_deferred_offsets_are_read_once_and_only_for_nonzero_weights():
     deferred, loads = counted(OFFSETS)
     lazy = shapes(offsets=deferred)
     lazy.displacement(np.zeros(3))
@@ -87,12 +87,12 @@ def test_deferred_offsets_are_read_once_and_only_for_a_weight_that_is_not_zero()
 def test_corrective_weights_are_rotation_entries_minus_the_identity():
     rotations = np.array([turn_x(0.3), turn_z(np.pi / 2), np.eye(3)])
     found = corrective_weights(rotations)
-    # Rz(90) is ((0,-1,0), (1,0,0), (0,0,1)); the root does not count.
+    # Rz(90) is ((0,-1,0), (1,0,0), (0,0,1)); the root has no weights.
     assert_allclose(found[:9], [-1, -1, 0, 1, -1, 0, 0, 0, 0], atol=1e-15)
     assert found[9:].tolist() == [0] * 9
 
 
-def test_a_root_alone_has_no_corrective_weights():
+def test_single_root_has_no_corrective_weights():
     assert corrective_weights(turn_x(1.0)[None]).shape == (0,)
 
 
@@ -133,7 +133,7 @@ def test_deferred_correctives_are_read_when_a_joint_rotates():
     assert np.array_equal(lazy.values(), offsets)
 
 
-def test_correctives_need_nine_rows_a_joint():
+def test_correctives_require_nine_rows_per_joint():
     with pytest.raises(RigError) as caught:
         Correctives(np.zeros((10, 2, 3)))
     assert str(caught.value) == "offsets: expected nine for each joint except the root, found 10"
@@ -150,7 +150,7 @@ def test_sparse_regression_matches_the_dense_matrix():
     assert_allclose(regress_joints(regressor, positions), dense @ positions, atol=1e-14)
 
 
-def test_entries_listed_twice_add_up():
+def test_entries_listed_twice_are_added():
     regressor = JointRegressor(1, [0, 0], [1, 1], [0.25, 0.5])
     assert regress_joints(regressor, np.array([[9.0, 9, 9], [4, 8, 0]])).tolist() == [[3, 6, 0]]
 

@@ -16,7 +16,7 @@ def load(shared, name):
     return viewer.load(shared / f"{name}.skel", shared / f"{name}.skin").actors[0].figure
 
 
-def test_robot_knee(shared):
+def test_robot_knee_has_the_check_values(shared):
     robot = viewer.load(shared / "test.skel").actors[0].figure.skeleton
     pose = rest_pose(robot)
     assert robot.names[5] == "knee_r"
@@ -26,7 +26,7 @@ def test_robot_knee(shared):
     assert_allclose(knee[0, :3], [0.995004, -0.090778, -0.041545], atol=PRINTED)
 
 
-def test_wasp_with_all_dofs_zero(shared):
+def test_wasp_with_all_dofs_zero_has_the_check_values(shared):
     wasp = load(shared, "wasp")
     pose = rest_pose(wasp.skeleton)
     pose.dofs[:] = 0.0
@@ -35,7 +35,7 @@ def test_wasp_with_all_dofs_zero(shared):
     assert_allclose(box, [low, high], atol=PRINTED)
 
 
-def test_wasp_in_its_file_pose(shared):
+def test_wasp_in_its_file_pose_has_the_check_values(shared):
     wasp = load(shared, "wasp")
     positions, _ = viewer.deform(wasp, rest_pose(wasp.skeleton))
     low, high = [-1.149258, -0.962391, -0.84758], [1.149702, 0.611065, 2.006119]
@@ -43,7 +43,7 @@ def test_wasp_in_its_file_pose(shared):
     assert_allclose(positions[693], [-0.194991, 0.027316, -0.187903], atol=PRINTED)
 
 
-def test_tube_in_its_file_pose(shared):
+def test_tube_in_its_file_pose_has_the_check_values(shared):
     tube = load(shared, "tube")
     positions, normals = viewer.deform(tube, rest_pose(tube.skeleton))
     assert_allclose(positions[0], [0.474766, -0.186004, 0], atol=PRINTED)
@@ -60,7 +60,8 @@ def test_all_skinning_matrices_are_one_translation_at_zero_dofs(shared, name, mo
     palette = world_matrices(figure.skeleton, pose) @ figure.skin.inverse_bind
     expected = np.eye(4)
     expected[:3, 3] = move
-    assert_allclose(palette, np.tile(expected, (len(palette), 1, 1)), atol=1e-5)  # spec: spread
+    # Spread given in the specification.
+    assert_allclose(palette, np.tile(expected, (len(palette), 1, 1)), atol=1e-5)
 
 
 @pytest.mark.parametrize("name", ["wasp", "tube", "test"])

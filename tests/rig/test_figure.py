@@ -15,7 +15,7 @@ SHAPE = mesh([[0, 0, 0], [1, 0, 0]])
 SKIN = skin_from_lists([[(0, 1.0)], [(0, 1.0)]], ONE)
 
 
-def test_figure_needs_a_mesh_or_a_skeleton():
+def test_figure_requires_a_mesh_or_a_skeleton():
     assert not Figure("a", mesh=SHAPE).is_attached
     assert not Figure("a", skeleton=skeleton([-1])).is_attached
     assert not Figure("a", mesh=SHAPE, skin=SKIN).is_attached
@@ -41,7 +41,7 @@ def test_figure_needs_a_mesh_or_a_skeleton():
         ),
     ],
 )
-def test_figure_refuses_parts_that_do_not_fit(parts, message):
+def test_figure_refuses_inconsistent_parts(parts, message):
     with pytest.raises(RigError) as caught:
         Figure("a", **parts)
     assert str(caught.value) == message

@@ -18,11 +18,11 @@ def test_vectors_are_the_mean_plus_the_weighted_components():
     assert_allclose(found, [[2.1, -2.8, 0.3], [0.4, 4.5, 0.6]], atol=1e-15)
 
 
-def test_flat_hand_leaves_the_mean_out():
+def test_flat_hand_omits_the_mean():
     assert hand_vectors(HAND, np.array([2.0, -1.0]), flat=True).tolist() == [[2, -3, 0], [0, 4, 0]]
 
 
-def test_empty_coefficients_give_the_mean_hand():
+def test_empty_coefficients_return_the_mean_hand():
     assert hand_vectors(HAND, np.zeros(0), flat=False).ravel().tolist() == MEAN
     assert hand_vectors(HAND, np.zeros(0), flat=True).tolist() == [[0, 0, 0]] * 2
 
@@ -44,8 +44,9 @@ def test_coefficients_round_trip(flat):
         assert_allclose(hand_coefficients(hand, vectors, flat, count), wanted, atol=1e-12)
 
 
-def test_coefficients_give_the_nearest_representable_hand():
-    # Of (5, 7, 0, 0, 0, 0) component 0, of length sqrt 5, holds 5 / 5 and component 1 holds 7 / 3.
+def test_coefficients_represent_the_nearest_hand():
+    # For (5, 7, 0, 0, 0, 0), the coefficient of component 0, of length sqrt 5, is 5 / 5, and that
+    # of component 1 is 7 / 3.
     vectors = np.array([[5.0, 7, 0], [0, 0, 0]])
     assert_allclose(hand_coefficients(HAND, vectors, True, 1), [1.0], atol=1e-14)
     assert_allclose(hand_coefficients(HAND, vectors, True, 2), [1.0, 7 / 3], atol=1e-14)
@@ -59,7 +60,7 @@ def test_coefficients_give_the_nearest_representable_hand():
         (([[np.nan] * 6], MEAN), "hands_components: expected finite numbers, found nan at index 0"),
     ],
 )
-def test_hand_refuses_parts_that_do_not_fit(parts, message):
+def test_hand_refuses_inconsistent_parts(parts, message):
     with pytest.raises(RigError) as caught:
         Hand("left", [7, 8], *parts)
     assert str(caught.value).startswith(message)

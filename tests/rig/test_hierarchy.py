@@ -1,4 +1,4 @@
-"""Cycles among parents, compared with a walk from every joint."""
+"""Cycles among parents, compared with a traversal from every joint."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from viewer.rig.hierarchy import cycle_members
 
 
 def walks_back(parents: list[int], joint: int) -> bool:
-    """Return whether a walk up the hierarchy from a joint returns to it."""
+    """Return whether the chain of parents of a joint returns to the joint."""
     at = joint
     for _ in parents:
         at = parents[at] if 0 <= at < len(parents) else -1
@@ -26,12 +26,12 @@ def test_cycle_members_are_their_own_ancestors(seed: int) -> None:
     assert cycle_members(parents).tolist() == expected
 
 
-def test_invalid_index_is_not_a_parent() -> None:
+def test_invalid_index_counts_as_no_parent() -> None:
     parents = np.array([-1.0, 0.5, np.nan, 99.0, -7.0, 5.0])
     assert cycle_members(parents).tolist() == [False] * 5 + [True]
 
 
-def test_a_long_cycle() -> None:
+def test_long_cycle_is_found() -> None:
     parents = np.roll(np.arange(1000), 1)
     assert cycle_members(parents).all()
     parents[0] = -1

@@ -26,14 +26,14 @@ def test_keypoint_on_a_triangle_is_the_weighted_mean_of_its_corners():
     assert found.tolist() == [[1, 2, 0], [0, 0, 16]]
 
 
-def test_keypoint_at_a_joint_follows_it_whatever_its_corners():
+def test_keypoint_at_a_joint_follows_the_joint_and_ignores_corners():
     points = Keypoints(("a", "b"), [1, 0], [[3, 3, 3], [0, 0, 0]], [[1, 0, 0], [0, 0, 0]])
     joints = np.array([[7.0, 8, 9], [1, 2, 3]])
     assert keypoint_positions(points, CORNERS, joints).tolist() == [[1, 2, 3], [7, 8, 9]]
 
 
 def arm() -> Figure:
-    """Return a square over two joints, the second of which is at (4, 0, 0)."""
+    """Return a square bound to two joints, the second at (4, 0, 0)."""
     bones = skeleton([-1, 0], [(0, "tx", 0.0), (1, "z", 0.0)], offsets=[[0] * 3, [4, 0, 0]])
     bind = np.array([np.eye(4), matrix(None, (-4, 0, 0))])
     ties = [[(0, 1.0)], [(0, 1.0)], [(1, 1.0)], [(1, 1.0)]]
@@ -103,7 +103,7 @@ def test_subset_of_vertices_moves_as_in_the_whole_figure(tmp_path):
     assert_allclose(deform(part, pose)[0], deform(figure, pose)[0][chosen], atol=1e-14)
 
 
-def test_keypoints_read_no_more_of_the_file_than_they_need(tmp_path):
+def test_keypoints_read_only_the_required_part_of_the_file(tmp_path):
     figure = family_figure("smplx", tmp_path)
     posed_keypoints(figure, figure_pose(figure))
     assert not figure.blend_shapes.offsets.is_loaded

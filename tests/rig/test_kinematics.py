@@ -25,7 +25,7 @@ def test_chain_equals_the_direct_product(n_joints):
     parents = np.arange(-1, n_joints - 1, dtype=np.int32)
     local = random_locals(n_joints, n_joints)
     expected = plain_kinematics(parents, local)
-    # Offsets are at most 1.8 long, so 62 of them add up to 110: rounding stays below 1e-12.
+    # Offsets are at most 1.8 long, so 62 of them add up to 110, and rounding stays below 1e-12.
     assert_allclose(forward_kinematics(parents, local), expected, atol=1e-12)
 
 
@@ -34,10 +34,11 @@ def test_chain_of_1000_equals_the_direct_product():
     parents = np.arange(-1, 999, dtype=np.int32)
     local = random_locals(1000, 7)
     world, expected = forward_kinematics(parents, local), plain_kinematics(parents, local)
-    assert_allclose(world, expected, atol=1e-10)  # 1000 products of rounding 1e-16 and length 1000
+    # 1000 products with rounding of 1e-16 at lengths of 1000.
+    assert_allclose(world, expected, atol=1e-10)
 
 
-def test_chain_of_unit_offsets_adds_up():
+def test_chain_of_unit_offsets_has_their_sum():
     parents = np.arange(-1, 999, dtype=np.int32)
     local = np.tile(matrix(None, (1.0, 0, 0)), (1000, 1, 1))
     assert forward_kinematics(parents, local)[:, 0, 3].tolist() == list(range(1, 1001))
@@ -47,7 +48,7 @@ def test_chain_of_unit_offsets_adds_up():
 def test_random_tree_equals_the_direct_product(seed):
     rng = np.random.default_rng(seed)
     n_joints = int(rng.integers(1, 80))
-    # A few joints become further roots.
+    # A few joints become additional roots.
     parents = np.array([int(rng.integers(-1, joint)) if joint else -1 for joint in range(n_joints)])
     local = random_locals(n_joints, seed + 100)
     expected = plain_kinematics(parents, local)
@@ -62,7 +63,7 @@ def test_star_equals_the_direct_product():
     )
 
 
-def test_root_placement_comes_before_everything():
+def test_root_placement_is_applied_last():
     parents = np.array([-1, 0, -1], dtype=np.int32)
     local = random_locals(3, 1)
     root = matrix(turn_y(0.5), (1, 2, 3))
@@ -70,7 +71,7 @@ def test_root_placement_comes_before_everything():
     assert_allclose(forward_kinematics(parents, local, root), expected, atol=1e-14)
 
 
-def test_forward_kinematics_changes_neither_argument():
+def test_forward_kinematics_does_not_modify_its_arguments():
     parents = np.array([-1, 0, 1], dtype=np.int32)
     local = random_locals(3, 2)
     before = local.copy()

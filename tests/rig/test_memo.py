@@ -13,7 +13,7 @@ class Owner:
     """An object that supports weak references."""
 
 
-def test_a_result_is_made_once() -> None:
+def test_result_is_computed_once() -> None:
     memo: Memo[Owner, list[int]] = Memo()
     owner, made = Owner(), []
     for _ in range(3):
@@ -21,7 +21,7 @@ def test_a_result_is_made_once() -> None:
     assert made == [1]
 
 
-def test_the_oldest_result_is_evicted() -> None:
+def test_oldest_result_is_evicted() -> None:
     memo: Memo[Owner, int] = Memo(kept=2)
     owner, made = Owner(), []
 
@@ -42,8 +42,8 @@ def test_results_are_freed_with_their_owner() -> None:
     assert gone() is None
 
 
-def test_threads_evicting_each_other_get_their_own_results() -> None:
-    """One result is kept, and a second thread requests another one while the first is computed."""
+def test_threads_that_evict_results_of_other_threads_get_correct_results() -> None:
+    """The memo stores one result; a second thread requests another while the first is computed."""
     memo: Memo[Owner, str] = Memo(kept=1)
     owner, inside, go = Owner(), threading.Event(), threading.Event()
     found: list[str] = []

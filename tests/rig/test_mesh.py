@@ -22,7 +22,7 @@ def test_mesh_counts_vertices_and_triangles():
     assert (square.n_vertices, square.n_triangles) == (4, 2)
 
 
-def test_mesh_without_materials_gives_every_triangle_none():
+def test_mesh_without_materials_has_no_material_for_every_triangle():
     assert mesh(SQUARE, triangles=[[0, 1, 2], [0, 2, 3]]).material_indices.tolist() == [-1, -1]
 
 
@@ -44,14 +44,14 @@ def test_mesh_may_be_empty():
         ({"triangle_materials": [0, 0]}, "triangle_materials: expected shape 1, found 2"),
     ],
 )
-def test_mesh_refuses_parts_that_do_not_fit(changes, message):
+def test_mesh_refuses_inconsistent_parts(changes, message):
     parts = {"positions": SQUARE, "normals": UP, "triangles": [[0, 1, 2]], **changes}
     with pytest.raises(RigError) as caught:
         Mesh(**parts)
     assert str(caught.value) == message
 
 
-def test_material_texture_needs_four_channels():
+def test_material_texture_requires_four_channels():
     with pytest.raises(RigError) as caught:
         Texture("a.png", np.zeros((2, 2, 3), np.uint8))
     assert str(caught.value) == "image: expected shape any x any x 4, found 2 x 2 x 3"
@@ -74,7 +74,7 @@ def test_triangle_areas_are_half_base_times_height():
 
 
 def test_vertex_normals_are_weighted_by_area():
-    # One vertex of a triangle of area 2 facing +z and one of area 1/2 facing +x.
+    # One vertex is shared by a triangle of area 2 facing +z and one of area 1/2 facing +x.
     positions = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 1, 0], [0, 0, 1]])
     normals = vertex_normals(positions, np.array([[0, 1, 2], [0, 3, 4]]))
     assert_allclose(normals[0], np.array([0.5, 0, 2]) / np.hypot(0.5, 2), atol=1e-15)
@@ -82,7 +82,7 @@ def test_vertex_normals_are_weighted_by_area():
     assert normals[4].tolist() == [1, 0, 0]
 
 
-def test_vertex_normals_point_up_for_zero_area():
+def test_vertex_normals_of_zero_area_point_up():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [7, 7, 7]])
     normals = vertex_normals(positions, np.array([[0, 1, 2]]))
     assert normals.tolist() == [[0, 1, 0]] * 4

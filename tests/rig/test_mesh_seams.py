@@ -1,4 +1,4 @@
-"""Seams: one vertex with several texture coordinates; and the volume that a mesh encloses."""
+"""Seams, at which a vertex has several texture coordinates, and the volume enclosed by a mesh."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_cube_is_split_once_per_face_corner():
     check_split(cube)
 
 
-def test_coordinates_that_follow_the_vertices_split_nothing():
+def test_coordinates_that_follow_the_vertices_split_no_vertex():
     cube = build(uvs=np.zeros((8, 2)), uv_triangles=CUBE)
     assert len(split_seams(cube)[0]) == 8
     check_split(cube)
@@ -58,7 +58,7 @@ def test_mesh_with_one_coordinate_per_vertex_is_unchanged():
         assert triangles is cube.triangles
 
 
-def test_vertices_without_triangles_stay():
+def test_vertices_without_triangles_are_kept():
     positions = np.vstack([[[9.0, 9, 9]], CORNERS, [[8.0, 8, 8]]])
     uvs, corners = atlas()
     cube = build(positions, CUBE + 1, uvs=uvs, uv_triangles=corners)
@@ -70,7 +70,7 @@ def test_vertices_without_triangles_stay():
 
 
 def test_one_seam_doubles_the_vertices_along_it():
-    # A strip of two squares bent to a ring: vertices 0 and 1 are at both ends of the texture.
+    # A strip of two squares is bent into a ring; vertices 0 and 1 are at both ends of the texture.
     ring = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [4, 0, 5], [5, 0, 1]])
     in_picture = np.array([[0, 2, 1], [1, 2, 3], [2, 4, 3], [3, 4, 5], [4, 6, 5], [5, 6, 7]])
     mesh = Mesh(
@@ -99,7 +99,7 @@ def test_random_seams_keep_every_corner(seed):
     assert np.array_equal(uv_indices[triangles], mesh.uv_triangles)
 
 
-def test_no_triangles_split_nothing():
+def test_mesh_without_triangles_is_not_split():
     none = np.zeros((0, 3), np.int32)
     mesh = Mesh(CORNERS, CORNERS, none, uvs=np.zeros((2, 2)), uv_triangles=none)
     sources, uv_indices, triangles = split_seams(mesh)
@@ -123,7 +123,7 @@ def test_no_triangles_split_nothing():
         ({"uvs": np.zeros((9, 2))}, "uvs: expected shape 8 x 2, found 9 x 2"),
     ],
 )
-def test_mesh_refuses_texture_coordinates_that_do_not_fit(changes, message):
+def test_mesh_refuses_inconsistent_texture_coordinates(changes, message):
     with pytest.raises(RigError) as caught:
         build(**changes)
     assert str(caught.value) == message
@@ -138,9 +138,9 @@ def test_volume_of_clockwise_triangles_is_negative():
     assert volume(CORNERS, CUBE[:, ::-1]) == pytest.approx(-1.0, abs=1e-15)
 
 
-def test_volume_far_from_the_origin_keeps_its_digits():
+def test_volume_far_from_the_origin_is_accurate():
     box = CORNERS * [2.0, 3.0, 0.7] + [1e6 / 3, -3e6 / 7, 1e6]
-    # Positions 1e6 away are rounded to 1e-10; without a shift, cubes of 1e6 would be to 100.
+    # Positions 1e6 away are rounded to 1e-10; without a shift, their cubes would be rounded to 100.
     assert volume(box, CUBE) == pytest.approx(4.2, abs=1e-8)
 
 
@@ -160,7 +160,7 @@ def test_split_vertices_are_the_distinct_pairs_in_ascending_order(seed: int) -> 
     assert uv_indices.tolist()[: len(pairs)] == [uv for _, uv in pairs]
 
 
-def test_hole_far_from_the_origin_does_not_count_as_volume():
+def test_hole_far_from_the_origin_adds_no_volume():
     # Without the top, a sixth of the cube is missing: the pyramid from its middle.
     open_cube = np.array([t for t in CUBE.tolist() if not set(t) <= {1, 5, 7, 3}])
     for shift in (0.0, 1e4):

@@ -1,4 +1,4 @@
-"""Morphs: absolute targets as blend shapes, normals by the same formula, then skinning."""
+"""Morphs: conversion of absolute targets to blend shapes, morphed normals, and skinning."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def test_targets_are_absolute_and_reached_at_weight_1():
     assert changed.mesh.normals.tolist() == [[0, 0, 1], [0, 0, 2], [0, 1, 0]]
 
 
-def test_several_weights_add_up_from_the_base():
+def test_several_weighted_morphs_are_added_to_the_base():
     changed = shaped(with_morphs(figure(), [LIFTED, WIDE]), np.array([0.5, 2.0]))
     # Vertex 2: (0,1,0) + 0.5 (0,0,4) + 2 (0,2,0); vertex 1: (1,0,0) + 2 (4,0,0).
     assert changed.mesh.positions.tolist() == [[0, 0, 0], [9, 0, 0], [0, 5, 2]]
@@ -64,7 +64,7 @@ def test_skinning_rotates_the_morphed_normals_then_normalises_them():
         assert_allclose(found, right, atol=1e-14)
 
 
-def test_joints_bindings_and_weights_of_0_stay():
+def test_joints_bindings_and_zero_weights_are_unchanged():
     plain = figure()
     whole = with_morphs(plain, [WIDE])
     assert shaped(whole, np.zeros(1)) is whole
@@ -92,7 +92,7 @@ def test_additional_morphs_are_appended():
     assert_array_equal(one_by_one.normal_offsets, together.normal_offsets)
 
 
-def test_no_targets_return_the_figure_itself():
+def test_figure_is_unchanged_without_targets():
     plain = figure()
     assert with_morphs(plain, []) is plain
 
@@ -107,7 +107,7 @@ def test_vertex_outside_the_mesh_is_refused_with_index_and_count(index):
     assert caught.value.diagnostic.values == values
 
 
-def test_figures_without_mesh_or_with_shapes_of_their_own_are_refused():
+def test_figures_without_mesh_or_with_other_shapes_are_refused():
     with pytest.raises(RigError) as caught:
         with_morphs(figure(mesh=None, skin=None), [LIFTED])
     assert caught.value.diagnostic.key == "F004.morph-mesh"
@@ -138,7 +138,7 @@ def test_normal_offsets_may_be_read_lazily():
     assert len(asked) == 1
 
 
-def test_normal_offsets_of_another_shape_are_refused():
+def test_normal_offsets_with_a_different_array_shape_are_refused():
     with pytest.raises(RigError) as caught:
         BlendShapes(("a",), np.zeros((1, 3, 3)), (), np.zeros((1, 2, 3)))
     assert str(caught.value) == "normal_offsets: expected shape (1, 3, 3), found (1, 2, 3)"
@@ -153,7 +153,7 @@ def test_recorded_pose_restores_morph_weights():
     assert other.shape_weights.tolist() == [0.25, 0.75]
 
 
-def test_further_targets_keep_the_weights_of_the_file():
+def test_additional_targets_keep_the_weights_of_the_file():
     first = with_morphs(figure(), [LIFTED]).blend_shapes
     known = BlendShapes(
         first.names, first.offsets, first.groups, first.normal_offsets, np.array([0.5])
@@ -161,6 +161,6 @@ def test_further_targets_keep_the_weights_of_the_file():
     both = with_morphs(figure(blend_shapes=known), [WIDE])
     assert both.blend_shapes.names == ("lifted", "wide")
     assert figure_pose(both).shape_weights.tolist() == [0.5, 0.0]
-    # A pose that is not given is that of the file.
+    # If no pose is given, the figure has that of the file.
     assert_array_equal(deform(both)[0], deform(both, figure_pose(both))[0])
     assert deform(both)[0][2].tolist() == [0.0, 1.0, 2.0]

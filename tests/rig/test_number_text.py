@@ -1,4 +1,4 @@
-"""Numbers as text: no minus before a zero."""
+"""Numbers as text, without negative zeros."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from viewer.rig.number_text import angle_text, number_text, short_number
         (-30.0, ".0f", "-30"),
     ],
 )
-def test_zero_has_no_minus(value, spec, text):
+def test_zero_has_no_minus_sign(value, spec, text):
     assert number_text(value, spec) == text
 
 

@@ -42,8 +42,8 @@ def test_local_matrix_matches_the_documented_one(angles):
     assert_allclose(local[0], printed_matrix(*angles, (1.0, -2.0, 3.0)), atol=ROUNDING)
 
 
-def test_quarter_turns_about_x_then_y_then_z_match_hand_calculation():
-    # z axis: x rotates it to -y, y preserves it, z rotates -y to +x.
+def test_rotations_by_90_degrees_about_x_then_y_then_z_match_hand_calculation():
+    # For the z axis, x rotates it to -y, y preserves that, and z rotates -y to +x.
     joint = euler_joint("xyz", [math.pi / 2] * 3)
     local = local_matrices(joint, rest_pose(joint))[0]
     assert_allclose(local[:3, :3] @ [0, 0, 1], [1, 0, 0], atol=ROUNDING)
@@ -67,7 +67,7 @@ def test_dof_rows_of_several_joints_may_be_interleaved():
     assert_allclose(local[1], matrix(turn_x(-0.7) @ turn_z(0.3), (5, 1, 1)), atol=ROUNDING)
 
 
-def test_translation_dofs_are_added_to_the_offset_unrotated():
+def test_translation_dofs_are_added_to_the_offset_without_rotation():
     rows = [(0, "tx", 1.0), (0, "z", math.pi / 2), (0, "ty", 2.0), (0, "tz", 3.0), (0, "tx", 0.5)]
     joint = skeleton([-1], rows, offsets=[[10, 20, 30]])
     local = local_matrices(joint, rest_pose(joint))[0]
@@ -97,7 +97,7 @@ def test_rest_pose_is_clamped():
     assert rest_pose(joint).dofs.tolist() == [-2, 0, 1]
 
 
-def test_rest_poses_share_nothing_with_each_other_or_the_skeleton():
+def test_rest_poses_share_no_array_with_each_other_or_the_skeleton():
     joint = euler_joint("x", [0.5])
     pose = rest_pose(joint)
     pose.dofs[0] = pose.translations[0, 0] = 7.0

@@ -1,4 +1,4 @@
-"""World and skinning matrices of a pose: correct, computed once, and up to date."""
+"""World and skinning matrices of a pose: correctness, single computation, and invalidation."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import pose_key, pose_of
 
 ARRAYS = ("dofs", "translations", "rotations", "scales", "shape_weights")
-ORDER = 1e-14  # rounding: matrices of many poses are multiplied in another order
+ORDER = 1e-14  # rounding, because matrices of many poses are multiplied in a different order
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def actor():
 
 @pytest.fixture
 def runs(monkeypatch):
-    """Counts the runs of forward kinematics."""
+    """A counter of the runs of forward kinematics."""
     counted, run = [], kinematics.forward_kinematics
 
     def count(*args):
@@ -54,7 +54,7 @@ def test_kinematics_run_once_until_a_value_changes(actor, runs):
     skeleton, pose = actor.figure.skeleton, actor.pose
     first = posed_skeleton(skeleton, pose)
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
-    pose.figure_translation[0] += 1.0  # applied after skinning
+    pose.figure_translation[0] += 1.0  # placement is applied after skinning
     pose.figure_scale = 2.0
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 1
 
@@ -72,7 +72,7 @@ def test_every_joint_value_invalidates_the_cache(actor, name):
     assert_array_equal(posed_skeleton(skeleton, pose).world, first.world)
 
 
-def test_another_skeleton_or_skin_has_its_own_matrices(actor):
+def test_different_skeleton_or_skin_has_separate_matrices(actor):
     figure, pose = actor.figure, actor.pose
     longer = replace(figure.skeleton, rest_translations=2.0 * figure.skeleton.rest_translations)
     first = posed_skeleton(figure.skeleton, pose)
@@ -88,7 +88,7 @@ def test_matrices_are_read_only(actor):
             matrices[0] = 0.0
 
 
-def test_copies_of_a_pose_keep_their_own(actor, runs):
+def test_copied_poses_have_separate_matrices(actor, runs):
     skeleton, pose = actor.figure.skeleton, actor.pose
     first, copy = posed_skeleton(skeleton, pose), pose.copy()
     copy.dofs[0] += 0.5
@@ -96,7 +96,7 @@ def test_copies_of_a_pose_keep_their_own(actor, runs):
     assert posed_skeleton(skeleton, pose) is first and len(runs) == 2
 
 
-def test_poses_computed_together_keep_theirs(actor, runs):
+def test_poses_computed_together_cache_their_matrices(actor, runs):
     skeleton, poses = actor.figure.skeleton, [actor.pose.copy() for _ in range(3)]
     for row, pose in enumerate(poses):
         pose.dofs[:] *= row
@@ -138,7 +138,7 @@ def test_keys_distinguish_array_layouts_and_sizes():
     assert hash(key) == hash(NumberKey(square[:, ::2], np.zeros(0))) and key != 1
 
 
-def test_updated_keys_keep_the_old_contents():
+def test_old_keys_keep_their_contents_after_an_update():
     first, second = np.arange(3.0), np.arange(2.0)
     key = NumberKey(first, second)
     second[1] = -0.0

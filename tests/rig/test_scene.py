@@ -12,7 +12,7 @@ def cloud(points) -> Actor:
     return Actor(Figure("cloud", mesh=mesh(points)))
 
 
-def test_actor_takes_the_rest_pose_of_its_figure():
+def test_actor_starts_in_the_rest_pose_of_its_figure():
     actor = Actor(Figure("a", skeleton=skeleton([-1], [(0, "x", 0.5)])))
     assert actor.pose.dofs.tolist() == [0.5]
     assert cloud([[0, 0, 0]]).pose is None
@@ -26,7 +26,7 @@ def test_actors_of_one_figure_move_independently():
     assert actor_points(first).tolist() == [[5, 0, 0]]
 
 
-def test_actor_points_are_placed():
+def test_actor_points_include_the_placement():
     actor = cloud([[1, 2, 3]])
     actor.placement = translation_matrix(np.array([10.0, 0, 0]))
     assert actor_points(actor).tolist() == [[11, 2, 3]]
@@ -39,11 +39,11 @@ def test_scene_box_spans_visible_actors_only():
     assert scene_box(Scene([near, far])).tolist() == [[0, 0, 0], [1, 1, 1]]
 
 
-def test_scene_box_of_nothing_is_the_origin():
+def test_scene_box_of_an_empty_scene_is_the_origin():
     assert scene_box(Scene([])).tolist() == [[0, 0, 0], [0, 0, 0]]
 
 
-def test_scene_box_leaves_out_a_stray_vertex():
+def test_scene_box_ignores_a_stray_vertex():
     points = np.stack([np.linspace(0, 1, 5000)] * 3, axis=1)
     points[17] = 1e30, 0, 0
     box = scene_box(Scene([cloud(points)]))
@@ -81,14 +81,14 @@ def test_actor_without_pose_or_motion_is_reported():
     [
         ("m", 1.0, 1.0, "m"),
         ("cm", 1.0, 1.0, "cm"),
-        ("cm", 0.01, 1.0, "m"),  # placed in metres
-        ("cm", 1.0, 0.01, "m"),  # posed in metres
+        ("cm", 0.01, 1.0, "m"),  # placed with a scale to metres
+        ("cm", 1.0, 0.01, "m"),  # posed with a scale to metres
         ("m", 1.0, 1.3, "m"),  # enlarged by the user
         ("m", 1.3, 1.0, ""),
         ("", 1.0, 1.0, ""),
     ],
 )
-def test_unit_of_the_scene_is_that_of_the_placed_figure(unit, placed, posed, expected):
+def test_scene_unit_is_that_of_the_placed_figure(unit, placed, posed, expected):
     figure = Figure("a", skeleton=skeleton([-1], []), unit=unit)
     actor = Actor(figure, placement=np.diag([placed, placed, placed, 1.0]))
     actor.pose.figure_scale = posed

@@ -1,4 +1,4 @@
-"""Shapes: joints and bindings follow the rest mesh, which the rest pose reproduces."""
+"""Shapes of the rest mesh, which joints and bindings follow and the rest pose reproduces."""
 
 import gc
 import weakref
@@ -17,7 +17,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import figure_pose
-from viewer.rig.shape import rest_joints, rest_positions, shaped, with_rest_mesh
+from viewer.rig.shape import rest_joints, rest_positions, shaped, shaped_skeleton, with_rest_mesh
 from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import deform
 
@@ -50,7 +50,7 @@ def arm(**changes) -> Figure:
 
 def test_shape_moves_vertices_joints_and_bindings():
     changed = shaped(arm(), np.array([1.0, 3.0]))
-    # Vertex 3 goes by (2, 3, 0), the others by (0, 3, 0); joint 1 is the mean of 2 and 3.
+    # Vertex 3 moves by (2, 3, 0), the others by (0, 3, 0); joint 1 is the mean of vertices 2 and 3.
     assert changed.mesh.positions.tolist() == [[0, 2, 0], [0, 4, 0], [4, 2, 0], [6, 4, 0]]
     assert rest_joints(changed).tolist() == [[0, 3, 0], [5, 3, 0]]
     assert changed.skeleton.rest_translations.tolist() == [[0, 3, 0], [5, 0, 0]]
@@ -59,7 +59,7 @@ def test_shape_moves_vertices_joints_and_bindings():
 
 def test_shaped_normals_are_those_of_the_new_surface():
     directions = np.zeros((1, 4, 3))
-    directions[0, [2, 3], 2] = 4.0  # the square leans: z = x
+    directions[0, [2, 3], 2] = 4.0  # the square is tilted: z = x
     figure = arm(blend_shapes=BlendShapes(("lean",), directions))
     normals = shaped(figure, np.array([1.0])).mesh.normals
     assert_allclose(normals, np.tile([-np.sqrt(0.5), 0, np.sqrt(0.5)], (4, 1)), atol=1e-15)
@@ -79,14 +79,14 @@ def test_too_many_weights_are_refused():
     assert str(caught.value) == "expected at most 2 shape weights, found 3"
 
 
-def test_same_weights_give_the_same_figure():
+def test_equal_weights_return_the_same_figure():
     figure = arm()
     first = shaped(figure, np.array([1.0, 0.0]))
     assert shaped(figure, np.array([1.0, 0.0])) is first
     assert shaped(figure, np.array([2.0, 0.0])) is not first
 
 
-def test_without_regressor_the_joints_stay():
+def test_joints_do_not_move_without_a_regressor():
     figure = arm(joint_regressor=None)
     changed = shaped(figure, np.array([1.0, 3.0]))
     assert changed.skeleton is figure.skeleton
@@ -109,12 +109,12 @@ def test_joint_rotates_about_its_shaped_position():
     pose.shape_weights[:] = 1.0, 0.0
     pose.dofs[5] = np.pi / 2  # joint 1 about z; it is at (5, 0, 0)
     positions, _ = deform(figure, pose)
-    # Vertex 2 at (4, -1, 0) is (-1, -1) from the joint and turns to (1, -1).
+    # Vertex 2 at (4, -1, 0) is (-1, -1) from the joint and rotates to (1, -1).
     assert_allclose(positions[2], [6, -1, 0], atol=1e-15)
 
 
 def turned_chain(scale=1.0) -> Figure:
-    """Return a chain of three with rest rotations, bound in its rest pose."""
+    """Return a chain of three joints with rest rotations, bound in its rest pose."""
     rng = np.random.default_rng(0)
     bones = skeleton(
         [-1, 0, 1],
@@ -158,11 +158,11 @@ def test_rest_pose_returns_the_shaped_mesh_under_rest_rotations(scale):
     )
     before = rest_joints(figure)
     assert not np.allclose(before, figure.mesh.positions[[0, 5, 9]])
-    # The bindings move as far as the joints do, so nothing else may move the vertices.
+    # The bindings move with the joints, so the vertices move by their offsets only.
     assert_allclose(deform(figure, pose)[0], expected, atol=1e-13)
 
 
-def test_rest_rotations_stay_when_the_shape_changes():
+def test_rest_rotations_do_not_depend_on_the_shape():
     figure = turned_chain()
     changed = shaped(figure, np.array([1.0, 1.0]))
     assert np.array_equal(changed.skeleton.rest_rotations, figure.skeleton.rest_rotations)
@@ -190,7 +190,7 @@ def test_family_at_rest_is_its_template_plus_the_shape(tmp_path, kind):
 
 
 def plain_smpl(arrays, weights, turns):
-    """The authors' forward pass, with loops over joints and vertices."""
+    """Return the vertices of the authors' forward pass, with loops over joints and vertices."""
     shape = arrays["v_template"] + arrays["shapedirs"] @ weights
     joints = arrays["J_regressor"] @ shape
     parents = arrays["kintree_table"][0].astype(np.int64)
@@ -227,7 +227,7 @@ def test_correctives_are_added_unless_left_out():
     figure = arm(correctives=Correctives(offsets))
     pose = figure_pose(figure)
     assert rest_positions(figure, figure.mesh, pose) is figure.mesh.positions
-    pose.dofs[:3] = 1.0  # the root does not count
+    pose.dofs[:3] = 1.0  # the root has no correctives
     assert rest_positions(figure, figure.mesh, pose) is figure.mesh.positions
     pose.dofs[5] = np.pi  # Rz(180) - I is diag(-2, -2, 0): rows 0 and 4
     expected = np.array(POSITIONS) - 2.0 * offsets[0] - 2.0 * offsets[4]
@@ -235,7 +235,7 @@ def test_correctives_are_added_unless_left_out():
     assert rest_positions(figure, figure.mesh, pose, correct=False) is figure.mesh.positions
 
 
-def test_another_rest_mesh_moves_the_joints_by_the_regressor():
+def test_different_rest_mesh_moves_the_joints_by_the_regressor():
     figure = arm()
     changed = with_rest_mesh(figure, 2.0 * np.array(POSITIONS))
     assert rest_joints(changed).tolist() == [[0, 0, 0], [8, 0, 0]]
@@ -271,8 +271,19 @@ def test_shaped_figures_are_freed_with_their_figure():
     assert gone() is None
 
 
-def test_failed_results_are_not_remembered():
+def test_failed_results_are_not_cached():
     memo, owner = Memo(), Owner()
     with pytest.raises(ZeroDivisionError):
         memo.get(owner, 1, lambda: 1 // 0)
     assert memo.get(owner, 1, lambda: 5) == 5
+
+
+def test_skeletons_follow_the_shape_only_with_a_joint_regressor() -> None:
+    figure, weights = arm(), np.array([1.0, 0.5])
+    moved = shaped_skeleton(figure, weights)
+    # The shape moves one of the second joint's two vertices by 2 along x, and all of them along y.
+    assert_allclose(moved.rest_translations, [[0, 0.5, 0], [5, 0, 0]], atol=1e-12)
+    free = arm(joint_regressor=None)
+    assert shaped_skeleton(free, weights) is free.skeleton
+    with pytest.raises(RigError):
+        shaped_skeleton(arm(skeleton=None, skin=None, joint_regressor=None), weights)

@@ -77,13 +77,13 @@ def test_locked_dofs_have_equal_limits():
         ({"boxes": np.zeros((2, 3))}, "boxes: expected shape 2 x 2 x 3, found 2 x 3"),
     ],
 )
-def test_skeleton_refuses_parts_that_do_not_fit(changes, message):
+def test_skeleton_refuses_inconsistent_parts(changes, message):
     with pytest.raises(RigError) as caught:
         build(**changes)
     assert str(caught.value) == message
 
 
-def test_skeleton_needs_a_joint():
+def test_skeleton_requires_a_joint():
     with pytest.raises(RigError) as caught:
         skeleton([], names=[])
     assert str(caught.value) == "a skeleton needs at least one joint"
@@ -93,13 +93,13 @@ def test_skeleton_may_have_several_roots():
     assert skeleton([-1, -1, 0]).parents.tolist() == [-1, -1, 0]
 
 
-def test_clamp_dofs_brings_values_to_the_nearest_limit():
+def test_clamp_dofs_moves_values_to_the_nearest_limit():
     limited = build(dof_limits=[[-1.0, 0.5], [2.0, 3.0]])
     values = np.array([[-9.0, 0.0], [0.25, 2.5], [9.0, 9.0]])
     assert clamp_dofs(limited, values).tolist() == [[-1.0, 2.0], [0.25, 2.5], [0.5, 3.0]]
 
 
-def test_clamp_dofs_leaves_unlimited_values_alone():
+def test_clamp_dofs_does_not_change_unlimited_values():
     assert clamp_dofs(
         build(dof_limits=[[-np.inf, np.inf]] * 2), np.array([1e30, -1e30])
     ).tolist() == [
@@ -134,7 +134,7 @@ def test_find_dof_prefers_the_exact_case():
     assert (find_dof(both, "arm.x"), find_dof(both, "Arm.x")) == (1, 0)
 
 
-def test_find_dof_accepts_names_with_dots_and_blanks():
+def test_find_dof_accepts_names_with_dots_and_spaces():
     dotted = skeleton([-1], [(0, "x", 0.0)], names=["left arm.001"])
     assert find_dof(dotted, "left arm.001.x") == 0
 
@@ -164,6 +164,6 @@ def test_find_dof_lists_only_the_first_joints():
     assert str(caught.value) == 'no joint is called "toe"; there are 21: j0, j1, j2, j3, j4, j5, …'
 
 
-def test_find_dof_survives_an_index_of_5000_digits():
+def test_find_dof_refuses_an_index_of_5000_digits():
     with pytest.raises(RigError, match=r'^no joint is called "knee#9999'):
         find_dof(LEG, f"knee#{'9' * 5000}.x")

@@ -38,7 +38,7 @@ def test_skin_of_no_vertices_is_empty():
     assert has_influence(empty).tolist() == []
 
 
-def test_skin_of_vertices_without_influence_needs_no_joints():
+def test_skin_of_vertices_without_influence_may_have_no_joints():
     assert skin_from_lists([[], []], np.zeros((0, 4, 4))).n_joints == 0
 
 
@@ -56,7 +56,7 @@ def test_skin_of_vertices_without_influence_needs_no_joints():
         ({"joints": [-1]}, "joints: expected indices 0 to 1, found -1 to -1"),
     ],
 )
-def test_skin_refuses_parts_that_do_not_fit(changes, message):
+def test_skin_refuses_inconsistent_parts(changes, message):
     with pytest.raises(RigError) as caught:
         build(**changes)
     assert str(caught.value) == message

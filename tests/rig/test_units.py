@@ -9,7 +9,7 @@ from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES, is_metres, unit_of_scaled
 
 
-def test_factors_are_those_of_the_units():
+def test_factors_convert_units_to_metres():
     assert METRES == {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
     assert UNIT_NAMES.keys() == METRES.keys() and SIZES.keys() < METRES.keys()
 
@@ -24,7 +24,7 @@ def test_sizes_cover_people_from_newborn_to_tallest(unit):
 @pytest.mark.parametrize(
     ("size", "expected"), [(0.0, False), (0.29, False), (0.3, True), (3.5, True), (3.6, False)]
 )
-def test_metres_are_inferred_between_infant_and_giant(size, expected):
+def test_metres_are_inferred_for_sizes_between_infant_and_giant(size, expected):
     assert is_metres(size) == expected
 
 

@@ -93,7 +93,7 @@ class Shortcut:
 
     @property
     def name(self) -> str:
-        """Name of the action in the preferences: it stays the same when keys and texts change."""
+        """Name of the action in the preferences: it stays the same when keys and labels change."""
         return " ".join([self.action, *map(str, self.arguments)])
 
     def run(self, state: AppState) -> None:

@@ -54,7 +54,7 @@ def draw_interface(state: AppState) -> list[Path]:
 
 
 def _dock_of_neighbour(panel: Panel) -> int:
-    """Return the dock node of another panel with the same place, or 0 if none is docked."""
+    """Return the dock node of another panel with the same initial dock, or 0 if none is docked."""
     for other in PANELS.values():
         window = None
         if other.place == panel.place and other is not panel:

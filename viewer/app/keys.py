@@ -18,7 +18,7 @@ from viewer.data_classes import dataclass
 __all__ = ["Keyboard", "handle_keys"]
 
 _REPEATED = (imgui.Key.left_arrow, imgui.Key.right_arrow)  # these repeat while held
-_NAVIGATION = {  # these move in an open menu or list, and choose from it
+_NAVIGATION = {  # these navigate an open menu or list, and choose from it
     imgui.Key.left_arrow,
     imgui.Key.right_arrow,
     imgui.Key.up_arrow,
@@ -42,7 +42,7 @@ class Keyboard:
     modifiers : int
         Modifiers in the previous frame, as ImGui's bits.
     has_menu : bool
-        Whether a menu or list was open at the last keys. ImGui may have closed it since.
+        Whether a menu or list was open when keys were last handled. ImGui may have closed it since.
     chosen : dict
         The user's keys for which the table below was made, as in ``Preferences.keys``.
     bound : dict

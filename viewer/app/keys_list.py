@@ -18,7 +18,7 @@ __all__ = ["column_layout", "draw_keys"]
 
 _COLOR = (1.0, 0.78, 0.45, 1.0)  # colour of the keys
 _OPACITY = 0.97  # text behind the list must not show through
-_GAP, _BETWEEN = 1.5, 3.0  # in font sizes: from a key to its text, from column to column
+_GAP, _BETWEEN = 1.5, 3.0  # distances from a key to its text and between columns, in font sizes
 
 
 class _Columns(NamedTuple):

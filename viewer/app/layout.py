@@ -28,8 +28,8 @@ _LEFT, _RIGHT, _COLUMN = (15.0, 22.0), (17.0, 24.0), (17.0, 22.0)
 # Widths of the sides relative to the window's width.
 _LEFT_PART, _RIGHT_PART, _COLUMN_PART = 0.22, 0.25, 0.3
 _MOST = 0.5
-"""Largest fraction of the window's width that panels may take."""
-_THREE_ROWS = 60.0  # font sizes: a window of less height has two rows of panels on the right
+"""Maximum fraction of the window's width that panels may occupy."""
+_THREE_ROWS = 60.0  # font sizes: lower windows have two rows of panels on the right
 _TIMELINE, _CURVES = (8.0, 0.34), (22.0, 0.46)
 """Minimum height of bottom panels in font sizes, and maximum as a fraction of the window."""
 
@@ -247,7 +247,7 @@ def _resize(layout: Layout, sizes: Sizes) -> None:
 
 
 def _notice(layout: Layout) -> None:
-    """Detect that the user drags a panel or an edge."""
+    """Detect whether the user drags a panel or an edge."""
     nodes = map(imgui.internal.dock_builder_get_node, layout.nodes.values())
     found = (
         *((title, imgui.internal.find_window_by_name(title).dock_id) for title in _docked()),

@@ -20,7 +20,7 @@ __all__ = ["draw_error", "draw_message_window"]
 
 _ERROR_TITLE = "Error"
 _TITLE = "Messages"
-_SIZE = (42.0, 22.0)  # in font sizes
+_SIZE = (42.0, 22.0)  # initial size of the window, in font sizes
 _LONGEST = 1000  # maximum length of a message in characters
 
 

@@ -27,13 +27,13 @@ from viewer.rig.scene import scene_unit
 
 __all__ = ["draw_hints", "draw_overlays", "hint_rect", "n_newest"]
 
-_SHOW_PROGRESS_AFTER = 0.3  # seconds
-_BAR_WIDTH = 52.0 / 3.0  # in font sizes
+_SHOW_PROGRESS_AFTER = 0.3  # seconds before the progress bar appears
+_BAR_WIDTH = 52.0 / 3.0  # width of the progress bar, in font sizes
 _GAP = 10.0  # points from the edges of the view
 _BETWEEN = 6.0  # points between two overlays
 _BESIDE = 0.6  # minimum fraction of the view's width for messages next to the hints
 _MOST_NOTES = 8
-_LONGEST_NOTE = 400  # characters
+_LONGEST_NOTE = 400  # maximum length of a message in characters
 
 
 def draw_overlays(state: AppState) -> None:
@@ -101,6 +101,9 @@ def _progress(state: AppState) -> _Progress | None:
     if stream is not None:
         read, total = stream.progress
         names = ", ".join(builder.capture.name for builder in stream.builders)
+        if stream.finishing >= 0.0:
+            title, text = f"Retargeting {printable(names, 60)}", f"{100 * stream.finishing:.0f} %"
+            return _Progress(title, stream.finishing, text, "Cancel", is_aside=True)
         text = f"{read:,} of {total:,} frames"
         title = f"Reading {printable(names, 60)}"
         return _Progress(title, read / max(total, 1), text, "Cancel reading", is_aside=True)

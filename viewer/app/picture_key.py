@@ -52,7 +52,8 @@ class PictureKeys:
             self._options = copy.deepcopy(options)
         place = (camera.target.tobytes(), camera.distance, camera.azimuth, camera.inclination)
         lens = (camera.fov, camera.orthographic, camera.up, id(camera.fixed))
-        # Motion paths show the motion around the current time, cameras their current images.
+        # Motion paths show the motion around the current time, and cameras show their current
+        # images.
         shows_images = camera.fixed is not None or options.cameras
         time = state.scene.time if options.path_joints or shows_images else None
         actors = self._actors(state.scene.actors)

@@ -20,7 +20,7 @@ class ShownPanels:
     closed : set of str
         Panels open by default that were closed.
     opened : set of str
-        Panels on demand that were opened.
+        On-demand panels that were opened.
     wants_reset : bool
         Whether the default layout is to be restored.
     fronts : list of str

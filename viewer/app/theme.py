@@ -93,7 +93,7 @@ def apply_theme(scale: float, theme: str = "dark") -> None:
 
 
 def lacks_letters(texts: Iterable[str]) -> bool:
-    """Return whether the current font lacks a letter of some texts."""
+    """Return whether the current font lacks a glyph for any letter of some strings."""
     font = imgui.get_io().fonts.fonts[0]
     letters = {letter for text in texts if not text.isascii() for letter in text}
     return not all(font.is_glyph_in_font(ord(letter)) for letter in letters)

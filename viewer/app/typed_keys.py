@@ -73,8 +73,9 @@ def end_frame_before(queue: Any, key: int, action: int) -> None:
 def end_frame(queue: Any) -> None:
     """Make ImGui process the queued events, if any, in a frame before later ones.
 
-    A mouse button needs it: tabs and other widgets that may overlap react to a press only if they
-    were hovered in an earlier frame, and the last motion of a drag counts only before its release.
+    Mouse buttons require this: tabs and other widgets that may overlap react to a press only if
+    they were hovered in an earlier frame, and the last motion of a drag counts only before its
+    release.
 
     Parameters
     ----------

@@ -38,7 +38,7 @@ from viewer.rig.units import UNIT_NAMES, unit_of_scaled
 
 __all__ = ["robust"]
 
-_JOINT_REACH = 0.08  # fraction of the target's size; maximum distance between the two surfaces
+_JOINT_REACH = 0.08  # maximum distance between the two surfaces, as a fraction of the target's size
 
 
 def robust(

@@ -178,9 +178,7 @@ class _Search:
             text = counted(self._n_skipped, "file")
             notes.append(f"{text} in folders skipped: the suffix belongs to no format")
         if self._n_outputs:
-            notes.append(
-                f"{counted(self._n_outputs, 'file')} in the folder of the outputs left out"
-            )
+            notes.append(f"{counted(self._n_outputs, 'file')} in the folder of the outputs omitted")
         paths = sorted(self._found.values(), key=natural_key)
         return Inputs(tuple(paths), _common(self.roots), frozenset(self._folders), tuple(notes))
 

@@ -46,7 +46,7 @@ class Result:
         ``timeout``, ``crashed`` (the worker process died), ``memory``, ``cancelled``; ``unchanged``
         if an earlier run finished it.
     exit_code : int
-        That of the job's command: 0 success, 1 findings or differences, 2 bad input ...
+        Exit code of the job's command: 0 success, 1 findings or differences, 2 bad input ...
     seconds : float
         Wall time of the last attempt.
     attempts : int

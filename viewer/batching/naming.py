@@ -164,7 +164,7 @@ def _filled(
 
 
 def filled(template: str, item: Item) -> str:
-    """Return a template filled for one item, such as the name of a second output."""
+    """Return a template with its fields replaced for one item, such as for a second output."""
     path = item.files[-1]
     pieces = list(Formatter().parse(template))
     return _filled(pieces, item.index, path, item.name, os.path.isdir(path))
@@ -182,7 +182,7 @@ def check_further_outputs(
     template : str
         Template for its name.
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -214,7 +214,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     Parameters
     ----------
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -256,7 +256,7 @@ def check_summaries(
     files : dict of str
         The file of each option, such as ``--table``; empty for none.
     items : sequence of Item
-        All items, also those of other shards.
+        All items, including those of other shards.
     more_inputs : iterable of str
         Files that all items read.
 
@@ -286,7 +286,7 @@ def check_summaries(
         found = "an input" if real.of(path) in inputs else owners.get(_identity(here, path))
         if found is not None:
             raise ViewerError(
-                f"{option}: {_shown(path)}: expected a file of its own, found {_shown(found)}"
+                f"{option}: {_shown(path)}: expected a separate file, found {_shown(found)}"
             )
         owners[_identity(here, path)] = f"the file of {option}"
 

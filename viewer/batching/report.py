@@ -101,7 +101,7 @@ class ReportFile:
             raise self._error(problem) from None
 
     def add(self, result: Result) -> None:
-        """Append a line; a killed process loses no earlier line."""
+        """Append a line; earlier lines survive if the process is killed."""
         line = _line(result).encode("utf-8", "backslashreplace") + b"\n"
         try:
             with _locked(self._handle):
@@ -165,7 +165,8 @@ def _line(result: Result) -> str:
     found["seconds"] = round(result.seconds, 6)
     try:
         return json.dumps(found, default=_data, separators=(",", ":"), allow_nan=False)
-    except (ValueError, TypeError):  # JSON has no infinite numbers, no NaN, and only texts as keys
+    # JSON has no infinite numbers, no NaN, and only strings as keys.
+    except (ValueError, TypeError):
         found["values"] = plain(result.values)
         return json.dumps(found, default=str, separators=(",", ":"))
 

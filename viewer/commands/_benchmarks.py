@@ -144,7 +144,7 @@ def _drawn(
 
 
 def _crowd(scene: Scene) -> Scene:
-    """Return rows of ten of the first figure."""
+    """Return copies of the first figure, in rows of ten."""
     from viewer.rig.scene import Actor, Scene
 
     actors = [Actor(scene.actors[0].figure) for _ in range(_INSTANCES)]

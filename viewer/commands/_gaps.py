@@ -39,7 +39,7 @@ def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
 
     ``group``: options of a command.
     ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.
-    Parsing gives ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
+    Parsing sets ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
       are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, in frames,
       ``ONE_SECOND`` or None.
     """

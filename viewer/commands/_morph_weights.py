@@ -46,7 +46,7 @@ def morph_record(figure: Figure, values: Floats) -> PoseRecord:
 
 
 def named_record(scene: Scene, text: str) -> tuple[Actor, PoseRecord]:
-    """Return the first actor that has all shapes named in a text, and a record that sets them.
+    """Return the first actor that has all shapes named in the text, and a record that sets them.
 
     Returns ``actor``: actor with a pose.
     Returns ``record``: sets the named shapes and keeps the others.

@@ -161,7 +161,7 @@ def _is_numbers(text: str) -> bool:
 def _numbers(option: str, text: str | None) -> Floats | None:
     if text is None:
         return None
-    # A trailing comma is accepted; two in a row would shift the following numbers.
+    # A trailing comma is accepted; two consecutive commas would shift the following numbers.
     words = re.split(r"\s*,\s*|\s+", text.strip().removesuffix(",").rstrip())
     try:
         return np.array([number(word) for word in words])

@@ -74,7 +74,7 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "--max-size",
         default="2G",
         metavar="SIZE",
-        help="refuse larger files, with k, M or G (default: 2G)",
+        help="maximum size of a file, with suffix k, M or G (default: 2G)",
     )
     group.add_argument(
         "--no-cache",
@@ -94,7 +94,9 @@ def add_capture_arguments(parser: argparse.ArgumentParser, gaps: str = "check") 
     group.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
-    group.add_argument("--unit", choices=METRES, help="length unit of BVH (default: estimated)")
+    group.add_argument(
+        "--unit", choices=METRES, help="length unit of BVH files (default: estimated)"
+    )
     _add_video_arguments(group)
     group.add_argument(
         "--layout",
@@ -249,9 +251,9 @@ def size_limit(arguments: argparse.Namespace) -> int:
 
 
 def parse_bytes(text: str, option: str = "--max-size") -> int:
-    """Return the number of bytes that an option gives, such as ``2G``.
+    """Return the number of bytes that an option specifies, such as ``2G``.
 
-    Raises ViewerError if the text is no such number.
+    Raises ViewerError if the text is not such a number.
     """
     found = re.fullmatch(r"(\d{1,15})([kKmMgG]?)", text)
     if not found:
@@ -343,7 +345,7 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
 def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
     """Print one line per warning or note to the error stream, unless the run is recorded.
 
-    Plain texts are warnings, and so are errors in a file that opened nevertheless.
+    Plain strings are warnings, as are errors in a file that was opened nevertheless.
     """
     for warning in warnings:
         if not note_found(warning):

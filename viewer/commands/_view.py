@@ -38,12 +38,12 @@ _SWITCHES = (
     ("wireframe", "draw triangle edges"),
     ("normals", "draw vertex normals"),
     ("no-texture", "use plain colours instead of textures"),
-    ("no-vertex-colors", "leave out the colours of vertices"),
+    ("no-vertex-colors", "omit vertex colours"),
     ("no-grid", "omit the ground grid"),
     ("keypoints", "draw a model's keypoints"),
     ("reduced", "draw the coarser mesh, if there is one"),
     ("xray", "draw bones that are visible through the skin"),
-    ("joint-names", "label joints, where labels do not overlap"),
+    ("joint-names", "label joints; labels that would overlap are omitted"),
     ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
 )
@@ -79,7 +79,8 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         default=0.6,
         metavar="0..1",
-        help="with --view, of the camera's image behind the scene; 0 hides it (default: 0.6)",
+        help="brightness of the camera's image behind the scene, with --view; 0 hides it (default: "
+        "0.6)",
     )
 
 
@@ -155,7 +156,8 @@ def _add_shading_arguments(group: argparse._ArgumentGroup) -> None:
             type=number,
             default=default,
             metavar="0..1",
-            help=f"for materials that do not specify it, with --shading pbr (default: {default:g})",
+            help=f"value for materials that do not specify one, with --shading pbr (default: "
+            f"{default:g})",
         )
     group.add_argument(
         "--matcap",

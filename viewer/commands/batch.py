@@ -20,7 +20,7 @@ from viewer.streams import summary_stream
 
 __all__ = ["add_arguments", "parser_of", "run"]
 
-_FAILED = 1  # exit code
+_FAILED = 1  # exit code if an item failed or has findings
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -56,7 +56,7 @@ def parser_of(words: Sequence[str]) -> Parser | None:
     """Return the parser of a job with the options of its command; None if no job is named.
 
     ``words``: the arguments.
-    Raises ViewerError for a word that is no job.
+    Raises ViewerError for a word that is not a job.
     """
     word = next(iter(words), "-")
     if word in JOBS:

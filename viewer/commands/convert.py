@@ -33,6 +33,7 @@ from viewer.commands._writing.motion_export import (
     writes_keys,
 )
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
+from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.commands._writing.written_actors import left_out_notes, pose_or_point_actors
 from viewer.diagnostics import Diagnostic
@@ -78,7 +79,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--force", action="store_true", help="replace existing files")
     add_joint_map_argument(group)
     add_motion_arguments(parser)
-    add_vrm_arguments(parser)
+    add_vrm_arguments(parser, upgrades=True)
     add_frame_arguments(parser, "A:B")
     add_capture_arguments(parser, gaps="write")
     add_cleanup_arguments(parser)
@@ -96,17 +97,24 @@ def run(arguments: argparse.Namespace) -> int:
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     skinning = skinning_of(arguments)
+    notes = convert_streamed(arguments, output, skinning)
+    if notes is None:
+        notes = _converted(arguments, output, skinning)
+    for note in notes:
+        note_found(note)
+    print("\n".join(map(str, notes)), file=summary_stream(output))
+    return 0
+
+
+def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) -> list[Diagnostic]:
+    """Open all files, and write what is requested; return the notes."""
     scene = open_scene(arguments)
     baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):
         write = _write_clips
     with saving_joint_map(arguments, scene), shown_progress("converting"):
-        notes = [*write(arguments, scene, output, skinning), *baked]
-    for note in notes:
-        note_found(note)
-    print("\n".join(map(str, notes)), file=summary_stream(output))
-    return 0
+        return [*write(arguments, scene, output, skinning), *baked]
 
 
 def _check_suffix(arguments: argparse.Namespace, output: Path) -> None:
@@ -166,7 +174,7 @@ def _write_actors(
     shown = pose_or_point_actors(scene)
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
-        raise RigError("nobody is present at that time: there is nothing to write")
+        raise RigError("no person is present at that time: there is nothing to write")
     if EXPORTERS[exporter_for(output)].writes_several and PERSON not in output.name:
         notes = _write_together(arguments, scene, output, skinning, actors, clips_of)
     else:

@@ -36,7 +36,7 @@ from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
-_DIFFERS = 1  # exit code
+_DIFFERS = 1  # exit code if there are differences
 _UNREADABLE = 2
 
 
@@ -62,7 +62,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     files.add_argument(
         "--up", choices=("y", "z", "-y", "-z"), help="up axis of captures and BVH files"
     )
-    files.add_argument("--unit", choices=METRES, help="length unit of BVH")
+    files.add_argument("--unit", choices=METRES, help="length unit of BVH files")
     add_animation_argument(files)
     _add_poses(parser)
     _add_results(parser)
@@ -99,8 +99,8 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "-o",
         "--output",
         metavar="FILE",
-        help="image of the reference, coloured by distance, in the worst pose; several "
-        "comparisons give a sheet with a common scale",
+        help="image of the reference, coloured by distance, in the worst pose; several comparisons "
+        "result in a sheet with a common scale",
     )
     group.add_argument("--force", action="store_true", help="replace an existing image")
 
@@ -218,7 +218,7 @@ def _compared(
 
 
 def _lone(name: str, pairing: Pairing) -> tuple[Diagnostic, ...]:
-    """Return messages about actors and motions present on one side only."""
+    """Return messages about actors and motions that are present in only one of the scenes."""
     sides = ((Phrase("the-reference"), pairing.first), (name, pairing.second))
     return tuple(
         Diagnostic("D001.actor", values={"side": side, "actor": one})

@@ -35,7 +35,7 @@ _EXTRAS = {
     "ufbx": "reading .fbx files",
     "DracoPy": "glTF files compressed with Draco",
     "av": "videos",
-    "isal": "PNG images in less time",
+    "isal": "faster PNG encoding",
     "scipy": "viewer rig, comparing different meshes",
     "pebble": "worker processes of viewer batch",
     "dask": "viewer batch on clusters",
@@ -92,7 +92,7 @@ def _print_measurements() -> None:
 
 
 def examine() -> Iterator[Finding]:
-    """Yield findings as they are made, quick ones first."""
+    """Yield findings as the checks complete, quick ones first."""
     system = f"{platform.system()} {platform.release()} {platform.machine()}"
     yield Finding(
         "viewer", "ok", f"{viewer.__version__}, Python {sys.version.split()[0]}, {system}"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from viewer.commands._info.body_models import describe_model, model_lines
+from viewer.commands._info.materials import describe_surface, surface_words
 from viewer.commands._pose import add_skinning_arguments, skinning_of
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
@@ -29,7 +30,6 @@ from viewer.rig.skinning import Skinning
 
 if TYPE_CHECKING:
     from viewer.rig.blendshapes import BlendShapes
-    from viewer.rig.material import Material
     from viewer.rig.skin import Skin
 
 __all__ = ["add_arguments", "describe", "run"]
@@ -177,7 +177,7 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
                 "name": material.name,
                 "texture": material.texture,
                 "pixels": None if material.image is None else list(material.image.shape[1::-1]),
-                **_describe_surface(material),
+                **describe_surface(material),
             }
             for material in mesh.materials
         ],
@@ -186,28 +186,12 @@ def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
 
 def _describe_parts(mesh: Mesh) -> list[dict[str, Any]]:
     """Return the parts that can be hidden, with their numbers of triangles."""
-    # Triangles of no part are counted first.
+    # Triangles without a part are counted first.
     counts = np.bincount(mesh.part_indices + 1, minlength=len(mesh.parts) + 1)[1:]
     return [
         {"name": name, "triangles": int(count)}
         for name, count in zip(mesh.parts, counts, strict=True)
     ]
-
-
-def _describe_surface(material: Material) -> dict[str, Any]:
-    """Return the properties of a material other than one opaque texture."""
-    if material.is_plain:
-        return {}
-    maps = {
-        name.removesuffix("_texture"): texture.name
-        for name, texture in material.textures.items()
-        if name != "base_texture"
-    }
-    color = None if material.base_color is None else list(material.base_color)
-    surface: dict[str, Any] = {"base_color": color, "maps": maps, "alpha": material.alpha_mode}
-    if material.is_physical:
-        surface |= {"metallic": material.metallic, "roughness": material.roughness}
-    return surface
 
 
 def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
@@ -232,15 +216,22 @@ def _describe_skin(skin: Skin, skeleton: Skeleton | None) -> dict[str, Any]:
 
 
 def _describe_morphs(shapes: BlendShapes) -> list[dict[str, Any]]:
-    """Return the morph targets with the number of vertices that each one moves."""
+    """Return the morph targets with the numbers of vertices and materials that each changes."""
     from viewer.rig.morph_target import MORPH_GROUP
 
     rows = [row for row, group in enumerate(shapes.groups) if group == MORPH_GROUP]
     counts = shapes.direction_values()[rows].any(axis=2).sum(axis=1)
+    binds = shapes.material_binds
+    materials = {} if binds is None else binds.n_materials
     return [
-        {"name": shapes.names[row], "vertices": int(count)}
+        {"name": shapes.names[row], "vertices": int(count), "materials": materials.get(row, 0)}
         for row, count in zip(rows, counts, strict=True)
     ]
+
+
+def _morph_line(morph: dict[str, Any]) -> str:
+    changes = f", changes {counted(morph['materials'], 'material')}" if morph["materials"] else ""
+    return f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}{changes}"
 
 
 def _lines(actor: dict[str, Any]) -> list[str]:
@@ -253,10 +244,7 @@ def _lines(actor: dict[str, Any]) -> list[str]:
         lines += _mesh_lines(actor["mesh"])
     if "skin" in actor:
         lines += _skin_lines(actor["skin"])
-    lines += [
-        f"  morph      {printable(morph['name'])}: moves {_vertices(morph['vertices'])}"
-        for morph in actor.get("morphs", [])
-    ]
+    lines += [_morph_line(morph) for morph in actor.get("morphs", [])]
     return lines + _motion_lines(actor)
 
 
@@ -327,22 +315,9 @@ def _mesh_lines(mesh: dict[str, Any]) -> list[str]:
         state = f"{pixels[0]} x {pixels[1]} pixels" if pixels else "not drawn"
         name = printable(material["name"] or "without a name")
         picture = [f"{printable(material['texture'])}, {state}"] if material["texture"] else []
-        shown = "; ".join([*picture, *_surface_words(material)]) or "no picture"
+        shown = "; ".join([*picture, *surface_words(material)]) or "no picture"
         lines.append(f"    material {name}: {shown}")
     return lines
-
-
-def _surface_words(material: dict[str, Any]) -> list[str]:
-    """Return the properties of a material other than one texture, as text."""
-    if "maps" not in material:
-        return []
-    words = []
-    if material["base_color"] is not None:
-        words.append(f"colour {' '.join(f'{channel:.3g}' for channel in material['base_color'])}")
-    if "metallic" in material:
-        words.append(f"metallic {material['metallic']:.3g}, roughness {material['roughness']:.3g}")
-    words += [f"{kind} {printable(file)}" for kind, file in material["maps"].items()]
-    return words if material["alpha"] == "opaque" else [*words, f"alpha {material['alpha']}"]
 
 
 def _skin_lines(skin: dict[str, Any]) -> list[str]:

@@ -38,7 +38,7 @@ from viewer.phrases import printable
 
 __all__ = ["add_arguments", "run"]
 
-_FOUND = 1  # exit code
+_FOUND = 1  # exit code if there are findings
 _STYLES = {"error": "red", "warning": "yellow"}
 
 

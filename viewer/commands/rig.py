@@ -72,7 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--force", action="store_true", help="replace existing files")
     parser.add_argument(
-        "--rig", metavar="NAME", help="which of the template's rigs, for Anny (default: default)"
+        "--rig", metavar="NAME", help="rig of the template, for Anny (default: default)"
     )
     add_clip_argument(parser)
     parser.add_argument("--view", action="store_true", help="open the result in a window")

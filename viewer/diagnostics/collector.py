@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from viewer.diagnostics.diagnostic import Diagnostic
 
-# Users do not read longer lists; the number is per file.
+# Maximum number of warnings per file: users do not read longer lists.
 _MOST = 100
 
 

@@ -113,7 +113,7 @@ EXPORTERS = {
     "amass": Exporter(
         "AMASS: parameters of the SMPL family",
         (".npz",),
-        "pose, place and shape of an SMPL body",
+        "pose, position and shape of an SMPL body",
         "scale",
         writes_pose=False,
         writes_motion=True,
@@ -122,7 +122,7 @@ EXPORTERS = {
     "smplx": Exporter(
         "SMPL-X for robots (GMR, PHC)",
         (".npz",),
-        "pose, place and mean shape of an SMPL body, z up",
+        "pose, position and mean shape of an SMPL body, z up",
         "scale, hands of SMPL",
         writes_pose=False,
         writes_motion=True,
@@ -130,7 +130,7 @@ EXPORTERS = {
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
         ("/",),
-        "pose, place and shape of SMPL bodies",
+        "pose, position and shape of SMPL bodies",
         "scale",
         writes_pose=False,
         writes_motion=True,

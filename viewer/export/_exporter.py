@@ -20,7 +20,7 @@ class Exporter:
     suffixes : tuple of str
         With leading dots; ``"/"`` represents a folder.
     keeps, omits : str
-        Data that its files hold, and data that they cannot hold.
+        Data that its files contain, and data that they cannot store.
     writes_pose : bool
         Whether its module has ``export(actor, path, skinning)``.
     writes_motion : bool

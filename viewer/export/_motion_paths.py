@@ -48,7 +48,7 @@ def motion_paths(output: Path, actors: Sequence[Actor]) -> list[Path]:
 def is_together(output: Path, options: MotionOptions) -> bool:
     """Return whether a format that holds several figures gets one file for all of them.
 
-    Not if the name has ``{person}``, or if motions are split at their gaps.
+    This is not the case if the name has ``{person}``, or if motions are split at their gaps.
     """
     return PERSON not in output.name and options.closing != "split"
 

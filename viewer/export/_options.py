@@ -35,11 +35,14 @@ class VrmMeta:
         At least one for figures from other files.
     licence : str
         Address of the licence.
+    upgrades : bool
+        Write characters from VRM 0.x files as VRM 1.0.
     """
 
     name: str = ""
     authors: tuple[str, ...] = ()
     licence: str = ""
+    upgrades: bool = False
 
 
 @dataclass(slots=True)

@@ -29,7 +29,7 @@ _NODES = (".glb", ".gltf", ".vrm")
 def files_of(output: Path) -> list[Path]:
     """Return all files that belong to one output.
 
-    Raises UnsupportedFormatError if it writes no such suffix.
+    Raises UnsupportedFormatError if the suffix is not supported.
     """
     suffix = output.suffix.lower()
     if suffix == ".npz":
@@ -55,7 +55,7 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     ``meta``: name, authors and licence of a VRM character.
     Returns: notes about the written files, and about data that the format cannot store.
     Raises RigError if ``.skel`` cannot store the skeleton.
-    Raises UnsupportedFormatError as ``files_of``.
+    Raises UnsupportedFormatError as ``files_of`` does.
     Raises OutputError if a file cannot be written.
     """
     files = files_of(output)

@@ -87,10 +87,10 @@ def export_animation(
 def write_layout(
     animation: SampledAnimation, path: Path, options: MotionOptions, title: str, layout: Layout
 ) -> list[Diagnostic]:
-    """Write a motion as arrays of the family in some layout; see ``export_animation``.
+    """Write a motion as arrays in the layout of a format; see ``export_animation``.
 
-    ``title``: name of the layout, for messages.
-    ``layout``: returns the arrays of some rows.
+    ``title``: name of the format, for messages.
+    ``layout``: returns the arrays of a range of rows.
     """
     check_unit(options, title)
     member = member_of_figure(animation.figure, f"an {title} motion", ("pelvis",))

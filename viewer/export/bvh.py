@@ -32,7 +32,16 @@ from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["export_animation"]
+__all__ = [
+    "Writer",
+    "check_finite",
+    "check_options",
+    "ends_of",
+    "export_animation",
+    "one_root",
+    "remarks",
+    "space_of",
+]
 
 _DEFAULT_UNIT = "cm"
 _SHORTEST_END = 2e-3  # Blender replaces the direction of bones shorter than 1e-3
@@ -74,20 +83,19 @@ def export_animation(
     OutputError
         If a file cannot be written.
     """
-    _check(options)
+    check_options(options)
     if not animation.frames.present.any():
         raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
     reference = int(animation.frames.present.argmax())
     is_split = options.closing == "split" and not animation.frames.present.all()
     frames = filled(animation.frames, options.closing == "interpolate")
-    figure, rigged = _one_root(animation.figure, frames, reference)
-    space = _space(figure, options)
+    figure, rigged = one_root(animation.figure, frames, reference)
+    space = space_of(figure, options)
     with np.errstate(invalid="ignore", over="ignore"):
         body = body_of(figure, rigged, reference, options.rotation_order, space)
-    if not all(np.isfinite(part).all() for part in (body.angles, body.positions, body.offsets)):
-        raise RigError(f"{animation.name}: expected finite numbers in every frame")
-    writer = _Writer(
-        animation, figure, body, _ends(animation, figure, space, reference), space, options
+    check_finite(animation, body.angles, body.positions, body.offsets)
+    writer = Writer(
+        animation, figure, body, ends_of(animation, figure, space, reference), space, options
     )
     spans = runs(animation.frames.present) if is_split else [(0, frames.n_frames)]
     paths = split_paths(path, len(spans))
@@ -102,10 +110,11 @@ def export_animation(
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
     lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + _remarks(animation, figure, body, reference, options)
+    return notes + lost + remarks(animation, figure, body, reference, options)
 
 
-def _check(options: MotionOptions) -> None:
+def check_options(options: MotionOptions) -> None:
+    """Raise RigError for an option that the format does not have."""
     for what, value, known in (
         ("unit", options.unit, ("", *METRES)),
         ("up axis", options.up, ("", "y", "z")),
@@ -120,7 +129,14 @@ def _check(options: MotionOptions) -> None:
         raise RigError(f"digits: expected 1 to {_MOST_DIGITS}, found {options.digits}")
 
 
-def _space(figure: Figure, options: MotionOptions) -> Space:
+def check_finite(animation: SampledAnimation, *parts: Floats) -> None:
+    """Raise RigError if a number of a file would be infinite or NaN."""
+    if not all(np.isfinite(part).all() for part in parts):
+        raise RigError(f"{animation.name}: expected finite numbers in every frame")
+
+
+def space_of(figure: Figure, options: MotionOptions) -> Space:
+    """Return the transform to the requested unit and up axis."""
     up = options.up or "y"
     factor = 1.0
     if figure.unit in METRES:
@@ -135,7 +151,7 @@ def _up_rotation(start: str, end: str) -> Floats:
     return np.round(axis_rotations(0, np.asarray(np.pi / 2 if end == "z" else -np.pi / 2)))
 
 
-def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
+def one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, Frames]:
     """Return a figure with one root: several roots become children of a joint at the origin."""
     skeleton = figure.require_skeleton()
     if int((skeleton.parents < 0).sum()) == 1:
@@ -165,7 +181,7 @@ def _one_root(figure: Figure, frames: Frames, reference: int) -> tuple[Figure, F
     )
 
 
-def _ends(
+def ends_of(
     animation: SampledAnimation, figure: Figure, space: Space, reference: int
 ) -> dict[int, Floats]:
     """Return the End Site of each leaf joint of the written figure, in the file's space."""
@@ -183,7 +199,7 @@ def _ends(
 
 
 @dataclass(frozen=True, slots=True)
-class _Writer:
+class Writer:
     """Writer of all files of one animation."""
 
     animation: SampledAnimation
@@ -259,7 +275,7 @@ class _Writer:
         return Diagnostic("X001.bvh", path, values=values)
 
 
-def _remarks(
+def remarks(
     animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
 ) -> list[Diagnostic]:
     """Return notes about changed or omitted data."""

@@ -182,7 +182,7 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
     for animation in animations:
         if animation.first_frame < 0:
             raise RigError(
-                f"{animation.name}: expected frames from 0 on, found {animation.first_frame}"
+                f"{animation.name}: expected frame numbers from 0, found {animation.first_frame}"
             )
         if not animation.frames.present.any():
             raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")

@@ -88,7 +88,7 @@ def export_figures(
 ) -> list[Diagnostic]:
     """Write figures and cameras to one file; see ``viewer.export.export_figures``.
 
-    Several figures are placed as in their scene; the placement of a single one is omitted.
+    Several figures are placed as in their scene; the placement of a single figure is omitted.
     ``extend``: as for ``export``.
     """
     document = Document(actors[0].figure.name)
@@ -203,7 +203,7 @@ def export_animations(
 ) -> list[Diagnostic]:
     """Write figures to one file, placed as in their scene, with one animation that moves them all.
 
-    Frames of different figures keep their distance in time; the first frame of all is at 0.
+    Frames of different figures keep their relative times; the earliest frame is at 0.
 
     Parameters
     ----------
@@ -281,7 +281,7 @@ def _motions_written(
 
 
 def _unplaced(data: Mapping[Path, bytes], placing: Sequence[int]) -> GltfFile:
-    """Return a written file without placements: errors are measured in the space of each figure."""
+    """Return a written file without placements, because errors are measured in figure space."""
     file = parsed([*data.values()])
     for node in placing:
         del file.root["nodes"][node]["matrix"]

@@ -7,9 +7,9 @@
     mocap_frame_rate   mocap_framerate   mocap_time_length   surface_model_type "smplx"   up
 
 This is the layout of AMASS for SMPL-X: GMR reads ``pose_body``, ``root_orient``, ``trans``,
-``betas``, ``gender`` and ``mocap_frame_rate``; PHC and its relatives read ``poses``, of which they
-use the first 66 columns, ``trans``, ``betas``, ``gender`` and ``mocap_framerate``. They expect z up
-and one shape. ``up``, and ``present`` if frames are missing, are extensions.
+``betas``, ``gender`` and ``mocap_frame_rate``; PHC and related programs read ``poses``, of which
+they use the first 66 columns, ``trans``, ``betas``, ``gender`` and ``mocap_framerate``. They expect
+z up and one shape. ``up``, and ``present`` if frames are missing, are extensions.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
 """Exporter of VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
 
-A figure from a VRM file keeps its version and all data of its extensions. Any other figure with the
-required human bones becomes VRM 1.0: at rest in a T-pose, in metres, facing +z. Specification:
-``github.com/vrm-c/vrm-specification``.
+A figure from a VRM file keeps its version and all data of its extensions, unless VRM 0.x is to
+become 1.0. Any other figure with the required human bones becomes VRM 1.0: at rest in a T-pose, in
+metres, facing +z. Specification: ``github.com/vrm-c/vrm-specification``.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from viewer.export._vrm.made import made_character
 from viewer.export._vrm.maps import Maps
 from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export._vrm.standing import in_t_pose, standing
+from viewer.export._vrm.upgraded import upgraded
 from viewer.formats._vrm.json_parts import part
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
@@ -43,6 +44,7 @@ _STRAIGHT = 1e-4  # radians
 _CONSTRAINT = "VRMC_node_constraint"
 _TOON = "VRMC_materials_mtoon"
 _UNLIT = "KHR_materials_unlit"
+_TRANSFORM = "KHR_texture_transform"
 
 
 def export(
@@ -79,10 +81,16 @@ def export(
     record = None if figure.record is None else figure.record.vrm
     notes = _left_out(actor)
     still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    if record is not None and record.version == 0 and given.upgrades:
+        figure, record, lost = upgraded(figure, record, bones)
+        still = replace(still, figure=figure, pose=figure_pose(figure))
+        _require_author(record, given, figure.name)
+        if lost:
+            notes.append(Diagnostic("X003.vrm-upgrade", values={"names": lost, "n": len(lost)}))
     if record is not None:
         extend = partial(_add_kept, record, given)
         return gltf.export(still, path, skinning, optimizes, extend) + notes
-    told = checked_meta(given, figure.name)
+    added_meta = checked_meta(given, figure.name)
     pose = figure_pose(figure)
     pose.shape_weights = actor.require_pose().shape_weights.copy()
     figure, angle = in_t_pose(standing(figure, pose, bones), bones)
@@ -90,8 +98,14 @@ def export(
     if angle > _STRAIGHT:
         notes.append(Diagnostic("X005.t-pose", values={"degrees": float(np.degrees(angle))}))
     notes += _unit_notes(actor.figure)
-    extend = partial(_add_made, bones, told)
+    extend = partial(_add_made, bones, added_meta)
     return gltf.export(still, path, skinning, optimizes, extend) + notes
+
+
+def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
+    """Raise RigError if neither the file nor the options name an author."""
+    if not any(record.extensions["VRMC_vrm"]["meta"]["authors"]):
+        checked_meta(replace(meta, licence=meta.licence or LICENCE), figure)
 
 
 def _unit_notes(figure: Figure) -> list[Diagnostic]:
@@ -128,10 +142,10 @@ def _add_kept(
     else:
         extensions = kept_modern(maps)
     _keep_shading(record, document, maps)
-    told = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
-    told["meta"] = changed_meta(told["meta"], meta, record.version)
+    data = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
+    data["meta"] = changed_meta(data["meta"], meta, record.version)
     _add(document, body, built, extensions)
-    return [_written(told, extensions, record.version), *_lost(maps.lost)]
+    return [_written(data, extensions, record.version), *_lost(maps.lost)]
 
 
 def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
@@ -144,6 +158,11 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
         if _TOON in given:
             item[_TOON] = kept_toon(given[_TOON], maps)
             _declare(document, _TOON)
+            if any(_TRANSFORM in part(each, "extensions") for each in _textures(item[_TOON])):
+                _declare(document, _TRANSFORM)
+        if _UNLIT in given:
+            item[_UNLIT] = given[_UNLIT]
+            _declare(document, _UNLIT)
         if not item:
             del document.root["materials"][written]["extensions"]
     items = document.root.get("materials", ())
@@ -151,6 +170,11 @@ def _keep_shading(record: VrmRecord, document: Document, maps: Maps) -> None:
     used = document.root.get("extensionsUsed", [])
     if _UNLIT in used and not is_used:
         used.remove(_UNLIT)
+
+
+def _textures(toon: Mapping[str, Any]) -> list[Any]:
+    """Return the textures of toon shading that have extensions."""
+    return [each for each in toon.values() if isinstance(part(each, "extensions"), dict)]
 
 
 def _add_made(
@@ -180,17 +204,17 @@ def _declare(document: Document, *names: str) -> None:
     used += [name for name in names if name not in used]
 
 
-def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
+def _written(data: Mapping[str, Any], extensions: Mapping[str, Any], version: int) -> Diagnostic:
     """Return a note that counts the contents of the extensions."""
-    bones = told["humanoid"]["humanBones"]
+    bones = data["humanoid"]["humanBones"]
     if version == 0:
-        n_expressions = _size(part(told, "blendShapeMaster", "blendShapeGroups"))
-        groups = part(told, "secondaryAnimation", "boneGroups")
+        n_expressions = _size(part(data, "blendShapeMaster", "blendShapeGroups"))
+        groups = part(data, "secondaryAnimation", "boneGroups")
         chains = groups if isinstance(groups, list) else []
         n_chains = sum(_size(part(each, "bones")) for each in chains)
     else:
         kinds = ("preset", "custom")
-        n_expressions = sum(_size(part(told, "expressions", kind)) for kind in kinds)
+        n_expressions = sum(_size(part(data, "expressions", kind)) for kind in kinds)
         n_chains = _size(part(extensions.get("VRMC_springBone"), "springs"))
     parts = [Phrase("vrm-bones", n=len(bones)), Phrase("vrm-expressions", n=n_expressions)]
     parts.append(Phrase("vrm-springs", n=n_chains))
@@ -198,9 +222,9 @@ def _written(told: Mapping[str, Any], extensions: Mapping[str, Any], version: in
     return Diagnostic("X001.vrm", values=values)
 
 
-def _size(told: Any) -> int:
+def _size(data: Any) -> int:
     """Return the number of members of parsed JSON; 0 if it is neither a list nor an object."""
-    return len(told) if isinstance(told, list | dict) else 0
+    return len(data) if isinstance(data, list | dict) else 0
 
 
 def _lost(lost: Counter[str]) -> list[Diagnostic]:

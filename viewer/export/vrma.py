@@ -104,15 +104,15 @@ def _fill(
             local = np.swapaxes(turns[above[bone]], -1, -2) @ local
         keys.add(nodes[bone], "rotation", _continuous(matrix_to_quaternion(local)), "VEC4")
     keys.add(nodes["hips"], "translation", hips, "VEC3")
-    told: dict[str, Any] = {
+    extension: dict[str, Any] = {
         "specVersion": "1.0",
         "humanoid": {"humanBones": {bone: {"node": nodes[bone]} for bone in order}},
     }
     weights = _add_expressions(document, keys, figure, frames)
     if weights:
-        told["expressions"] = weights
+        extension["expressions"] = weights
     keys.finish(animation.motion.name or animation.name)
-    document.root["extensions"] = {_EXTENSION: told}
+    document.root["extensions"] = {_EXTENSION: extension}
     document.root["extensionsUsed"] = [_EXTENSION]
     return weights
 

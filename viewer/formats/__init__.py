@@ -97,7 +97,7 @@ FORMATS = {
         rb"(?:^|[\s}])(?:positions|normals|texcoords|skinweights|triangles|bindings)\s+[-+\w]",
     ),
     "anim": Format("clip (CSE169)", (".anim",), rb"(?:^|\s)animation\s*\{"),
-    # This row follows that of the skin, whose sections have the same names: a .morph is identified
+    # This row follows the row of .skin, whose sections have the same names: a .morph is identified
     # by its suffix.
     "morph": Format(
         "morph (CSE169)", (".morph",), rb"(?:^|[\s}])(?:positions|normals)\s+\d", writes=False
@@ -205,7 +205,7 @@ def detect(source: Source) -> str:
     Raises
     ------
     FormatError
-        If no format matches; the message gives the apparent type of the file.
+        If no format matches; the message states the apparent type of the file.
     """
     if source.is_folder:
         return _detect_folder(source)
@@ -249,7 +249,7 @@ SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in
 """All suffixes, without duplicates."""
 
 KNOWN = " or ".join(SUFFIXES)
-"""All suffixes, for messages."""
+"""All suffixes as text for messages."""
 
 MESHES = tuple(s for kind in FORMATS.values() if kind.is_bare_mesh for s in kind.suffixes)
 """Suffixes of meshes without a rig."""
@@ -300,7 +300,7 @@ def read(source: Source) -> Content:
 
 
 def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnostic]:
-    """Write a clip, a pose, or the part of a figure that the format of the suffix holds.
+    """Write a clip, a pose, or the part of a figure that the format of the suffix supports.
 
     An existing file is replaced.
 
@@ -314,7 +314,7 @@ def write(content: Figure | Clip | PoseRecord, path: str | Path) -> list[Diagnos
     Returns
     -------
     list of Diagnostic
-        Notes about data of this part that the format cannot hold, or holds in another form.
+        Notes about data of this part that the format cannot store, or stores in another form.
 
     Raises
     ------

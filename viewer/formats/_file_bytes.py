@@ -19,7 +19,7 @@ MAX_SIZE = 2 << 30
 FOLDER = "a folder"
 """Name of a folder in the result of ``kind_of``."""
 
-# Maximum number of names in a folder that are compared with that of a missing file.
+# Maximum number of names in a folder that are compared with the name of a missing file.
 _MOST_FILES = 2000
 _ALIKE = 0.8  # minimum similarity; high, because file names share suffixes and often more
 _KINDS = {
@@ -53,7 +53,7 @@ def read_bytes(path: Path, max_size: int = MAX_SIZE) -> bytes:
 
 
 def kind_of(path: Path, max_size: int) -> str | None:
-    """Return the kind of file at a path, None for a regular file; opening a pipe would block."""
+    """Return the kind of file at a path without opening it; None for a regular file."""
     try:
         status = path.stat()
     except (OSError, ValueError) as problem:
@@ -96,7 +96,7 @@ def _near_files(path: Path) -> str:
     try:
         with os.scandir(path.parent) as entries:
             names = [entry.name for entry in islice(entries, _MOST_FILES)]
-    except OSError:  # the folder is also missing, or cannot be listed
+    except OSError:  # the folder is missing too, or cannot be listed
         return ""
-    # A dangling link has exactly this name.
+    # A dangling link has exactly the missing name.
     return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

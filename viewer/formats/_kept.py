@@ -67,7 +67,7 @@ def kept_or_read(source: Source, reader: Callable[[Source], _Content]) -> _Conte
     path = source.path.resolve() if _wanted else source.path
     if path not in _wanted or source.is_folder:
         return reader(source)
-    # Files that a figure refers to are checked too: textures or buffers may be replaced alone.
+    # Files to which a figure refers are checked too: textures or buffers may be replaced alone.
     known = _kept.get(path)
     if known is not None and known.state == _state(source, known.also_read):
         for found in known.diagnostics:

@@ -28,7 +28,7 @@ def is_beyond(translations: NDArray[np.floating]) -> Bools:
     """
     rows = translations.reshape(len(translations), -1)
     low, high = rows.min(initial=0.0), rows.max(initial=0.0)
-    if low >= -FARTHEST and high <= FARTHEST:  # true for nearly all motions
+    if low >= -FARTHEST and high <= FARTHEST:  # this is true for nearly all motions
         return np.zeros(len(rows), dtype=np.bool_)
     return np.asarray((np.abs(rows) > FARTHEST).any(axis=1))
 

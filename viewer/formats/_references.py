@@ -1,13 +1,13 @@
 """Rule for the location of files that are referenced by other files.
 
-A file may reference only files below its own folder, with links resolved: opening or converting a
+A file may reference only files in or below its folder, with links resolved: opening or converting a
 downloaded model must not show or copy images from elsewhere on the disk. Refused references are
 reported: the figure is drawn without the texture, and a ``.rig`` that references such a file is
 rejected.
 
-The folder is that of the path that was opened. If the path is a link, names are looked up next to
-the link, as other programs do, not next to its target. Files that the user specifies on the command
-line or in a dialog may be anywhere, as may the files of a folder that the user opens.
+The folder is the one that contains the opened path. If the path is a link, names are looked up next
+to the link, as other programs do, not next to its target. Files that the user specifies on the
+command line or in a dialog may be anywhere, as may the files of a folder that the user opens.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ def referenced_path(folder: Path, name: str) -> Path | None:
     try:
         # Unlike Path.resolve(), this does not raise for circular links; reading reports them.
         inside, base = Path(os.path.realpath(path)), Path(os.path.realpath(folder))
-    except ValueError:  # a NUL character, which is invalid in any path
+    except ValueError:  # the name has a NUL character, which is invalid in a path
         return path
     return path if inside != base and inside.is_relative_to(base) else None
 

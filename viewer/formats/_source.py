@@ -24,7 +24,7 @@ Content = TypeVar("Content")
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-# Binary data follows, which may end with any byte.
+# Files with these first bytes are binary and may end with any byte.
 _ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _MAGIC = (
@@ -81,7 +81,8 @@ class Source:
         self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else _without_marks(data)
-        self._counted = (0, 1)  # an offset with a known line, and that line
+        self._is_stored = data is None  # whether the data can be read again
+        self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
         self._pointers: dict[int, tuple[object, Callable[[str, int], str]]] = {}
 
@@ -89,7 +90,7 @@ class Source:
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Open a file or folder; raises as ``read_bytes`` does."""
+        """Open a file or folder; errors as of ``read_bytes``."""
         source = cls(path, max_size=max_size, diagnostics=diagnostics)
         kind = kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
@@ -107,17 +108,22 @@ class Source:
             report_bytes(0, len(self._data), name)
         return self._data
 
+    def release(self) -> None:
+        """Release the memory of the data, which is read again when an error needs its line."""
+        if self._is_stored:
+            self._data = None
+
     def option(self, name: str) -> str:
         """Return an option that selects among the contents of the file; empty for the default."""
         self.used_options.add(name)
         return self.options.get(name, "")
 
     def peek(self, size: int) -> bytes:
-        """Return the first bytes; the rest is not read unless it has already been read."""
+        """Return the first bytes of the file; no more is read."""
         return read_head(self.path, size) if self._data is None else self._data[:size]
 
     def once(self, opened: Callable[[Source], Content]) -> Content:
-        """Return the result of a function of this file, which is called only on first use."""
+        """Return the cached result of a function of this file, which is called on first use."""
         if opened not in self._opened:
             self._opened[opened] = opened(self)
         return cast("Content", self._opened[opened])
@@ -216,7 +222,8 @@ class Source:
         key : str
             Key of the message.
         offset : int, optional
-            Position in the file, or a JSON pointer, if known; that of the first of several errors.
+            Position in the file, or a JSON pointer, if known; of several errors, the first
+            position.
         count : int
             Number of errors.
         part, places : str, (N,)
@@ -227,7 +234,7 @@ class Source:
         Raises
         ------
         FormatError
-            Immediately, if the collector does not keep errors.
+            Immediately, if the collector does not collect errors.
         """
         found = self._diagnostic(key, offset, values, count, part, places)
         found = replace(found, is_refusal=True)
@@ -301,7 +308,7 @@ class Source:
         skeleton : Skeleton
             Identifies the figure, as a file may have several.
         pointer_of : callable
-            Takes a kind, as for ``remember``, and an index; returns an empty text if there is no
+            Takes a kind, as for ``remember``, and an index; returns an empty string if there is no
             such element.
         """
         self._pointers[id(skeleton)] = skeleton, pointer_of

@@ -172,7 +172,7 @@ def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
 
 
 def _first_key(source: Source, archive: Archive, keys: tuple[str, ...]) -> str | None:
-    """Return the first spelling of a key that exists; warn if another has different values."""
+    """Return the first existing spelling of a key; warn if another has different values."""
     there = [key for key in keys if archive.has(key)]
     for key in there[1:]:
         if not _are_same(_numbers(archive, there[0]), _numbers(archive, key)):
@@ -195,7 +195,7 @@ def _are_same(first: Floats, second: Floats) -> bool:
 def _compare_parts(
     source: Source, archive: Archive, key: str, names: tuple[str, ...], vectors: Floats
 ) -> None:
-    """Warn of parts that contradict the complete poses."""
+    """Warn about parts that contradict the complete poses."""
     has_angles = not _flag(archive, "use_pca")
     has_angles &= not archive.has("flat_hand_mean") or _flag(archive, "flat_hand_mean")
     odd = []
@@ -207,7 +207,7 @@ def _compare_parts(
         usual = () if part in _HANDS else next(iter(joints.values()))
         turned = joints.get(len(numbers) // len(vectors), usual)
         if not turned or not set(turned) <= set(names):
-            continue  # hand components, or joints missing from the poses
+            continue  # columns of hand components, or of joints that the poses lack
         columns = [names.index(name) for name in turned]
         if not _are_same(vectors[:, columns].ravel(), numbers):
             odd.append(part)
@@ -236,7 +236,7 @@ def _split_poses(
             raise archive.fault("F002.motion-width", item=key, expected=list(joints), found=columns)
         if key in _HANDS and archive.has("flat_hand_mean") and not _flag(archive, "flat_hand_mean"):
             source.warn("F007.motion-angles", item=key)
-        if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one
+        if set(joints[columns]) <= set(names):  # pose_eye has both eyes, leye_pose one eye
             _compare_again(source, key, joints[columns], rows, names, parts)
             continue
         names += joints[columns]
@@ -356,7 +356,8 @@ def _up(archive: Archive, is_aist: bool) -> str:
         return said
     if is_aist:
         return "y"
-    is_speech = any(archive.has(key) for key in _EXPRESSIONS)  # EMAGE is y up, but unstated
+    # EMAGE is y up, although its files do not state it.
+    is_speech = any(archive.has(key) for key in _EXPRESSIONS)
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
 
 

@@ -80,7 +80,7 @@ class _Parser:
         # The channel and the key that contain the current word.
         self.channel: int | None = None
         self.key: int | None = None
-        self.starts: list[int] = []  # offsets of all channels
+        self.starts: list[int] = []  # offsets of all channels in the file
 
     def clip(self) -> Clip:
         """Return the whole file as a clip."""
@@ -199,7 +199,7 @@ class _Parser:
             time, value = self._number("time", of_key=True), self._number("value", of_key=True)
             row = time, value, self._tangent(), self._tangent(), start
             if math.isnan(time + value):
-                lost += 1  # already recorded; the curve is defined by the other keys
+                lost += 1  # the error has been recorded; the other keys define the curve
             else:
                 rows.append(row)
         self.key = None
@@ -314,7 +314,7 @@ def write(clip: Clip | Figure, path: str | Path) -> list[Diagnostic]:
     Returns
     -------
     list of Diagnostic
-        Empty: the format stores all of a clip.
+        Empty: the format stores every property of a clip.
 
     Raises
     ------

@@ -47,7 +47,7 @@ from viewer.rig.skin import Skin, skin_from_entries
 
 __all__ = ["read"]
 
-# From decimetres with y up to metres with z up, as in Anny.
+# Transform from decimetres with y up to metres with z up, as in Anny.
 _MATRIX = 0.1 * np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 

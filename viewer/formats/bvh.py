@@ -13,7 +13,7 @@ Words are separated by any white space, including line ends, and keywords are ca
 frame has one number per channel, with joints in the order of the file. Angles are degrees; a
 joint's rotation channels multiply from left to right: ``Zrotation Yrotation Xrotation`` is R = Rz
 Ry Rx. Position channels replace the joint's OFFSET. Unit and up axis are not in the file: both are
-estimated, unless the user specifies them, and the motion records how.
+estimated, unless the user specifies them, and the motion records the method.
 """
 
 from __future__ import annotations
@@ -129,7 +129,7 @@ def _rest_points(table: Table, skeleton: Skeleton) -> Floats:
 def _boxes(table: Table, parents: Ints) -> Floats:
     """Return a box for each joint from itself to its children or End Sites: (J, 2, 3).
 
-    Invariant for the exporter: if a joint has an End Site, it is at twice the centre of the box.
+    The exporter relies on an invariant: an End Site is at twice the centre of its joint's box.
     """
     inner = np.flatnonzero(parents >= 0)
     owners = np.concatenate([parents[inner], [joint for joint, _ in table.ends]]).astype(np.int32)

@@ -4,7 +4,7 @@ The format belongs to Autodesk and is not published. ufbx (github.com/ufbx/ufbx)
 to 7.7, ASCII and binary, in a child process, because its Python binding can crash. Transforms with
 pivots are folded into translation, rotation and scale, which is exact. Animations are baked at the
 file's frame rate and at their keys. Right-handed axes with y or z up and units of m, cm, mm or
-inches are kept; others are converted to y up and metres.
+inches are preserved; others are converted to y up and metres.
 """
 
 from __future__ import annotations

@@ -16,9 +16,12 @@ Vertices are ``base_shape`` plus shapes plus correctives, skinned by LBS with we
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.formats._archive.checking import archive_of, are_indices, corners_of, finite
 from viewer.formats._archive.values import Archive
@@ -27,6 +30,7 @@ from viewer.formats._mhr.rig import bind_matrices, read_feature, read_parameters
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import BlendShapes, Correctives
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skin import Skin, skin_from_entries
@@ -35,9 +39,10 @@ __all__ = ["read"]
 
 _RIG = "rig.npz"
 _LOD = re.compile(r"lod([0-6])\.npz")
-_USUAL = 1  # default level of detail in MHR's own loader and in SAM 3D Body
-_N_IDENTITY = 45  # number of shapes of the identity; the others are expressions
-_SMALLEST = 1e-5  # MHR's skinning omits smaller weights
+_USUAL = 1  # default level of detail in MHR's loader and in SAM 3D Body
+_ROWS = 8  # number of correctives per block, 1.8 MB at the default level of detail
+_N_IDENTITY = 45  # number of shapes of the identity; all other shapes are expressions
+_SMALLEST = 1e-5  # minimum weight; MHR's skinning omits smaller weights
 _RIG_KEYS = (
     "schema_version parameter_transform parameter_names joint_offsets joint_prerotations "
     "joint_parents joint_names inverse_bind_pose"
@@ -109,7 +114,7 @@ def _files(source: Source) -> tuple[Source, Source]:
 
 
 def _names(folder: Path) -> list[str]:
-    """Return the names of the files in a folder; raises FormatError if it cannot be listed."""
+    """Return the names of the files in a folder; raise FormatError if it cannot be listed."""
     try:
         return [path.name for path in folder.iterdir()]
     except OSError as problem:
@@ -173,7 +178,7 @@ def _shapes(lod: Archive, n_vertices: int) -> BlendShapes | None:
 def _correctives(
     source: Source, rig: Archive, lod: Archive, n_joints: int, n_vertices: int
 ) -> Correctives | None:
-    """Return the correctives; their offsets stay in single precision to save memory."""
+    """Return the correctives; their offsets stay in single precision, to save memory."""
     if not (lod.has("corrective_blendshapes") and rig.has("0.sparse_indices")):
         source.warn("F007.mhr-correctives")
         return None
@@ -187,4 +192,10 @@ def _correctives(
                 finite(lod, "corrective_blendshapes", row)
         return values
 
-    return Correctives(Deferred(array.shape, array.dtype, load), feature)
+    def blocks() -> Iterator[NDArray[Any]]:
+        for block in array.blocks(_ROWS):
+            if not np.isfinite(block).all():
+                finite(lod, "corrective_blendshapes", block)
+            yield block
+
+    return Correctives(SparseOffsets(array.shape, array.dtype, load, blocks), feature)

@@ -23,11 +23,10 @@ import numpy as np
 from viewer.formats._mesh.polygons import Picks, picked, triangulate
 from viewer.formats._mesh.surface import filled_normals, polygon_text, stated_unit, stated_up
 from viewer.formats._neutral import neutral_positions
-from viewer.formats._obj.lines import Places
 from viewer.formats._obj.mtl import read_libraries
 from viewer.formats._obj.parts import ObjParts, read_parts
 from viewer.formats._source import Source
-from viewer.rig.arrays import Bools, Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh
@@ -58,6 +57,7 @@ def read(source: Source) -> Figure:
         If the text violates the grammar; the error has the file and line.
     """
     parts = read_parts(source)
+    source.release()
     if len(parts.positions) == 0:
         looks = source.looks_like()
         raise source.fault("F002.obj-mesh", None if looks else source.end, looks=looks)
@@ -68,12 +68,14 @@ def read(source: Source) -> Figure:
     source.remember("triangles", lambda triangle: int(parts.offsets[owners[triangle]]))
     normals = _normals(source, parts)
     uvs, uv_triangles = _uvs(source, parts, picks)
+    # These tables are large and no longer needed.
+    parts.normals, parts.corners = parts.normals[:0].copy(), parts.corners[:0].copy()
     materials, of_face = _materials(source, parts)
     names, part_of_face = _parts_of(parts)
     mesh = Mesh(
-        positions=positions,
-        normals=filled_normals(source, normals, positions, triangles),
-        triangles=triangles,
+        positions=freeze(positions),
+        normals=freeze(filled_normals(source, normals, positions, triangles)),
+        triangles=freeze(triangles),
         uvs=uvs,
         uv_triangles=uv_triangles,
         materials=materials,
@@ -87,7 +89,7 @@ def read(source: Source) -> Figure:
         source.warn("F007.no-faces", n=mesh.n_vertices)
     if uvs is None and any(material.texture for material in materials):
         source.warn("F005.obj-texture")
-    head = source.data[:_HEAD].decode("ascii", "replace")
+    head = source.peek(_HEAD).decode("ascii", "replace")
     comments = "\n".join(re.findall(r"^#.*$", head, re.MULTILINE))
     return Figure(
         name=source.path.stem,
@@ -143,7 +145,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     vertices, indices = parts.corners[:, 0], parts.corners[:, 2]
     if not used.all():
         vertices, indices = vertices[used], indices[used]
-    # Most vertices have the same normal in all corners, so that few need to be compared.
+    # Most vertices have the same normal at all corners, so only few need to be compared.
     chosen = np.full(n_vertices, -1, dtype=indices.dtype)
     chosen[vertices] = indices
     others = np.flatnonzero(chosen[vertices] != indices)
@@ -165,7 +167,7 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     return result
 
 
-def _means(n_vertices: int, vertices: Places, indices: Places, listed: Floats) -> Floats:
+def _means(n_vertices: int, vertices: Picks, indices: Picks, listed: Floats) -> Floats:
     """Return the mean of each vertex's distinct normals: (V, 3)."""
     # Products of two counts exceed 32 bits in files of some 50,000 vertices.
     pairs = np.unique(vertices.astype(np.int64) * len(listed) + indices)
@@ -195,7 +197,7 @@ def _materials(source: Source, parts: ObjParts) -> tuple[tuple[Material, ...], I
 
 
 def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints]:
-    """Return the distinct names of runs of faces, and the index of each face's, or -1."""
+    """Return the distinct names of runs of faces, and the index of the name of each face, or -1."""
     names = list(dict.fromkeys(name for _, name in runs))
     numbers = {name: index for index, name in enumerate(names)}
     of_run = np.array([-1, *(numbers[name] for _, name in runs)], dtype=np.int32)

@@ -120,7 +120,7 @@ def _layout(n_joints: int) -> PoseLayout:
 
 
 def _neutral_mesh(parts: dict[str, Part]) -> Floats:
-    """Return the vertices; those of invalid rows are moved between their neighbours."""
+    """Return the vertices; vertices of invalid rows are moved between their neighbours."""
     positions, faces = parts["vertices"].values, parts["faces_vert"].values
     if not np.isnan(positions).any():
         return positions

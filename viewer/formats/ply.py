@@ -30,7 +30,7 @@ from viewer.formats._ply.rows import Table, read_tables
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.phrases import printable
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Floats, Ints, freeze
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
@@ -79,13 +79,15 @@ def read(source: Source) -> Figure:
     materials = _materials(source, header, uvs is not None)
     # Scans also have the colours of their texture at the vertices.
     is_painted = any(material.image is not None for material in materials)
+    colors = None if is_painted else _colors(source, vertices)
+    vertices.columns.clear()  # the values of the file, which take more memory than the mesh
     mesh = Mesh(
-        positions=positions,
-        normals=filled_normals(source, normals, positions, triangles),
-        triangles=triangles,
+        positions=freeze(positions),
+        normals=freeze(filled_normals(source, normals, positions, triangles)),
+        triangles=freeze(triangles),
         uvs=uvs,
         uv_triangles=uv_triangles,
-        colors=None if is_painted else _colors(source, vertices),
+        colors=colors,
         materials=materials,
         triangle_materials=np.zeros(len(owners), np.int32) if materials else None,
     )
@@ -181,6 +183,8 @@ def _faces(
     corners = _corners(source, faces, counts, values, n_vertices)
     small = counts < 3
     uvs = _wedges(source, faces, counts)
+    faces.lists.clear()
+    del values
     if small.any():
         source.warn("F007.ply-small-faces", n=int(small.sum()), face=int(small.argmax()))
         keeps = np.repeat(~small, counts)
@@ -251,7 +255,7 @@ def _wedges(source: Source, faces: Table, counts: Indices) -> Floats | None:
 def _uvs(
     source: Source, vertices: Table, wedges: Floats | None, picks: Indices
 ) -> tuple[Floats | None, Ints | None]:
-    """Return texture coordinates: the distinct coordinates of corners, or those of vertices."""
+    """Return texture coordinates: distinct ones of corners, or the coordinates of vertices."""
     if wedges is not None and len(wedges):
         # Each pair is viewed as one complex number, so that sorting finds equal pairs.
         pairs = np.ascontiguousarray(wedges + 0.0).view(np.complex128).ravel()
@@ -302,7 +306,8 @@ def _report(source: Source, tables: dict[str, Table], uses_wedges: bool, is_pain
         "vertex": {"x", "y", "z", "nx", "ny", "nz", *(name for pair in _UVS for name in pair)},
         "face": {*CORNERS, *(("texcoord",) if uses_wedges else ())},
     }
-    if not is_painted and set(_COLORS[:3]) <= set(tables["vertex"].columns):
+    single = {p.name for p in tables["vertex"].element.properties if not p.count_kind}
+    if not is_painted and set(_COLORS[:3]) <= single:
         used["vertex"] |= {*_COLORS}
     left = []
     for name, table in tables.items():

@@ -162,7 +162,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
 
 
 def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:
-    """Return a function that finds the line of a part of a record, or of a DOF by its name."""
+    """Return a function that finds the line of a part of a record, or of a named DOF."""
 
     def line(part: str, name: str) -> int | None:
         offset = named.offset(keys.get(part, part), *([name] if name else []))

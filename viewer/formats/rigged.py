@@ -3,7 +3,7 @@
 ::
 
     viewer_rig ()   name ()   up ()   unit ()
-    positions (V, 3)   triangles (T, 3)   and the rest of the mesh, see ``_rigged/mesh.py``
+    positions (V, 3) triangles (T, 3) and other arrays of the mesh, see ``_rigged/mesh.py``
     joint_names (J,)   parents (J,)   rest_translations (J, 3)   rest_rotations (J, 4)
     rest_scales (J, 3)   dof_joints (D,)   dof_kinds (D,)   rest_dofs (D,)   dof_limits (D, 2)
     boxes (J, 2, 3)   auxiliary (J,)   skin_starts (V + 1,)   skin_joints (N,)
@@ -69,7 +69,7 @@ def read(source: Source) -> Figure:
     Raises
     ------
     FormatError
-        If an array is missing or has a wrong shape, or the parts do not match each other.
+        If an array is missing or has the wrong shape, or the parts do not match each other.
     """
     archive = archive_of(source)
     version = int(_finite(archive, "viewer_rig", ()))

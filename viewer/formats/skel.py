@@ -51,7 +51,7 @@ class _Joint:
     boxmin: Sequence[float] = (-0.1, -0.1, -0.1)
     boxmax: Sequence[float] = (0.1, 0.1, 0.1)
     pose: Sequence[float] = (0.0, 0.0, 0.0)
-    # Limits and their offset, by axis.
+    # Limits and their offsets in the file, by axis.
     limits: dict[int, tuple[list[float], int]] = field(default_factory=dict)
 
 
@@ -214,7 +214,7 @@ class _Parser:
         self._skip_item()
 
     def _skip_item(self, on_line: bool = True) -> None:
-        """Skip the rest of an item: the rest of its line, and numbers on the lines below."""
+        """Skip the remainder of an item: the rest of its line, and numbers on the lines below."""
         while self.word is not None and self.word.group() not in (b"{", b"}", *KEYWORDS):
             last = self.word
             if not (on_line or is_number(last.group()) or is_infinite(last.group())):

@@ -38,7 +38,7 @@ _KEYS = (
 # The joint of SMPL whose correctives each joint drives; 0 for none.
 _SMPL = (0, 2, 5, 8, 8, 11, 1, 4, 7, 7, 10, 3, 6, 15, 14, 17, 19, 0, 21, 13, 16, 18, 0, 20)
 _N_SMPL = 24
-_ROUNDED = 1e-3  # maximum error of a rotation's entries; files are in single precision
+_ROUNDED = 1e-3  # maximum error of a rotation's entries, which files store in single precision
 
 
 def read(source: Source) -> Figure:

@@ -291,7 +291,7 @@ def _as_rest_of_line(texture: str | None) -> str | None:
     """Return a texture's name as it would be read back."""
     try:
         text = (texture or "").encode("utf-8", "surrogateescape").strip()
-    except UnicodeEncodeError:  # a lone surrogate, which decoding never yields
+    except UnicodeEncodeError:  # the name has a lone surrogate, which decoding never yields
         return None
     return re.split(rb"[\r\n{}]", text)[0].decode("utf-8", "surrogateescape") or None
 
@@ -312,7 +312,7 @@ def _save_texture(material: Material, folder: Path) -> None:
     """Save an image under its name in the file, unless the same image is already there."""
     if material.texture is None or material.image is None:
         return
-    name = Path(material.texture.replace("\\", "/"))  # interpreted in the same way as by the reader
+    name = Path(material.texture.replace("\\", "/"))  # the reader interprets it in the same way
     path = folder / name
     if path.exists():
         there = load_image(Source(folder / "x.skin", b""), material.texture, 0)

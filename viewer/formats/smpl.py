@@ -52,8 +52,9 @@ __all__ = ["KEYS", "read"]
 KEYS = ("v_template", "f", "weights", "J_regressor", "kintree_table")
 """Required keys, which identify such a model."""
 
-_ODD_SUM = 0.05  # deviation of a joint regressor's sum from 1, which would displace the joint
-_ROUNDED = 1e-3  # largest deviation of weight sums from 1 that is corrected by normalising
+# Maximum deviation of a joint regressor's sum from 1; a larger one would displace the joint.
+_ODD_SUM = 0.05
+_ROUNDED = 1e-3  # maximum deviation of weight sums from 1 that is corrected by normalising
 _ROOTS = (-1.0, 4294967295.0, 4294967296.0)  # -1, as uint32, and as uint32 converted to float32
 
 

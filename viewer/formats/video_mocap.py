@@ -1,6 +1,6 @@
 """Reader of results of video motion capture: people reconstructed from a video.
 
-Each tool writes a different kind of files: see the modules in ``_video_mocap/``. They are
+Each tool writes different files: see the modules in ``_video_mocap/``. They are
 recognised by their contents. People keep their IDs and the frames in which they are visible.
 """
 
@@ -40,11 +40,11 @@ def open_results(
     source : Source
         File or folder of the tool.
     frame_rate : float, optional
-        Frames per second; that of the tool by default, or 30 if it has none.
+        Frames per second; the tool's rate by default, or 30 if it has none.
     space : "world", "camera" or ""
         The space of the bodies; the world by default, if the file has it.
     up : "y", "z", "-y", "-z" or ""
-        Up axis of the space; that of the tool by default.
+        Up axis of the space; the tool's up axis by default.
     average_shape : bool
         Average each person's shape over time.
     video_rate : float, optional

@@ -76,8 +76,8 @@ def lint_again(
     progress : callable, optional
         As for ``lint_scene``; reading files is included.
     is_likely : bool
-        Whether the scene may not come from these files: they are used only if they have a part in
-        common with the scene.
+        Whether the scene may come from other files: these files are then used only if they have a
+        part in common with the scene.
     """
     opened = open_files(paths, settings, progress=progress)
     findings = lint_scene(scene, options, progress)
@@ -111,7 +111,7 @@ def _is_there(path: Path) -> bool:
 
 
 def _changed(path: Path) -> float:
-    """Return the time of the last change to a file, or to any file in a folder, since the epoch."""
+    """Return when a file, or any file in a folder, was last changed, as seconds since the epoch."""
     return max(map(_last_change, _with_contents(path)), default=0.0)
 
 
@@ -133,7 +133,7 @@ def _last_change(path: Path) -> float:
 
 
 def _owners(actor: Actor, index: int, opened: Opened) -> Owners:
-    """Return the file's actor for each part of an actor, preferably the one at the same index."""
+    """Return, for each part of an actor, the opened actor that has it, preferably by index."""
     others = list(enumerate(opened.scene.actors))
     others.sort(key=lambda pair: pair[0] != index)
     owners: Owners = {}

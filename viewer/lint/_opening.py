@@ -147,7 +147,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         figure = replace(figure, animations=valid)
     try:
         if figure.correctives is not None:
-            figure.correctives.values()
+            figure.correctives.check_values()
     except FormatError as problem:
         refusals.append(of_error(problem))
         figure = replace(figure, correctives=None)
@@ -226,7 +226,7 @@ def _is_unbound(figure: Figure, source: Source) -> bool:
 def _culprit(problem: ViewerError, contents: Contents) -> Path | None:
     """Return the file that an error is about, or the last file read if the error has none.
 
-    None if the file was not read here.
+    The result is None if the file was not read here.
     """
     paths = [path for name in _LISTS for path, _ in getattr(contents, name)]
     found = problem.diagnostic
@@ -248,7 +248,7 @@ def with_files(
     findings: list[Finding],
     looked_at: tuple[Scene, Sequence[Owners]] | None = None,
 ) -> list[Finding]:
-    """Return all findings, those of the scene with their files, without duplicate messages.
+    """Return all findings without duplicate messages, and with files for those about the scene.
 
     Parameters
     ----------

@@ -42,7 +42,7 @@ def finding_text(finding: Finding) -> str:
     who = "".join(f"{printable(name, 100)}: " for name in names if name)
     head = f"{place}: " if place else ""
     text = f"{finding.severity} {finding.code}: {who}{printable(finding.message, 2000)}"
-    return f"{head}{text}\n    {finding.title}: {finding.hint}"
+    return f"{head}{text}\n    {finding.title}; remedy: {finding.hint}"
 
 
 def summary(findings: Sequence[Finding], n_files: int = 0) -> str:

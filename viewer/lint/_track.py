@@ -38,7 +38,7 @@ class Track:
     scale : float
         Scene units per figure unit.
     feet : (N,) int32
-        The joint of each foot nearest to the ground; empty without two feet by name.
+        The joint of each foot nearest to the ground; empty unless joint names identify two feet.
     soles : (F, N)
         Height of each foot's lowest point in the scene.
     """

@@ -9,6 +9,7 @@ from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Track
 from viewer.lint._tracks import track_of
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.frame_rows import runs_of
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.ground_height import Ground, ground_of, resting_frames
 from viewer.rig.inspection.soles import extent
@@ -26,6 +27,8 @@ _FACTOR = 3.0  # multiple of the limit above which even a single frame is report
 # Lengths are relative to the size of the skeleton at rest: 1.9 m for a person with spread arms.
 _TOUCHES = 0.02  # maximum height of a foot that touches the ground
 _SLIDES = 0.15  # minimum speed that counts as sliding, per second
+_DRIFTS = 0.5  # per second: a foot that stood still and then moves faster starts to swing
+_LASTS = 0.2  # seconds for which a foot slides; starting and landing take less
 _SWINGS = 1.0  # maximum speed, per second: a faster foot swings just above the ground
 _FAR = 0.03  # minimum total distance during one contact
 _WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
@@ -176,8 +179,8 @@ def _slipped(
     along = track.positions[:, feet][..., flat]
     moved = np.linalg.norm(along[width:] - along[:-width], axis=2)
     speeds = moved / (width * step)
-    slides = (speeds > _SLIDES * track.size) & (speeds < _SWINGS * track.size)
-    slides &= _held(stands, width)
+    low = _held(stands, width)
+    slides = _sliding(speeds / track.size, low, max(1, round(_LASTS / step)))
     paths = np.array([_path(along[:, foot], slides[:, foot], width) for foot in range(len(feet))])
     if not (paths > _FAR * track.size).any():
         return []
@@ -201,6 +204,36 @@ def _slipped(
             at=("frames", fastest + width),
         )
     ]
+
+
+def _sliding(speeds: Floats, low: Bools, shortest: int) -> Bools:
+    """Return the windows in which low feet slide: (W, N).
+
+    A foot swings close to the ground as well, but while another foot stands still and only after
+    speeding up. So a foot slides if it stood still before and does not speed up much, or if no
+    other foot stands still. Starting and landing feet slide only for short times.
+
+    Parameters
+    ----------
+    speeds : (W, N)
+        Horizontal speeds relative to the size of the skeleton.
+    low : (W, N)
+        Windows in which feet touch the ground.
+    shortest : int
+        Number of windows that sliding lasts at least.
+    """
+    rests = low & (speeds < _SLIDES)
+    drifts = low & (speeds < _DRIFTS)
+    stands = np.zeros_like(low)
+    for foot in range(low.shape[1]):
+        for first, last in runs_of(drifts[:, foot]):
+            stands[first:last, foot] = rests[first:last, foot].any()
+    result = stands | (stands.sum(axis=1) == 0)[:, None]
+    result &= low & (speeds > _SLIDES) & (speeds < _SWINGS)
+    for foot in range(low.shape[1]):
+        for first, last in runs_of(result[:, foot]):
+            result[first:last, foot] &= last - first >= shortest
+    return result
 
 
 def _path(along: Floats, slides: Bools, width: int) -> float:

@@ -125,7 +125,7 @@ def _exchanged(subject: Subject, other: Actor, one: _Path, two: _Path) -> list[F
 
 
 def _continued(subject: Subject, other: Actor, own: _Path, path: _Path) -> list[Finding]:
-    """Report a person who appears where another one has just disappeared for good."""
+    """Report a person who appears where another one has just disappeared permanently."""
     first, last = int(np.flatnonzero(own.present)[0]), int(np.flatnonzero(path.present)[-1])
     pause = first - last
     if not 0 < pause <= _LATER * own.timing.frame_rate:

@@ -9,7 +9,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents
-from viewer.loading.covering import with_texture
+from viewer.loading.texturing import with_texture
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor

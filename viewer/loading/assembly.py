@@ -256,7 +256,7 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
     """Apply a texture to the first actor that can show it and has none."""
-    from viewer.loading.covering import with_texture
+    from viewer.loading.texturing import with_texture
 
     open_for_it = [
         actor

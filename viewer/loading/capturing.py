@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
@@ -12,7 +12,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.loading.carrying import carrying_drive
+from viewer.loading.body_driving import body_drive
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
@@ -20,8 +20,9 @@ from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip
-from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.evaluation import frame_rate, pose_actor
 from viewer.rig.motion.parameter_clip import parameter_clip
+from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip, joined
 from viewer.rig.motion.spring_motion import springs_for
 from viewer.rig.motion.timing import Timing
@@ -82,6 +83,8 @@ class Builder:
         Whether the feet of the target still have to be planted.
     hangs : bool
         Whether the axis along which people stand points down before placement.
+    defers : bool
+        Whether the caller computes the final motions and passes them to ``finish``.
     """
 
     capture: Capture
@@ -100,6 +103,7 @@ class Builder:
     joint_map: JointMap | None = None
     plants_feet: bool = True
     hangs: bool = False
+    defers: bool = False
     _names_shapes: bool = False  # whether any person has shape coefficients, even if all are 0
     _has_parameters: bool = False
     _grows: bool = True  # whether the motions of driven figures are computed part by part
@@ -217,26 +221,44 @@ class Builder:
     def _drive(self, clip: SampledClip) -> Drive:
         # Feet are planted at the end, because contacts and the ground need the whole motion.
         up = f"-{self.up}" if self.hangs else self.up
-        return carrying_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+        return body_drive(self.model, clip, up, self.joint_map, plants_feet=False)
 
     def _finished(self) -> list[Diagnostic]:
         """At the end, compute the whole motions of driven figures and plant their feet, once."""
+        return [] if self.defers else self.finish(self.final_motions())
+
+    def final_motions(self) -> list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]:
+        """Return the final motions of driven people once everything has been read.
+
+        They can be computed in another thread while nothing else changes the builder.
+        """
         is_left = self.plants_feet or self._is_behind
         if not (self.is_done and is_left and self.target is not None):
             return []
-        plants_feet, self.plants_feet, self._is_behind = self.plants_feet, False, False
-        notes: list[Diagnostic] = []
+        found = []
         for actor in self._bodies.values():
             if actor.drive is not None:
-                actor.drive = replace(actor.drive, plants_feet=plants_feet)
-                actor.clip, said = driven_clip(actor.drive, self.target)
-                notes += [replace(note, path=self.path) for note in said]
+                drive = replace(actor.drive, plants_feet=self.plants_feet)
+                found.append((actor, drive, *driven_clip(drive, self.target)))
+        return found
+
+    def finish(
+        self, motions: Sequence[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
+    ) -> list[Diagnostic]:
+        """Give people their final motions; return messages about these."""
+        notes: list[Diagnostic] = []
+        for actor, drive, clip, said in motions:
+            # The user may have changed the frame rate of a motion that is already shown.
+            rate = clip.timing.frame_rate if actor.clip is None else frame_rate(actor.clip)
+            actor.drive, actor.clip = drive, with_rate(clip, rate)
+            self.plants_feet = self._is_behind = False
+            notes += [replace(note, path=self.path) for note in said]
         return notes
 
     def _add_clip(
         self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
     ) -> None:
-        """Append a clip to that of a person, or add an actor; ``drive``: motion of its source."""
+        """Append a clip to a person's clip, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
             actor = self._actor(self.target or self.model, clip, person)
@@ -308,7 +330,7 @@ class Builder:
                 actor.placement = self.placement.copy()
 
     def carry_to(self, target: Figure) -> list[Diagnostic]:
-        """Let the bodies, including later ones, move another figure; ``place`` comes first.
+        """Let the bodies, also later ones, move another figure; ``place`` must be called first.
 
         Returns messages about matched joints. Raises RigError if too few match; nothing changes
         then.
@@ -352,7 +374,7 @@ def _grown(first: Drive, second: Drive) -> Drive:
 
 
 def _extended(first: SampledClip, second: SampledClip) -> SampledClip:
-    """Return one clip of the rows of two with the same timeline."""
+    """Return one clip with the rows of two clips on the same timeline."""
     return joined([first, second], joined_timing(first.timing, second.timing, first.n_rows))
 
 
@@ -363,6 +385,6 @@ def joined_timing(first: Timing, second: Timing, shift: int) -> Timing:
 
 
 def joined_points(first: PointClip, second: PointClip) -> PointClip:
-    """Return one clip of the concatenated rows of two with the same timeline."""
+    """Return one clip with the concatenated rows of two clips on the same timeline."""
     timing = joined_timing(first.timing, second.timing, len(first.points))
     return PointClip(first.name, timing, np.concatenate([first.points, second.points]))

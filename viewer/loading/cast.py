@@ -32,7 +32,7 @@ class Cast:
     placed : list of bool
         Whether each actor's motion determines its position.
     groups : list of FigureGroup or None
-        Group of each actor's figure; its actors keep their places relative to each other.
+        Group of each actor's figure; its actors keep their positions relative to each other.
     builders : list of Builder
         Captures that are still being read.
     views : list of CameraView

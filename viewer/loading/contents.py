@@ -42,7 +42,7 @@ class Contents:
     figures : list of (Path, Figure)
         All figures, including the figures of groups.
     groups : list of FigureGroup
-        Figures of one file, which keep their places relative to each other and to their cameras.
+        Figures of one file, which keep their positions relative to each other and to their cameras.
     called : dict
         Figure names by resolved file, if another file specifies one.
     diagnostics : tuple of Diagnostic
@@ -249,7 +249,7 @@ def _is_picture(source: Source) -> bool:
 def _with_own_picture(source: Source, figure: Figure) -> Figure:
     """Apply the image in a figure's folder as its texture, if there is exactly one."""
     from viewer.formats import read_picture, referenced_path
-    from viewer.loading.covering import with_texture
+    from viewer.loading.texturing import with_texture
 
     mesh = figure.mesh
     if mesh is None or mesh.uvs is None or mesh.materials:

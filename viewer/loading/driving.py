@@ -12,9 +12,9 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
+from viewer.loading.body_driving import body_drive, has_joints
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
-from viewer.loading.carrying import carrying_drive, has_joints
 from viewer.loading.cast import Cast
 from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
@@ -272,7 +272,7 @@ def _carried(
     Raises RigError if too few joints match.
     """
     assert isinstance(actor.clip, SampledClip)  # the clip of a captured body
-    drive = carrying_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
+    drive = body_drive(actor.figure, actor.clip, up, settings.joint_map, settings.feet)
     try:
         clip, notes = driven_clip(drive, target)
     except RigError as problem:

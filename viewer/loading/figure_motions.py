@@ -64,7 +64,7 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
 def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
     """Let skeletons with animations, but without a mesh, move figures that have no motion.
 
-    A skeleton that moves another figure is not shown itself. Returns whether there is one.
+    A skeleton that moves another figure is not shown itself. Returns whether any skeleton does so.
 
     Parameters
     ----------
@@ -90,7 +90,7 @@ def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
         try:
             motion = _motion_of(figure, wanted)
         except RigError:
-            continue  # the start of the animations reports it
+            continue  # reported when the animations are started
         drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
         if drive_somebody(actor.origin or Path(figure.name), drive, cast, np.eye(4))[0]:
             cast.take(next(n for n, other in enumerate(cast.actors) if other is actor))

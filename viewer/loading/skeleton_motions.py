@@ -25,7 +25,7 @@ from viewer.rig.retargeting.source_rest import rest_fault
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.units import METRES, is_metres
 
-__all__ = ["Lone", "agree_on_units", "drive_somebody", "give_skeleton_motion"]
+__all__ = ["Lone", "agree_on_units", "as_asked", "drive_somebody", "give_skeleton_motion"]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,7 +79,7 @@ def give_skeleton_motion(
     RigError
         If it does not match the model.
     """
-    motion = _as_asked(motion, settings)
+    motion = as_asked(motion, settings)
     for note in motion.up_notes:
         cast.note("F007.up-taken", path, note=note)
     fault = rest_fault(motion, settings.source_rest)
@@ -115,7 +115,7 @@ def give_skeleton_motion(
     return Lone(path, motion, actor)
 
 
-def _as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
+def as_asked(motion: SkeletonMotion, settings: MotionSettings) -> SkeletonMotion:
     """Return a motion in the requested unit, up axis and rate; others are estimated."""
     if settings.unit:
         motion = _in_metres(motion, settings.unit, f"{settings.unit} in the file, as requested")
@@ -184,7 +184,7 @@ def drive_somebody(
 
 
 def agree_on_units(cast: Cast, lone: list[Lone]) -> None:
-    """Scale separate skeletons to metres if other actors have a different unit; record the guesses.
+    """Scale separate skeletons to metres if other actors have another unit; record the estimates.
 
     A lone skeleton, or one among others in the same unit, keeps the values of its file.
 

@@ -36,10 +36,10 @@ VARIABLE = "VIEWER_CACHE"
 """Environment variable: a folder for the cache, or ``off``."""
 
 LIMIT = 1 << 29
-"""Bytes of all entries; beyond it, the least recently used ones are removed."""
+"""Maximum size of all entries in bytes; beyond it, the least recently used ones are removed."""
 
 _OFF = ("off", "0", "no", "none")
-_LEAST = 1 << 15  # bytes; shorter texts are parsed faster than an entry is opened
+_LEAST = 1 << 15  # minimum bytes: parsing shorter text is faster than opening an entry
 _LARGEST = 1 << 25  # maximum bytes of an entry; larger ones would evict all others
 _SUFFIX = ".array"
 _HEADER = struct.Struct("<16sIQ4s3Q")
@@ -58,7 +58,7 @@ def cache_folder() -> Path | None:
     if asked:
         return Path(os.path.abspath(os.path.expanduser(asked)))  # noqa: PTH100, PTH111
     if sys.platform.startswith("linux"):
-        # As platformdirs defines it; importing it takes longer than reading a small entry.
+        # As in platformdirs, whose import takes longer than reading a small entry.
         base = os.environ.get("XDG_CACHE_HOME", "").strip()
         home = base if os.path.isabs(base) else os.path.expanduser("~/.cache")  # noqa: PTH111, PTH117
         return Path(home) / "viewer" / "arrays"

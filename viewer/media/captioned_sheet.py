@@ -24,9 +24,9 @@ __all__ = ["CaptionedCell", "captioned_sheet", "elided", "wrapped"]
 _WIDTH = 240  # width of a cell, pixels
 _HEIGHTS = 120, 320  # minimum and maximum height of a cell's picture
 _CAPTION = 24  # height of a caption, pixels
-_GAP = 16  # margin between cells and around the sheet
-_LETTERS = 13  # height of letters
-_LINE = 18  # height of a line in a cell without a picture
+_GAP = 16  # margin between cells and around the sheet, pixels
+_LETTERS = 13  # height of letters, pixels
+_LINE = 18  # height of a line in a cell without a picture, pixels
 _PAPER, _INK = (255, 255, 255, 255), (40, 44, 52, 255)
 _EMPTY, _EDGE = (243, 244, 246, 255), (222, 225, 230, 255)
 _FAILED, _FAILED_EDGE, _FAILED_INK = (253, 236, 234, 255), (214, 69, 58, 255), (150, 28, 20, 255)
@@ -111,7 +111,7 @@ def _draw_text(
 
 
 def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
-    """Return a text that fits, with its middle elided if it is too long.
+    """Return text that fits, with its middle elided if it is too long.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def elided(text: str, width: float, length_of: Callable[[str], float]) -> str:
 
 
 def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], float]) -> list[str]:
-    """Return the lines of a text; long words are broken, and text that does not fit is omitted.
+    """Return text as lines; long words are broken, and text that does not fit is omitted.
 
     >>> wrapped("expected 3 numbers", 10, 2, len)
     ['expected 3', 'numbers']
@@ -165,7 +165,7 @@ def wrapped(text: str, width: float, n_lines: int, length_of: Callable[[str], fl
 
 
 def elided_end(text: str, width: float, length_of: Callable[[str], float]) -> str:
-    """Return a text with an ellipsis at its end, shortened until it fits.
+    """Return text with an ellipsis at its end, shortened until it fits.
 
     >>> elided_end("numbers", 7, len)
     'number…'

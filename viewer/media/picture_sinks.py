@@ -17,7 +17,7 @@ from viewer.rig.arrays import Bytes
 __all__ = ["PictureSink", "SheetSink", "sheet_layout"]
 
 _MOST_WORKERS = 4  # maximum number of images compressed at the same time
-_SMALLEST_CELL = 16  # pixels
+_SMALLEST_CELL = 16  # minimum side of a cell, pixels
 _CELL_ASPECT = 4.0 / 3.0
 _GUTTER = 0.006  # gutter between cells, relative to the image's shorter side
 _WHITE = (255, 255, 255, 255)

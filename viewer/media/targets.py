@@ -89,7 +89,7 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
 def _checked(
     file: Path, inputs: _Inputs, force: bool, hint: str, folders: set[Path]
 ) -> _Identity | None:
-    """Check one file and return its identity; None for a device or stream, never replaced."""
+    """Check one file and return its identity; None for devices and streams, never replaced."""
     if is_stdout(file):
         require_stdout(file)
         return None

@@ -230,7 +230,7 @@ class VideoSink:
         return "yuva420p" if self._has_alpha else "yuv420p"
 
     def _picture(self, pixels: Bytes) -> VideoFrame:
-        """Return the pixels in FFmpeg's memory, the edges repeated where the size must be even."""
+        """Return the pixels in FFmpeg's memory, with repeated edges if the size must be even."""
         (wide, high), (height, width) = self._coded, pixels.shape[:2]
         picture: VideoFrame = self._av.VideoFrame(wide, high, "rgba")
         plane = picture.planes[0]

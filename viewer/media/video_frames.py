@@ -20,7 +20,7 @@ _PICTURES = ("_pipe", "image2")  # FFmpeg's formats of single pictures
 _BYTES = 96_000_000  # size of the cache of decoded frames, which makes stepping back fast
 _FEWEST = 2  # minimum number of cached frames, regardless of their size
 _AHEAD = 2.0  # up to this number of seconds, decoding forwards is faster than seeking
-_ON_TIME = 1e-6  # seconds
+_ON_TIME = 1e-6  # tolerance of times, seconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +58,7 @@ class VideoFrames:
     rate : float
         Frames per second, on average.
     n_frames : int
-        Number of frames according to the file; 0 if it does not state it.
+        Number of frames according to the file; 0 if unknown.
 
     Raises
     ------

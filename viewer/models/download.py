@@ -16,7 +16,7 @@ from viewer.phrases import printable
 __all__ = ["ADDABLE", "add_model", "pip_command"]
 
 ADDABLE = {"anny": "anny==0.6.2"}
-"""Models that can be added, and the Python package of each, in a version that is tested."""
+"""Models that can be added, and the Python package of each, in a tested version."""
 
 
 def pip_command(name: str, folder: str | Path) -> list[str]:

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped, shaped_skeleton
 
 __all__ = ["spheres_of"]
 
@@ -58,11 +58,11 @@ def _of_mesh(actor: Actor, options: DisplayOptions) -> Floats:
 def _of_joints(actor: Actor) -> Floats:
     """Return spheres around an actor's bones and joint boxes, figure space."""
     pose = actor.require_pose()
-    skeleton = shaped(actor.figure, pose.shape_weights).require_skeleton()
+    skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
     world = posed_skeleton(skeleton, pose).world
     places = world[:, :3, 3]
     size, mesh = box_size(bounding_box(places)), actor.figure.mesh
-    if size == 0.0 and mesh is not None:  # if all joints coincide
+    if size == 0.0 and mesh is not None:  # used if all joints coincide
         size = box_size(bounding_box(mesh.positions))
     thick = np.full(len(places), _BONE * (size or 1.0))
     bones = np.column_stack([places, thick])

@@ -45,7 +45,7 @@ VIEWS = {
 _USUAL_AZIMUTH = 35.0  # initial angle from the front
 
 _MARGIN = 1.08  # margin around a framed figure
-_SMALLEST = 1e-9  # minimum distance; framing a single point would give less
+_SMALLEST = 1e-9  # minimum distance, for framing a single point
 
 
 @dataclass(slots=True)
@@ -113,7 +113,7 @@ class Camera:
 
     @property
     def is_parallel(self) -> bool:
-        """Whether the projection is parallel, which it never is for a calibrated camera."""
+        """Whether the projection is parallel; always False for a calibrated camera."""
         return self.orthographic and self.fixed is None
 
     def rotation(self) -> Floats:
@@ -266,7 +266,8 @@ def camera_from_view(
     fixed, view = view, view_at(view, seconds)
     width, height = picture_size(view)
     aspect = size[0] / size[1]
-    seen = max(height, width / aspect)  # rows of the image, including the margins above and below
+    # Number of rows of the image, including the margins above and below.
+    seen = max(height, width / aspect)
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)

@@ -10,7 +10,8 @@ from viewer.rig.scene import Scene
 
 __all__ = ["image_notes", "lens_notes"]
 
-_VISIBLE = 0.5  # pixels of the camera's images; smaller errors are not visible
+# Minimum reported distortion, in pixels of the camera's images; smaller ones are not visible.
+_VISIBLE = 0.5
 
 
 def image_notes(scene: Scene, camera: CameraView) -> list[str]:

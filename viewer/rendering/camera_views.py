@@ -28,7 +28,7 @@ __all__ = [
     "with_cameras",
 ]
 
-_FRAMED = 24  # number of positions along the path of a moving camera that are framed
+_FRAMED = 24  # number of framed positions along the path of a moving camera
 _TOLERANCE = 0.01  # maximum relative difference of aspect ratios: one pixel of a small image
 
 
@@ -89,7 +89,7 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 
 
 def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
-    """Return the points to frame: those of the figures, and of the cameras' frusta if drawn.
+    """Return the points to frame: the figures' points, and the corners of drawn frusta.
 
     Moving cameras are framed along their whole path.
     """

@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["FILTER_RADIUS", "NO_EFFECTS", "SHADOW_UNIT", "Effects", "Occlusion", "Shadow"]
 
-SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # texture units; lower ones belong to materials and skinning
+SHADOW_UNIT, _OCCLUSION_UNIT = 14, 15  # texture units; materials and skinning use the lower ones
 FILTER_RADIUS = 3.5
 """Radius of the shadow filter on surfaces, texels."""
 

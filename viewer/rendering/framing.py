@@ -131,10 +131,10 @@ def frames_looked_at(n_frames: int, most: int) -> list[int]:
 
 
 def outermost(points: Floats, n_directions: int = _N_DIRECTIONS) -> Floats:
-    """Return the extreme points along each of many directions.
+    """Return the points that are outermost in any of many directions.
 
-    Their bounding box is exact. A camera fitted to them cuts off much less than 1 % of the size, as
-    1000 directions are 7 degrees apart. The margin of ``fit`` is 8 %.
+    Their bounding box is exact. A camera fitted to these points cuts off much less than 1 % of the
+    size, because 1000 directions are 7 degrees apart; the margin of ``fit`` is 8 %.
 
     Parameters
     ----------
@@ -220,8 +220,9 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
     scene : Scene
         Scene with any number of actors.
     name : str
-        Name of an actor, for its root joint or the centre of its points; of a joint or captured
-        point; a person's number; or the joint of an actor, such as ``fox/head`` or ``1:pelvis``.
+        Name of an actor, which stands for its root joint or the centre of its points; name of a
+        joint or captured point; a person's number; or a joint of an actor, such as ``fox/head`` or
+        ``1:pelvis``.
     """
     wanted = name.lower()
     called = _called(scene)
@@ -238,7 +239,7 @@ def follow_candidates(scene: Scene, name: str) -> list[tuple[int, int]]:
 
 
 def _called(scene: Scene) -> list[tuple[str, ...]]:
-    """Return the names of each actor: its own, its figure's, and its person number."""
+    """Return each actor's names: the actor's own, its figure's, and its person number."""
     names = []
     for actor in scene.actors:
         by_figure = replace(actor, called="").name

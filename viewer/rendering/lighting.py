@@ -124,7 +124,7 @@ class Lighting:
             shadow = self._shadow_pass(size).draw(
                 casters.draw, self._spheres, direction, _SHADOW_STRENGTH * strength
             )
-            # The shadows of the passes are offset on the ground: they must overlap.
+            # The shadows of different passes are offset on the ground and must overlap.
             blur = _BLUR * casters.largest_mesh() if n_passes(options) > 1 else 0.0
             shadow = replace(shadow, angle=2.0 * math.pi * sample.phase, blur=blur)
         if options.quality == "final" and self._size > 0.0:

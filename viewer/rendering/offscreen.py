@@ -18,7 +18,8 @@ from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.inspection.front import guess_front
-from viewer.rig.scene import Scene, scene_box, scene_points
+from viewer.rig.mesh import bounding_box
+from viewer.rig.scene import Scene, scene_points
 
 __all__ = ["Offscreen", "default_camera", "render"]
 
@@ -141,8 +142,13 @@ def default_camera(scene: Scene, size: tuple[int, int], show: str = "skin") -> C
     show : str
         Drawn parts of the figures, a key of ``SHOWN``.
     """
+    return _framing(scene, size, scene_points(scene, show))
+
+
+def _framing(scene: Scene, size: tuple[int, int], points: Floats) -> Camera:
+    """Return the camera of ``default_camera`` for points (N, 3) of the scene."""
     camera = facing_camera(guess_front(scene), scene.up)
-    fit(camera, scene_points(scene, show), size[0] / size[1])
+    fit(camera, points, size[0] / size[1])
     return camera
 
 
@@ -191,7 +197,7 @@ def render(
         with offscreen.context:
             check_size(offscreen.context, size)  # checked before the camera divides by the height
     options = options or DisplayOptions(quality="normal")
-    camera = camera or default_camera(scene, size, options.show)
-    box = scene_box(scene, options.show)
+    points = scene_points(scene, options.show)
+    camera = camera or _framing(scene, size, points)
     with deferred():
-        return offscreen.render(scene, size, camera, options, box)
+        return offscreen.render(scene, size, camera, options, bounding_box(points))

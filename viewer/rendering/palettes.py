@@ -26,7 +26,7 @@ _DISTINCT = np.array(
     ]
 )  # fmt: skip
 _ROUNDS = (1.0, 0.55, 0.3)  # brightness levels of each colour
-_RELUCTANCE = 0.04  # OKLab distance by which a darker colour must be farther from its neighbours
+_RELUCTANCE = 0.04  # additional OKLab distance from its neighbours that a darker colour needs
 
 # Linear colours as seen with normal vision, protanopia and deuteranopia (Machado et al. 2009).
 _EYES = np.array(
@@ -50,8 +50,8 @@ _ENOUGH = 0.3  # OKLab distance beyond which colours are equally distinct
 def joint_palette(parents: Ints) -> Bytes:
     """Return a colour for every joint; neighbours differ clearly, even for colour-blind people.
 
-    Neighbours of a joint are its parent, grandparent, siblings and its parent's siblings. Among the
-    least-used colours, the one farthest from all neighbours is chosen.
+    Neighbours of a joint are its parent, its grandparent, its siblings and its parent's siblings.
+    Among the least-used colours, the one farthest from all neighbours is chosen.
 
     Parameters
     ----------

@@ -40,7 +40,8 @@ __all__ = ["Passes", "Pick", "PickPass"]
 
 _REACH = 3  # search radius around the requested pixel, pixels
 _SIDE = 2 * _REACH + 1
-_PREFERENCE = 2.5  # pixels by which a keypoint may be farther from the pointer than a surface
+# Distance by which a keypoint may be farther from the pointer than a surface, pixels.
+_PREFERENCE = 2.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -50,7 +50,7 @@ def pinhole_projection(view: CameraView, aspect: float, box: Floats) -> Floats:
     """Return the matrix from camera to clip space that reproduces the camera's image.
 
     OpenCV's pixel coordinates start at the centre of the first pixel, OpenGL's at its corner. So
-    with u from K and the image's width W, x in -1..1 is 2 (u + 1/2) / W - 1. An image with a
+    for u from K and the image's width W, x = 2 (u + 1/2) / W - 1 in -1..1. An image with a
     different aspect ratio shows all of the camera's image in its centre, with margins on two sides.
 
     Parameters
@@ -99,9 +99,9 @@ def _offset(principal: float, side: float) -> float:
 def distortion_error(view: CameraView) -> float:
     """Return the largest displacement of an image corner by lens distortion, pixels.
 
-    It is the error made by looking through the camera without distortion. OpenCV's model is, with
-    r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6)
-    + 2 p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
+    This is the error of a view through the camera that neglects the distortion. OpenCV's model is,
+    with r^2 = x^2 + y^2: x' = x (1 + k1 r^2 + k2 r^4 + k3 r^6) / (1 + k4 r^2 + k5 r^4 + k6 r^6) + 2
+    p1 x y + p2 (r^2 + 2 x^2), and likewise y' with p1 and p2 exchanged.
 
     Parameters
     ----------

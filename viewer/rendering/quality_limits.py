@@ -13,17 +13,19 @@ from viewer.rig.scene import Scene
 __all__ = ["limit_passes", "time_note"]
 
 _MOST_WORK = 2.0  # maximum work for a still image
-_FEWEST = 3  # minimum number of passes; fewer look no better than normal quality
+# Minimum number of passes, below which the image looks no better than in normal quality.
+_FEWEST = 3
 # Memory for the sum of passes and for occlusion at half resolution, and its limit.
 _BYTES_PER_PIXEL, _MOST_BYTES = 25, 1e9
-_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6  # work units, about seconds on two cores
-_PATIENCE = 5.0  # seconds above which the time is stated
+# Work per pass, pixel and triangle, in units of about a second on two cores.
+_PER_PASS, _PER_PIXEL, _PER_TRIANGLE = 0.02, 1e-7, 1.5e-6
+_PATIENCE = 5.0  # drawing time in seconds above which a message states it
 
 
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower a quality that would take software long, or need over 1 GB of memory.
+    """Lower the quality if it would take long in software, or need over 1 GB of memory.
 
     The work is counted, not timed, so that an image does not depend on the machine or its load.
 

@@ -123,7 +123,7 @@ class Recording:
     options : DisplayOptions
         Display options.
     box : (2, 3) or None
-        Bounds for the ground grid and the depth range; None for those of the current scene.
+        Bounds for the ground grid and the depth range; None for the current scene's bounds.
     moves : bool
         Whether clips pose the actors; if False, they keep their poses, for a turntable of a still
         pose.
@@ -261,7 +261,7 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         while wait([closing], _PATIENCE).not_done:
             yield progress(total)
         closing.result()
-    except BaseException:  # includes Ctrl-C and the closing of the generator
+    except BaseException:  # this includes Ctrl-C and the closing of the generator
         queue.stop()
         sink.abort()
         raise
@@ -297,7 +297,7 @@ class _Queue:
 
 
 class _Drawer:
-    """Draws the frames of a recording, each while the previous one is passed on."""
+    """Drawer of a recording's frames; each is drawn while the previous one is passed on."""
 
     def __init__(self, recording: Recording, renderer: Renderer) -> None:
         self._recording, self._renderer = recording, renderer
@@ -349,7 +349,7 @@ class _Drawer:
 
 
 class _Cameras:
-    """Camera of each frame; frames must be requested in order."""
+    """Cameras of the frames, which must be requested in order."""
 
     def __init__(self, recording: Recording) -> None:
         self._recording = recording

@@ -354,7 +354,7 @@ class Renderer:
         context.depth_func = "<"
 
     def _draw_legend(self, size: tuple[int, int]) -> None:
-        assert self.legend is not None  # guaranteed, as meshes were drawn with values
+        assert self.legend is not None  # meshes were drawn with values, so there is a legend
         note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
         if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
             self.notes.append(note)

@@ -1,4 +1,4 @@
-"""Passes of an image: small offsets that differ between the passes, whose images are averaged."""
+"""Passes of an image, whose results are averaged, and the small offsets between them."""
 
 from __future__ import annotations
 

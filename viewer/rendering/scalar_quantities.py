@@ -18,7 +18,7 @@ __all__ = ["ScalarQuantities", "name_for"]
 
 
 class ScalarQuantities:
-    """Values, colours and legend of the displayed scalar quantity, kept up to date.
+    """Values, colours and legend of the displayed scalar quantity, updated on demand.
 
     Attributes
     ----------
@@ -105,7 +105,7 @@ class ScalarQuantities:
 
 
 def name_for(name: str, actor: Actor | None, joint: int) -> str:
-    """Return a quantity's name, with the selected joint appended if it needs one and has none.
+    """Return a quantity's name; append the selected joint if the name lacks a required joint.
 
     Parameters
     ----------

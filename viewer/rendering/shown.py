@@ -18,7 +18,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.instance_buffers import InstanceBuffers
@@ -139,9 +139,9 @@ def update_skeletons(
         from viewer.rig.motion.instances import posed_worlds
 
         poses = [pose for _, pose in group]
-        skeleton = shaped(group[0][0].figure, poses[0].shape_weights).skeleton
-        assert skeleton is not None  # guaranteed by shows_skeleton
-        posed_worlds(skeleton, poses)  # computed in one batch; each pose caches its result
+        skeleton = shaped_skeleton(group[0][0].figure, poses[0].shape_weights)
+        # Matrices are computed in one batch, and each pose caches its result.
+        posed_worlds(skeleton, poses)
         for actor, pose in group:
             buffers.skeleton(actor).update(pose, options)
 

@@ -1,4 +1,4 @@
-"""Camera matrices shared by all passes, in float64 until they are uploaded."""
+"""Camera matrices that all passes share, in float64 until they are uploaded."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def view_of(camera: Camera, size: tuple[int, int], box: Floats) -> View:
 
 
 def in_front(view: View) -> View:
-    """Return a view whose depths are all in front of those of the given view."""
+    """Return a view whose depths are all in front of the given view's depths."""
     squeeze = np.eye(4)
     squeeze[2] = 0.0, 0.0, 0.01, -0.98
     return View(view.matrix, squeeze @ view.projection, view.camera)
@@ -62,8 +62,8 @@ def set_model(program: moderngl.Program, view: View, placement: Floats, center: 
 def normal_matrix(linear: Floats) -> Floats:
     """Return the matrix that transforms normals: the inverse transpose, up to a positive factor.
 
-    A singular matrix, as of a flattened or vanished mesh, has no inverse. Its cofactors, the
-    determinant times the inverse transpose, still transform normals.
+    A singular matrix, which flattens a mesh or shrinks it to a point, has no inverse. Its
+    cofactors, the determinant times the inverse transpose, still transform normals.
 
     Parameters
     ----------

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Iterator
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -11,7 +11,9 @@ from numpy.typing import DTypeLike, NDArray
 from viewer.errors import RigError
 from viewer.phrases import printable
 
-__all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "frozen"]
+__all__ = ["Bools", "Bytes", "Deferred", "Floats", "Ints", "freeze", "frozen"]
+
+Item = TypeVar("Item", bound=np.generic)
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -30,6 +32,9 @@ class Deferred:
         Element type declared by the file.
     load : callable
         Reads the array; called once; may raise a ``FormatError``.
+    blocks : callable, optional
+        Yields the array in blocks of a given number of rows, each valid until the next one, without
+        reading it as a whole; may raise a ``FormatError``.
 
     Attributes
     ----------
@@ -37,12 +42,17 @@ class Deferred:
         Whether the values are in memory.
     """
 
-    __slots__ = ("_load", "_values", "dtype", "shape")
+    __slots__ = ("_by_blocks", "_load", "_values", "dtype", "shape")
 
     def __init__(
-        self, shape: tuple[int, ...], dtype: DTypeLike, load: Callable[[], NDArray[Any]]
+        self,
+        shape: tuple[int, ...],
+        dtype: DTypeLike,
+        load: Callable[[], NDArray[Any]],
+        blocks: Callable[[int], Iterator[NDArray[Any]]] | None = None,
     ) -> None:
         self.shape, self.dtype, self._load = shape, np.dtype(dtype), load
+        self._by_blocks = blocks
         self._values: NDArray[Any] | None = None
 
     @property
@@ -63,6 +73,15 @@ class Deferred:
             values.flags.writeable = False
             self._values = values
         return self._values
+
+    def blocks(self, count: int) -> Iterator[NDArray[Any]]:
+        """Yield blocks of at most ``count`` rows, each valid until the next; see ``values``."""
+        if self._by_blocks is not None and self._values is None:
+            yield from self._by_blocks(count)
+            return
+        values = self.values()
+        for start in range(0, len(values), count):
+            yield values[start : start + count]
 
 
 def frozen(
@@ -103,6 +122,22 @@ def frozen(
     if (array is values or array.base is not None) and _is_writeable_by_others(array):
         array = array.copy()
     array.flags.writeable = False
+    return array
+
+
+def freeze(array: NDArray[Item]) -> NDArray[Item]:
+    """Make an array, and the arrays whose memory it uses, read-only, so that ``frozen`` keeps it.
+
+    For new arrays that no other code changes; a copy would double the memory.
+
+    >>> array = np.zeros(3)
+    >>> frozen("offset", freeze(array), (3,)) is array
+    True
+    """
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        owner.flags.writeable = False
+        owner = owner.base
     return array
 
 

@@ -2,50 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Deferred, Floats, Ints, frozen
+from viewer.rig.bodies.deferred_offsets import DeferredOffsets
 from viewer.rig.bodies.feature import Feature
 from viewer.rig.bodies.shape_space import ShapeSpace
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.expressions import ExpressionRules
+from viewer.rig.materials.material_binds import MaterialBinds
 
 __all__ = [
     "BlendShapes",
     "Correctives",
     "JointRegressor",
-    "SummedOffsets",
     "corrective_weights",
     "regress_joints",
 ]
-
-
-class SummedOffsets(Deferred):
-    """Offsets of blend shapes whose weighted sum does not need the whole array.
-
-    Parameters
-    ----------
-    shape : (int, int, int)
-        S, V, 3.
-    load : callable
-        Returns the array; see ``Deferred``.
-    total : callable
-        Returns sum_s w_s d_s, (V, 3), for weights (S,).
-    """
-
-    __slots__ = ("total",)
-
-    def __init__(
-        self,
-        shape: tuple[int, int, int],
-        load: Callable[[], Floats],
-        total: Callable[[Floats], Floats],
-    ) -> None:
-        super().__init__(shape, np.float64, load)
-        self.total = total
 
 
 _BLOCK = 9  # number of correctives per joint in SMPL
@@ -79,6 +54,8 @@ class BlendShapes:
         Value that a slider shows at weight 0; None if all are 0.
     ranges : (S, 2) or None
         Smallest and largest value of each slider; None for the default range of its group.
+    material_binds : MaterialBinds or None
+        Properties of materials that the weights change; None if there are none.
     """
 
     names: tuple[str, ...]
@@ -90,6 +67,7 @@ class BlendShapes:
     space: ShapeSpace | None = None
     origins: Floats | None = None
     ranges: Floats | None = None
+    material_binds: MaterialBinds | None = None
 
     def __post_init__(self) -> None:
         for name, size in (("origins", ()), ("ranges", (2,))):
@@ -136,6 +114,10 @@ class BlendShapes:
     def is_expression(self, row: int) -> bool:
         """Return whether a blend shape is a combination of others controlled by ``rules``."""
         return self.rules is not None and bool((self.rules.rows == row).any())
+
+    def shown(self, weights: Floats) -> Floats:
+        """Return the displayed weights, by the rules of expressions: (N,)."""
+        return weights if self.rules is None else self.rules.shown(weights)
 
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_s w_s d_s, or the displacement of the shape space.
@@ -184,11 +166,11 @@ class BlendShapes:
     def _weighted(self, offsets: Floats | Deferred, weights: Floats) -> Floats:
         """Return the weighted sum of offsets; if all weights are 0, nothing is read."""
         self._check_count(weights)
-        weights = weights if self.rules is None else self.rules.shown(weights)
+        weights = self.shown(weights)
         active = np.flatnonzero(weights)
         if len(active) == 0:
             return np.zeros((self.n_vertices, 3))
-        if isinstance(offsets, SummedOffsets):
+        if isinstance(offsets, DeferredOffsets):
             whole = np.zeros(self.n_shapes)
             whole[: len(weights)] = weights
             return offsets.total(whole)
@@ -217,7 +199,7 @@ class Correctives:
     offsets : (P, V, 3), or Deferred
         Figure units per unit of weight.
     feature : Feature or None
-        Computes the weights of a pose; None for those of SMPL, ``corrective_weights``, which are
+        Computes the weights of a pose; None for SMPL's weights, ``corrective_weights``, which are
         nine for each joint except the root.
     """
 
@@ -249,6 +231,22 @@ class Correctives:
         """Return the offsets, read from the file on first use."""
         return _values(self.offsets)
 
+    def of_vertices(self, vertices: Ints, weights: Floats) -> Floats:
+        """Return sum_p c_p d_p at some vertices only: (N, 3) for weights (P,)."""
+        active = np.flatnonzero(weights)
+        if isinstance(self.offsets, SparseOffsets):
+            offsets = self.offsets.of_vertices(vertices)[active]
+        else:
+            offsets = self.values()[active[:, None], vertices[None, :]]
+        return np.einsum("p,pva->va", weights[active], offsets.astype(np.float64, copy=False))
+
+    def check_values(self) -> None:
+        """Read the offsets; raises FormatError if they are damaged."""
+        if isinstance(self.offsets, SparseOffsets):
+            self.offsets.total(np.zeros(self.offsets.shape[0]))
+        else:
+            self.values()
+
     def displacement(self, weights: Floats) -> Floats:
         """Return sum_p c_p d_p, skipping joints without rotation.
 
@@ -262,6 +260,10 @@ class Correctives:
         (V, 3)
             Figure units.
         """
+        if isinstance(self.offsets, SparseOffsets) and weights.any():
+            found = self.offsets.total(weights)
+            if found is not None:
+                return found
         total = np.zeros(3 * self.n_vertices)
         for rows in active_rows(weights, self.block):
             total += weights[rows] @ self.values()[rows].reshape(rows.stop - rows.start, -1)

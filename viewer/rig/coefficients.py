@@ -12,7 +12,7 @@ from viewer.rig.pose import Pose
 
 __all__ = ["apply_coefficients", "unused_coefficients"]
 
-_MOST_SIGMA = 1e6  # standard deviations; larger coefficients are implausible
+_MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 
 
 def unused_coefficients(group: str, values: Floats, used: int, name: str) -> list[Diagnostic]:
@@ -47,7 +47,7 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
 def apply_coefficients(
     group: str, values: Floats | None, figure: Figure, pose: Pose, cut: bool
 ) -> list[Diagnostic]:
-    """Set the weights of one group of blend shapes in place; the rest of the group becomes 0.
+    """Set the weights of one group of blend shapes in place; other weights of the group become 0.
 
     Parameters
     ----------

@@ -58,12 +58,12 @@ class ExpressionRules:
         Parameters
         ----------
         weights : (N,)
-            Weights of all blend shapes; those of expressions are clamped to 0 … 1.
+            Weights of all blend shapes; weights of expressions are clamped to 0 … 1.
 
         Returns
         -------
         (N,)
-            Weights; those of other blend shapes are unchanged.
+            Weights; weights of other blend shapes are unchanged.
         """
         known = self.rows < len(weights)
         values = np.zeros(len(self.rows))

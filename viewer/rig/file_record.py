@@ -87,7 +87,7 @@ class FileRecord:
     copyright : str
         Copyright notice of the asset; empty if there is none.
     extras : Any
-        Application data of the whole file, as parsed from JSON; None if there is none.
+        Application data of the whole file, as parsed from JSON; None if the file has none.
     joint_extras, part_extras, mesh_extras : mapping of int
         Application data of joints, of the nodes of parts that are not joints, and of the meshes of
         parts, by the index of the joint or part.
@@ -96,7 +96,7 @@ class FileRecord:
     part_shapes : tuple of P (S,) int32
         Blend shapes that are the morph targets of each part, in the order of its mesh.
     target_names : tuple of P tuple of str
-        Their names in the file, which may repeat between parts or be empty.
+        Names of these blend shapes in the file, which may repeat between parts or be empty.
     vrm : VrmRecord or None
         Properties of a VRM character.
     """

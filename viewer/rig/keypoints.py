@@ -10,6 +10,7 @@ from viewer.errors import RigError
 from viewer.rig.annotations import Keypoints, keypoint_positions
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
@@ -81,7 +82,7 @@ def some_vertices(figure: Figure, vertices: Ints) -> Figure:
     Returns
     -------
     Figure
-        It has no joint regressor, so its joints do not follow its shape.
+        Figure without a joint regressor, so its joints do not follow its shape.
     """
     mesh = figure.require_mesh()
     shapes, correctives = figure.blend_shapes, figure.correctives
@@ -103,4 +104,6 @@ def _columns(offsets: Floats | Deferred, vertices: Ints) -> Floats | Deferred:
     if not isinstance(offsets, Deferred):
         return offsets[:, vertices]
     shape = (offsets.shape[0], len(vertices), 3)
+    if isinstance(offsets, SparseOffsets):
+        return Deferred(shape, np.float64, lambda: offsets.of_vertices(vertices))
     return Deferred(shape, offsets.dtype, lambda: offsets.values()[:, vertices])

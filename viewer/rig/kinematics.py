@@ -33,10 +33,10 @@ Indices = NDArray[np.intp]
 def forward_kinematics(parents: Ints, local: Floats, root: Floats | None = None) -> Floats:
     """Concatenate local matrices down the hierarchy: W[j] = W[parent[j]] @ L[j].
 
-    Pointer doubling for one pose: every pass multiplies each joint's matrix by that of the ancestor
-    to which it points, and adopts that ancestor's pointer, so a chain of n joints takes log2(n)
-    passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by joint, which
-    takes a single product for each.
+    Pointer doubling for one pose: every pass multiplies each joint's matrix by the matrix of the
+    ancestor to which it points, and adopts that ancestor's pointer, so a chain of n joints takes
+    log2(n) passes (Hillis and Steele 1986). The matrices of many poses are multiplied joint by
+    joint, which takes a single product for each.
 
     Parameters
     ----------

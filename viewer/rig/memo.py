@@ -1,4 +1,4 @@
-"""Caches of derived results that live as long as the objects they were derived from."""
+"""Caches of derived results with the lifetime of the objects from which they are derived."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Memo(Generic[_Owner, _Value]):
     Parameters
     ----------
     kept : int
-        Results kept per owner; the oldest is evicted first.
+        Maximum number of results per owner; the oldest is evicted first.
     """
 
     def __init__(self, kept: int = 1) -> None:
@@ -42,7 +42,8 @@ class Memo(Generic[_Owner, _Value]):
         """
         known = self._values.setdefault(owner, {})
         if key in known:
-            with contextlib.suppress(KeyError):  # already evicted by another thread
+            # Another thread may already have evicted the result.
+            with contextlib.suppress(KeyError):
                 return known[key]
         value = make()
         with self._lock:

@@ -49,7 +49,7 @@ class Mesh:
     positions, normals : (V, 3)
         Figure units; normals as stored, not necessarily of unit length.
     triangles : (T, 3) int32
-        Vertex indices; counter-clockwise from outside in most files, which is not relied upon.
+        Vertex indices; counter-clockwise from outside in most files, on which no code relies.
     uvs : (U, 2) or None
         Texture coordinates, v = 0 at the bottom row of the image.
     uv_triangles : (T, 3) int32 or None
@@ -166,7 +166,7 @@ def bounding_box(points: Floats) -> Floats:
     Parameters
     ----------
     points : (N, 3)
-        Points; an empty array gives a box of size 0 at the origin.
+        Points; for an empty array, the box has size 0 at the origin.
 
     Returns
     -------
@@ -251,7 +251,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
     Returns
     -------
     sources : (R,) int32
-        Mesh vertex that each split vertex is a copy of; vertices without triangles are kept.
+        Mesh vertex that each split vertex is a copy of; vertices without triangles are included.
     uv_indices : (R,) int32
         Texture coordinate of each split vertex.
     triangles : (T, 3) int32
@@ -284,7 +284,7 @@ def split_seams(mesh: Mesh) -> tuple[Ints, Ints, Ints]:
 
 
 def without_seams(mesh: Mesh) -> tuple[Mesh, Ints]:
-    """Return a mesh with one texture coordinate per vertex, for formats that support no others.
+    """Return a mesh with one texture coordinate per vertex, for formats that require this.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from viewer.rig.skin import Skin
 __all__ = ["MORPH_GROUP", "MorphTarget", "on_one_joint", "with_morphs"]
 
 MORPH_GROUP = "morph"
-"""Group of blend shapes for which weight 0 gives the unchanged mesh and weight 1 the target."""
+"""Group of blend shapes: weight 0 is the unchanged mesh, and weight 1 the target."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +58,7 @@ class MorphTarget:
 def with_morphs(figure: Figure, targets: Sequence[MorphTarget]) -> Figure:
     """Return a figure with a blend shape for each target: p = p0 + sum_k w_k (target_k - p0).
 
-    Normals follow by the same formula, before skinning. Joints do not move.
+    Normals are computed with the same formula, before skinning. Joints do not move.
 
     Parameters
     ----------

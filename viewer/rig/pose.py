@@ -41,7 +41,7 @@ class Pose:
     dofs : (D,)
         Lengths or radians.
     translations : (J, 3)
-        Added to the skeleton's rest translations, which follow the figure's shape.
+        Offsets from the skeleton's rest translations, which follow the figure's shape.
     rotations, scales : (J, 4), (J, 3)
         Local rotations before the DOFs, as quaternions (x, y, z, w), and local scale factors.
     shape_weights : (S,)

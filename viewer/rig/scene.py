@@ -17,7 +17,7 @@ from viewer.rig.figure import Figure, skeleton_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 __all__ = [
     "Actor",
@@ -46,9 +46,9 @@ if TYPE_CHECKING:
 Motion: TypeAlias = "Clip | TransformClip | SampledClip | PointClip"
 """The motion of an actor; all types have a ``name``, and ``start`` and ``end`` in seconds."""
 
-# The camera frames the box that excludes this fraction of outlying points ...
+# Fraction of outlying points that the camera ignores if they enlarge the bounding box a lot.
 _OUTLIER_FRACTION = 0.001
-# ... if the box of all points is this many times larger.
+# Minimum ratio of the bounding boxes with and without outliers for which they are ignored.
 _OUTLIER_RATIO = 100.0
 
 
@@ -90,7 +90,7 @@ class Actor:
     animation : int
         Index of the figure's animation that ``clip`` plays, as read or edited; -1 for none.
     origin : Path or None
-        File of its figure; figures of one file play their animations together.
+        File of its figure; figures from the same file play their animations together.
     called : str
         Name of the recording opened for this actor; empty to use the figure's name.
     hidden_parts : frozenset of int
@@ -121,7 +121,7 @@ class Actor:
 
     @property
     def title(self) -> str:
-        """Name of the recording, or else of the figure; the same for all people of a recording."""
+        """Name of the recording or, without one, of the figure; common to a recording's people."""
         return self.called or self.figure.name
 
     @property
@@ -137,7 +137,7 @@ class Actor:
 
     @property
     def is_drawn(self) -> bool:
-        """Whether it is drawn, being visible and present at the current time."""
+        """Whether it is drawn: visible and present at the current time."""
         return self.visible and self.is_present
 
     def __post_init__(self) -> None:
@@ -302,31 +302,37 @@ def actor_points(actor: Actor, show: str = "skin") -> Floats:
     (N, 3)
         Scene space.
     """
-    from viewer.rig.skinning import deform
-
     figure = actor.figure
     parts = [] if actor.points is None else [actor.points[actor.points[:, 3] > 0.0, :3]]
     shows_mesh = show != "skeleton" or figure.skeleton is None
     shows_skeleton = show in ("skeleton", "both") or figure.mesh is None
     if figure.skeleton is not None and actor.pose is not None and shows_skeleton:
-        shape = shaped(figure, actor.pose.shape_weights).require_skeleton()
+        shape = shaped_skeleton(figure, actor.pose.shape_weights)
         joints = skeleton_points(shape, actor.pose)
         parts.append(apply_transform(placement_matrix(actor.pose), joints))
         # Joints that coincide have no size to frame.
         shows_mesh = shows_mesh or not np.ptp(joints, axis=0).any()
     if figure.mesh is not None and shows_mesh:
-        is_bound = show == "binding"
-        points = figure.mesh.positions if is_bound else deform(figure, actor.pose)[0]
+        points = figure.mesh.positions if show == "binding" else _posed_vertices(figure, actor.pose)
         if actor.hidden_parts:
             points = points[visible_vertices(figure.mesh, actor.hidden_parts)]
         parts.append(points)
     return apply_transform(actor.placement, np.concatenate(parts or [np.zeros((0, 3))]))
 
 
-def scene_unit(scene: Scene) -> str:
-    """Return the unit of length of the scene: that of its first figure with a known unit.
+def _posed_vertices(figure: Figure, pose: Pose | None) -> Floats:
+    """Return the posed vertices (V, 3) without normals, which would double the work."""
+    from viewer.rig.skinning import deform, deform_frames
 
-    A scale that converts the figure's unit into another one, such as that of a placement, is taken
+    if pose is None or not figure.is_attached:
+        return deform(figure, pose)[0]
+    return deform_frames(figure, [pose])[0]
+
+
+def scene_unit(scene: Scene) -> str:
+    """Return the unit of length of the scene: the unit of its first figure with a known one.
+
+    A scale that converts the figure's unit into another one, such as a placement's scale, is taken
     into account; any other scale of a pose is assumed to be the user's choice.
 
     Parameters

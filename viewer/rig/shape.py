@@ -28,6 +28,7 @@ __all__ = [
     "rest_joints",
     "rest_positions",
     "shaped",
+    "shaped_skeleton",
     "with_rest_mesh",
 ]
 
@@ -37,7 +38,7 @@ _shaped: Memo[Figure, Figure] = Memo(kept=32)  # maximum number of shapes in use
 def shaped(figure: Figure, weights: Floats) -> Figure:
     """Return the figure with its blend shapes applied: mesh, normals, joints and bindings.
 
-    The last few results are cached, as several passes and panels need the same one.
+    The last few results are cached, as several passes and panels need the same result.
 
     Parameters
     ----------
@@ -72,6 +73,36 @@ def shaped(figure: Figure, weights: Floats) -> Figure:
     return _shaped.get(figure, weights.tobytes(), make)
 
 
+def shaped_skeleton(figure: Figure, weights: Floats) -> Skeleton:
+    """Return the skeleton of ``shaped(figure, weights)``, without shaping the mesh if possible.
+
+    Morph targets of glTF and FBX files leave the joints in place, and their sums over large meshes
+    are expensive.
+
+    Parameters
+    ----------
+    figure : Figure
+        Figure with a skeleton, with or without blend shapes.
+    weights : (N,)
+        N <= S; missing weights are 0.
+
+    Returns
+    -------
+    Skeleton
+        The figure's own skeleton if its joints do not follow its shape.
+
+    Raises
+    ------
+    RigError
+        If there is no skeleton, or if the joints follow the shape and there are more weights than
+        blend shapes.
+    """
+    shapes = figure.blend_shapes
+    if figure.joint_regressor is None and (shapes is None or shapes.space is None):
+        return figure.require_skeleton()
+    return shaped(figure, weights).require_skeleton()
+
+
 def _with_joints(figure: Figure, joints: Floats, shifts: Floats) -> Figure:
     """Return a figure whose rest joints (J, 3) are moved by shifts (J, 3)."""
     skeleton, skin = figure.require_skeleton(), figure.skin
@@ -99,7 +130,7 @@ def with_rest_mesh(figure: Figure, positions: Floats, normals: Floats | None = N
     Returns
     -------
     Figure
-        With new normals, rest translations and inverse bind matrices.
+        Figure with new normals, rest translations and inverse bind matrices.
     """
     from viewer.rig.blendshapes import regress_joints
 
@@ -124,7 +155,7 @@ def _moved_skeleton(skeleton: Skeleton, joints: Floats) -> Skeleton:
 
 
 def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
-    """Return the rest translations for new joint positions; rest rotations and scales are kept.
+    """Return the rest translations for new joint positions, with unchanged rotations and scales.
 
     Parameters
     ----------
@@ -144,7 +175,7 @@ def moved_rest_translations(skeleton: Skeleton, joints: Floats) -> Floats:
     above = parents[has_parent]
     translations = joints.copy()
     offsets = joints[..., has_parent, :] - joints[..., above, :]
-    # Solved instead of multiplied by the transpose, as rest transforms may scale.
+    # A linear system is solved, as the transpose is not the inverse if rest transforms scale.
     translations[..., has_parent, :] = np.linalg.solve(linear[above], offsets[..., None])[..., 0]
     return translations
 

@@ -70,7 +70,7 @@ class Skeleton:
     humanoid : Humanoid or None
         Joints with the standard names of human bones, if the file states them.
     constraints : tuple of Constraint
-        Joints that follow others, in the order of evaluation; at most one per joint.
+        Constraints of joints that follow others, in the order of evaluation; at most one per joint.
     springs : Springs or None
         Joints that are simulated as springs while a motion plays.
     posing : JointPosing or None
@@ -251,7 +251,7 @@ def joint_label(skeleton: Skeleton, joint: int) -> str:
 
 
 def shown_joints(skeleton: Skeleton) -> Ints:
-    """Return the joints that are shown: those of the file, without auxiliary ones: (N,) int32."""
+    """Return the joints that are shown, without auxiliary ones: (N,) int32."""
     joints: Ints = np.arange(skeleton.n_joints, dtype=np.int32)
     return joints if skeleton.auxiliary is None else joints[~skeleton.auxiliary]
 
@@ -343,7 +343,7 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     Raises
     ------
     RigError
-        If there is no such DOF, or several joints have that name.
+        If there is no such joint, or several joints have that name.
     """
     name, hash_sign, index = text.rpartition("#")
     if hash_sign and index.isdecimal() and len(index) < 10 and int(index) < skeleton.n_joints:

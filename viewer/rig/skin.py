@@ -30,7 +30,7 @@ __all__ = [
     "weight_sums",
 ]
 
-_NO_SUM = 1e-12  # sums of weights smaller than this cannot be scaled to 1
+_NO_SUM = 1e-12  # minimum sum of weights that can be scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -44,7 +44,7 @@ class Skin:
     Attributes
     ----------
     starts : (V + 1,) int32
-        Vertex v has the influences from ``starts[v]`` up to, not including, ``starts[v + 1]``.
+        Vertex v has the influences from ``starts[v]`` up to, but not including, ``starts[v + 1]``.
     joints : (N,) int32
         Joint of each influence; if a vertex lists a joint twice, the weights are summed.
     weights : (N,)
@@ -267,7 +267,7 @@ def limit_influences(skin: Skin, count: int) -> Skin:
 
 
 def normalized(skin: Skin) -> Skin:
-    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are kept."""
+    """Return the skin with each vertex's weights scaled to a sum of 1; sums of 0 are unchanged."""
     sums = weight_sums(skin)
     factors = np.divide(1.0, sums, out=np.ones_like(sums), where=np.abs(sums) > _NO_SUM)
     return replace(skin, weights=skin.weights * factors[owners(skin)])

@@ -54,7 +54,7 @@ FAMILY = {
     16: Member("MANO", ("wrist", *_hand("")), (-1, *_hand_parents(0, 1)), (("", 1),)),
     5: Member("FLAME", ("global", "neck", *_FACE), (-1, 0, 1, 1, 1), has_expressions=True),
 }
-"""Members by their number of joints."""
+"""Members of the family by their number of joints."""
 
 
 def member_of(parents: tuple[int, ...]) -> Member | None:

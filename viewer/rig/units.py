@@ -34,7 +34,7 @@ def is_metres(size: float) -> bool:
 
 
 def unit_of_scaled(unit: str, scale: float) -> str:
-    """Return the unit of a figure from that of a similar figure and the ratio of their sizes.
+    """Return the unit of a figure from the unit of a similar figure and the ratio of their sizes.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def unit_of_scaled(unit: str, scale: float) -> str:
     Returns
     -------
     str
-        Unit; empty if the other unit is unknown, or no unit gives similar sizes.
+        Unit; empty if the other unit is unknown, or no unit results in similar sizes.
 
     >>> unit_of_scaled("m", 1.04), unit_of_scaled("m", 950.0), unit_of_scaled("m", 7.0)
     ('m', 'mm', '')

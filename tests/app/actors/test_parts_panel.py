@@ -51,4 +51,4 @@ def test_right_click_hides_the_part_under_the_pointer(parts):
 
 
 def test_panel_requires_several_parts(hand):
-    assert no_panel(hand.state, "parts") == "this figure has one part only"
+    assert no_panel(hand.state, "parts") == "this figure has only one part"

@@ -84,7 +84,7 @@ def test_time_advances_according_to_the_playback_mode(mode, speed, seconds, show
     assert playback.playing is playing
 
 
-def test_slow_frames_lose_no_time():
+def test_slow_frames_do_not_delay_the_clock():
     fine, coarse = clock(keyed()), clock(keyed())
     for _ in range(370):
         fine.advance(0.01)
@@ -92,7 +92,7 @@ def test_slow_frames_lose_no_time():
     assert fine.time == pytest.approx(coarse.time, abs=1e-9)
 
 
-def test_last_captured_frame_lasts_as_long_as_the_others():
+def test_last_captured_frame_lasts_as_long_as_other_frames():
     playback = clock(captured())  # frames at 0, 0.25 ... 2.0
     playback.advance(2.2)
     assert (playback.time, playback.frame) == (2.0, 8)
@@ -175,7 +175,7 @@ def test_steps_reach_every_frame_of_the_active_actor():
     assert playback.time == pytest.approx(1 / 30)
     playback.follow(other)
     assert playback.frame_rate == 50.0
-    assert playback.time == pytest.approx(1 / 30)  # choosing another range does not move the time
+    assert playback.time == pytest.approx(1 / 30)  # choosing another range does not change the time
     playback.seek(0.0)
     times = []
     for _ in range(3):
@@ -189,7 +189,7 @@ def test_steps_reach_every_frame_of_the_active_actor():
     assert playback.frame_range == (0, 3) and playback.frame == 1
 
 
-def test_the_clock_reads_its_time_from_the_scene():
+def test_clock_reads_its_time_from_the_scene():
     scene = Scene([actor(keyed())])
     playback = Clock()
     playback.show(scene)

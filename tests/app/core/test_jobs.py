@@ -55,7 +55,7 @@ def test_cancelled_job_is_done_immediately_and_ends_before_its_next_step() -> No
     assert not after and job.lines == [] and job.error == "" and job.title == "first"
 
 
-def test_errors_are_kept_as_messages() -> None:
+def test_errors_are_stored_as_messages() -> None:
     def refuse(report: Report) -> list[str]:
         raise RigError("figure box has no mesh")
 
@@ -66,3 +66,25 @@ def test_errors_are_kept_as_messages() -> None:
     for job in jobs:
         job.wait()
     assert [job.error for job in jobs] == ["figure box has no mesh", "Checking: not enough memory"]
+
+
+def test_the_result_of_a_job_is_applied_in_the_frame_loop() -> None:
+    applied: list[int] = []
+
+    def refuse(report: Report) -> list[str]:
+        raise RigError("no")
+
+    job = CountedJob("Working", lambda report: [], lambda: applied.append(threading.get_ident()))
+    job.wait()
+    assert not job.is_done and applied == []
+    job.step()
+    job.step()
+    assert job.is_done and applied == [threading.get_ident()]
+    failed = CountedJob("Working", refuse, lambda: applied.append(0))
+    failed.wait()
+    failed.step()
+    cancelled = CountedJob("Working", lambda report: [], lambda: applied.append(0))
+    cancelled.wait()
+    cancelled.cancel()
+    cancelled.step()
+    assert failed.is_done and cancelled.is_done and len(applied) == 1

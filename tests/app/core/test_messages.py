@@ -140,7 +140,7 @@ def test_keys_act_while_the_window_is_open(hand):
     ("heights", "room", "count"),
     [
         ([10, 10, 10], 30, 3),
-        ([10, 10, 10], 29, 1),  # one message and the line with the count of the other two
+        ([10, 10, 10], 29, 1),  # one message, and a line with the number of the remaining two
         ([10, 10, 10], 19, 0),
         ([10] * 20, 1000, 8),
         ([10] * 8, 1000, 8),

@@ -25,7 +25,7 @@ PLACES = {"world": 0.0, "camera": 5.0}
 
 
 def body(space: str, person: int, first: int) -> BodyMotion:
-    """Return a person who stands at z = 0 in the world, and at z = 5 in the camera."""
+    """Return a person at z = 0 in world space and z = 5 in camera space."""
     rows = np.where(np.arange(6) >= first, np.arange(6) - first, -1).astype(np.int32)
     count = 6 - first
     places = np.tile([float(person), 0.0, PLACES[space]], (count, 1))
@@ -72,7 +72,7 @@ def test_switching_the_space_stops_reading_of_captures(contents):
     assert builders[0].is_cut
 
 
-def test_clean_up_applies_to_the_other_space_too(scene):
+def test_clean_up_also_applies_to_the_other_space(scene):
     clean_up(scene, CleanUp(frames=(1, 5)))
     other = scene.in_space("camera")
     assert other.actors[0].clip.timing.n_frames == 4

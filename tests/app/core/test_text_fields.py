@@ -66,7 +66,7 @@ def test_units_are_converted_to_that_of_the_field():
     assert read_number("50 %", "%") == 50.0
 
 
-def test_escape_restores_the_value_and_nothing_else(hand):
+def test_escape_restores_only_the_value(hand):
     hand.state.selected_joint, before = 1, hand.dofs()
     hand.click(hand.place("arm.x", 0.3), held="ctrl")
     hand.type("12")

@@ -142,7 +142,7 @@ def test_buttons_of_named_views_restore_the_fit(wide, name):
     assert is_fitted(wide)
 
 
-def test_second_file_is_fitted_and_seen_from_its_front(wide, tmp_path):
+def test_second_file_is_fitted_and_viewed_from_its_front(wide, tmp_path):
     _orbit(wide)
     wide.state.camera.azimuth = 20.0
     wide.open(sided_skel(tmp_path / "turned.skel", "-z"))
@@ -163,7 +163,7 @@ def test_named_views_are_relative_to_the_front_and_the_panel_overrides_it(drive,
     assert hand.state.camera.azimuth == -90
     hand.pick("Front axis", 0)
     assert hand.state.camera.front == 90  # +x is the front now
-    assert abs(hand.state.camera.azimuth) == 180  # and its left hand is seen as before
+    assert abs(hand.state.camera.azimuth) == 180  # the camera still views its left hand
     hand.key("_1")
     assert hand.state.camera.azimuth == 90
     hand.pick("Front axis", 4)
@@ -272,7 +272,7 @@ def test_ground_stays_under_the_feet_when_the_shape_changes(box):
     box.step(2)
     taller = box_body.HEIGHT * (1 + 3.0 * box_body.STATURE)
     assert box.state.box[:, 1] == pytest.approx([-taller / 2, taller / 2])
-    # The camera stays, so that the growth of the figure is visible.
+    # The camera does not move, so that the growth of the figure is visible.
     assert box.state.camera.distance == camera.distance
     box.state.actor.pose.shape_weights[0] = 0.0
     box.step(2)

@@ -19,7 +19,7 @@ def _channel(mode, keys):
 
 
 def clip_text():
-    """A clip in which root x slides and the arm waves about x; all other channels have one key."""
+    """A clip that moves root x and rotates the arm about x; all other channels have one key."""
     still = [_channel("constant", [(0, value, "flat")]) for value in (0, 0, 0, 0.6, 0.3)]
     slide = _channel("linear", [(0, 0, "linear"), (2, 1, "linear")])
     wave = _channel("cycle", [(0, 0.2, "smooth"), (1, 0.6, "smooth"), (2, -0.2, "smooth")])

@@ -95,7 +95,7 @@ def test_position_combines_figure_and_root():
     assert sampled_points(turning([0, 0]), 1, 0, 9)[1].tolist() == [0, 0]
 
 
-def test_unseen_points_leave_gaps():
+def test_undetected_points_leave_gaps():
     points = np.ones((3, 2, 4))
     points[:, 1, 2] = 4, 5, 6
     points[1, 1, 3] = 0.0

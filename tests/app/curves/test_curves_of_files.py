@@ -117,7 +117,7 @@ def test_frames_are_shown_read_only(drive, rig):
     assert _clip(hand) is clip and hand.undo_steps == 0
 
 
-def test_captured_points_have_curves_too(drive):
+def test_captured_points_have_curves(drive):
     layout = PointLayout("pair", ("left", "right"), np.array([[0, 1]]), np.array([1, -1]))
     points = np.zeros((20, 2, 4))
     points[..., 3] = 1.0

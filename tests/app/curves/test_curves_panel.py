@@ -217,7 +217,7 @@ def test_insert_on_a_key_selects_it_without_adding_another(curves):
     assert curves.says("There is already a key at 1 s") and curves.undo_steps == 0
 
 
-def test_delete_does_nothing_while_a_key_is_dragged(curves):
+def test_delete_has_no_effect_while_a_key_is_dragged(curves):
     curves.move(_center(curves, "key arm.x 1"))
     curves.press()
     curves.key("delete")
@@ -325,7 +325,7 @@ def test_values_are_typed_in_the_shown_unit(curves):
 
 
 @pytest.mark.parametrize("text", ["nan", "inf", "-1e300", "1e999", "", "abc"])
-def test_invalid_typed_value_changes_nothing(curves, text):
+def test_invalid_typed_value_has_no_effect(curves, text):
     curves.click(_center(curves, "key arm.x 1"))
     curves.step(2)
     for label in ("Time", "Value"):

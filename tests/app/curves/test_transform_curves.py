@@ -1,4 +1,4 @@
-"""Keyed transforms in the Curves panel: keys by mouse, fields and buttons, each step undone."""
+"""Keyed transforms in the Curves panel: keys edited by mouse, fields and buttons, and undo."""
 
 from dataclasses import replace
 
@@ -64,7 +64,7 @@ def test_joint_shows_its_angles_if_keyed_and_otherwise_its_keyed_property(hand):
     assert hand.state.of(Curves).rows == rows(hand, "knee.sx", "knee.sy", "knee.sz")
 
 
-def test_a_dragged_key_moves_and_one_undo_returns_it(hand):
+def test_dragged_key_moves_and_one_undo_restores_it(hand):
     show(hand, "hip.tx")
     start, (x2, _) = _center(hand, "key hip.tx 1"), _center(hand, "key hip.tx 2")
     steps = hand.undo_steps
@@ -131,7 +131,7 @@ def test_added_and_deleted_keys_are_undone(hand):
     assert len(channels(hand)) == 5 and not hand.state.of(Curves).keys
 
 
-def test_the_pose_is_keyed_from_the_panel(hand):
+def test_pose_is_keyed_from_the_panel(hand):
     assert no_keys(hand.state) == ""
     hand.state.clock.seek(1.0)
     hand.step(2)

@@ -88,7 +88,7 @@ def test_no_dropped_file_is_applied_if_one_is_incompatible(textured, tmp_path):
     assert textured.state.actor.figure is figure and _key(textured) == before
 
 
-def test_pose_dropped_on_a_lone_skeleton_keeps_the_scene(drive, rig, tmp_path):
+def test_pose_dropped_on_a_skeleton_without_a_skin_keeps_the_scene(drive, rig, tmp_path):
     hand = drive(rig[0])
     hand.drag("arm.x", 0.9)
     scene = hand.state.scene
@@ -98,7 +98,7 @@ def test_pose_dropped_on_a_lone_skeleton_keeps_the_scene(drive, rig, tmp_path):
     assert hand.dof("arm.y") == 0.5 and hand.undo_steps == 2
 
 
-def test_pose_dropped_on_a_lone_skin_says_that_there_are_no_joints(drive, rig, tmp_path):
+def test_pose_dropped_on_a_skin_without_a_skeleton_is_refused(drive, rig, tmp_path):
     hand = drive(rig[1])
     scene = hand.state.scene
     (tmp_path / "bend.json").write_text('{"dofs": {"arm.y": 0.5}}')
@@ -107,7 +107,7 @@ def test_pose_dropped_on_a_lone_skin_says_that_there_are_no_joints(drive, rig, t
     assert hand.state.scene is scene
 
 
-def test_dropped_pose_goes_to_the_chosen_actor(drive, rig, tmp_path):
+def test_dropped_pose_is_applied_to_the_chosen_actor(drive, rig, tmp_path):
     other = tmp_path / "other.skel"
     other.write_text("balljoint hip { balljoint arm { offset 0 1 0 } }")
     hand = drive(*rig, other)

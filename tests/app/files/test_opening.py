@@ -72,7 +72,7 @@ def test_missing_file_or_folder_shows_a_message(hand, tmp_path, name):
     assert name in hand.state.error
 
 
-def test_good_files_replace_the_scene_and_its_history(hand, tmp_path):
+def test_valid_files_replace_the_scene_and_its_history(hand, tmp_path):
     hand.drag("arm.x", 0.9)
     other = tmp_path / "other"
     other.mkdir()
@@ -101,7 +101,7 @@ def test_dropped_skin_or_skeleton_is_combined_with_its_counterpart(drive, rig, o
     assert {path.suffix for path in hand.state.paths} == {".skel", ".skin"}
 
 
-def test_dropped_skin_of_a_different_skeleton_opens_alone(drive, rig, tmp_path):
+def test_dropped_skin_of_a_different_skeleton_replaces_the_scene(drive, rig, tmp_path):
     other = tmp_path / "three.skin"
     other.write_text(skin_text(3))
     hand = drive(rig[0])
@@ -291,7 +291,7 @@ def test_undecodable_names_survive_the_list(tmp_path):
     json.loads((state_folder() / "recent.json").read_text("utf-8"))
 
 
-def test_driver_error_while_drawing_becomes_a_message(hand, monkeypatch):
+def test_driver_error_while_drawing_is_shown_as_a_message(hand, monkeypatch):
     pose = hand.dofs()
 
     def refuse(*arguments, **settings):

@@ -63,7 +63,7 @@ def test_panel_copies_the_text_that_the_command_prints(lint, files, monkeypatch,
     assert " S003: " in copied[-1] and copied[-1].endswith(" in 3 files")
 
 
-def test_files_of_the_bundled_figure_are_checked_too(lint, monkeypatch, capsys):
+def test_files_of_the_bundled_figure_are_checked(lint, monkeypatch, capsys):
     hand = lint()
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
@@ -101,7 +101,7 @@ def test_missing_or_changed_files_are_reported(lint, files, texts):
     assert "a.skel was changed after opening: readers' messages are about the new contents" in texts
 
 
-def test_finding_about_a_file_only_says_so_and_copies_its_location(lint, files, texts, monkeypatch):
+def test_finding_about_a_file_states_this_and_copies_its_location(lint, files, texts, monkeypatch):
     hand = lint(*files)
     copied = []
     monkeypatch.setattr(imgui, "set_clipboard_text", copied.append)
@@ -136,7 +136,7 @@ def test_rows_describe_what_a_click_does(lint, files, texts):
 
 
 def gappy() -> Scene:
-    """Return a column that stands at x = 7 in frame 109 and is missing in frames 110 to 112."""
+    """Return a column that is at x = 7 in frame 109 and missing in frames 110 to 112."""
     figure = column()
     rows = np.arange(FRAMES)
     rows[10:13] = -1

@@ -66,7 +66,7 @@ def test_reset_layout_closes_the_lint_panel(lint):
     assert not hand.state.of(ShownPanels).opened and "Recheck" not in hand.state.item_rects
 
 
-def test_worst_finding_comes_first_with_its_full_message(lint, texts):
+def test_worst_finding_is_first_with_its_full_message(lint, texts):
     hand = lint(several())
     findings = hand.state.of(Linting).checked.findings
     assert findings[0].severity == "error" and findings[0].code == "B006"
@@ -189,7 +189,7 @@ def test_finding_in_a_clip_jumps_to_its_time(lint):
     assert not hand.state.clock.playing
     assert hand.state.clock.time == pytest.approx(finding.times[0])
     assert finding.times[0] == pytest.approx(30 / RATE)
-    # The camera is where the figure is at that time, not where it was.
+    # The camera is aimed at the position of the figure at that time.
     assert hand.state.camera.target[0] == pytest.approx(40.0)
     assert not hand.state.history.can_undo
 
@@ -250,7 +250,7 @@ def test_all_findings_are_copied_as_text_and_json(lint, monkeypatch):
         "column: warning W001: weights of 1 vertex do not sum to 1 (worst: 0.9 at "
         "vertex 5, an error of 0.1)"
     )
-    assert lines[1] == f"    {CODES['W001'].title}: {CODES['W001'].hint}"
+    assert lines[1] == f"    {CODES['W001'].title}; remedy: {CODES['W001'].hint}"
     assert lines[-1] == "0 errors, 1 warning, 0 notes"
     hand.click("Copy JSON")
     scene = scene_of(LIGHT)

@@ -19,7 +19,7 @@ def test_wrapped_headings_paragraphs_and_items_are_joined() -> None:
     ]
 
 
-def test_code_is_kept_line_by_line() -> None:
+def test_code_keeps_its_lines() -> None:
     text = "Type:\n\n```sh\nviewer a.skel  # `one`\n\n# two\n```\n\nDone.\n"
     assert blocks_of(text) == [
         Block("text", "Type:"),

@@ -21,7 +21,7 @@ NAMES = ["Wireframe", "Fit the view", "Front view", "Joint names", "Left_knee", 
         ("ftv", "Fit the view"),
     ],
 )
-def test_best_match_comes_first(query, first):
+def test_best_match_is_first(query, first):
     assert NAMES[ranked(query, NAMES)[0]] == first
 
 

@@ -106,7 +106,7 @@ def test_edited_keys_stay_when_another_animation_plays(hand):
     assert actor.clip is actor.figure.animations[0].clip()
 
 
-def test_invalid_keys_are_reported_and_nothing_changes(drive, tmp_path):
+def test_invalid_keys_are_reported_without_changes(drive, tmp_path):
     def refuse():
         raise FormatError(Diagnostic("F002.misfit", tmp_path, values={"message": "bad keys"}))
 

@@ -138,7 +138,7 @@ def test_other_captures_keep_their_rate(drive, rig):
     assert rates(hand) == [40.0, 10.0]
 
 
-def test_points_are_retimed_as_well(drive):
+def test_rate_applies_to_captured_points(drive):
     hand = drive(scene=Scene([dots([1, 1, 1, 1])]), size=SIZE, samples=1)
     hand.enter_value("Frame rate", "50")
     assert rates(hand) == [50.0] and hand.state.clock.whole == (0.0, 0.04)
@@ -152,7 +152,7 @@ def test_rate_is_greyed_if_another_actor_defines_the_frames(drive, rig):
     hand = drive(scene=scene, size=SIZE, samples=1)
     hand.state.choose_actor(1)
     hand.step(2)
-    assert foreign_rate(hand.state) == "the frames are those of another motion: select its actor"
+    assert foreign_rate(hand.state) == "the frames belong to another motion: select its actor"
     assert rate_of(hand.state) == 10.0
     hand.enter_value("Frame rate", "20")
     assert hand.state.scene.actors[0].clip.timing.frame_rate == 10.0

@@ -55,7 +55,7 @@ def test_scrubbing_a_capture_snaps_to_its_frames(drive, rig):
 
 
 @pytest.mark.parametrize("held", ["", "alt"])
-def test_time_line_in_the_curves_panel_snaps_to_frames_too(keyed, held):
+def test_time_line_in_the_curves_panel_snaps_to_frames(keyed, held):
     keyed.show_panel("Curves")
     keyed.state.selected_joint = 1
     keyed.step(3)

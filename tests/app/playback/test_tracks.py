@@ -16,7 +16,7 @@ from viewer.rig.srgb import decode_color, encode_color
         ([0, 9], [(0, 9)]),
         ([10, 10], [(10, 15)]),  # the minimum width
         ([40, 40], [(35, 40)]),  # at the end of the track the bar grows to the left
-        ([20, 20, 22, 30], [(16, 21), (22, 30)]),  # one point stays free before the next bar
+        ([20, 20, 22, 30], [(16, 21), (22, 30)]),  # one point remains free before the next bar
         ([0, 18, 20, 20, 22, 30], [(0, 18), (19, 21), (22, 30)]),  # between other bars
         ([], []),
     ],

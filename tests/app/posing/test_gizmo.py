@@ -221,7 +221,7 @@ def and_zero(values):
     return bool((np.abs(values) < 1e-9).all())
 
 
-def test_limits_hold_during_random_drags(drive, tmp_path):
+def test_limits_are_kept_during_random_drags(drive, tmp_path):
     hand = drive(*write_rig(tmp_path), size=SIZE, samples=1)
     random = np.random.default_rng(3)
     for number in range(24):

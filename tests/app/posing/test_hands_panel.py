@@ -27,7 +27,7 @@ def vectors(driver, which):
     return matrix_to_rotation_vector(rotations[actor.figure.hands[which].joints]).ravel()
 
 
-def test_mean_hand_comes_from_the_file_and_flat_hand_is_zero(hand):
+def test_mean_hand_is_that_of_the_file_and_flat_hand_is_zero(hand):
     left = hand.state.actor.figure.hands[0]
     hand.click("left mean")
     assert_allclose(vectors(hand, 0), left.mean, atol=1e-12)

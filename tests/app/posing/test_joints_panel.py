@@ -227,7 +227,7 @@ def test_figure_without_skeleton_shows_a_message(drive, rig):
 
 
 @pytest.mark.parametrize("text", [chain(5000), comb(5000), comb(40_000)], ids=len)
-def test_thousands_of_joints_stay_usable(drive, tmp_path, text):
+def test_panel_is_usable_with_thousands_of_joints(drive, tmp_path, text):
     path = tmp_path / "many.skel"
     path.write_text(text)
     hand = drive(path)

@@ -93,7 +93,7 @@ def test_unreachable_target_reports_its_distance() -> None:
     assert_allclose(outcome.target, far, atol=1e-9)
 
 
-def test_limits_hold_and_are_reported() -> None:
+def test_limits_are_kept_and_reported() -> None:
     actor, view = bent_arm(limits={(1, "z"): (0.5, 1.0)}), frame()
     posed = posed_joint(actor, 2)
     outcome = ReachHandle(posed, actor.pose, view.place(posed.center), 2).follow(
@@ -140,7 +140,7 @@ def test_arrow_is_picked_along_its_shaft_unless_it_points_at_the_eye() -> None:
     assert grab_arrow(found[2:], center, view, (300, 300)) is None
 
 
-def test_arrow_shifts_the_figure_along_its_axis_alone() -> None:
+def test_arrow_moves_the_figure_only_along_its_axis() -> None:
     actor, view = Actor(arm_figure()), frame(azimuth=30, inclination=20)
     actor.placement[:3, :3] *= 2.0
     posed = posed_joint(actor, 0)

@@ -77,7 +77,7 @@ def test_raw_pose_vector_round_trips(posed):
     posed.key("r")
     posed.key("v", "ctrl")
     after = posed.state.actor.pose
-    # SMPL's pose vector holds joint rotations only, no shape or translation.
+    # The pose vector of SMPL contains only joint rotations, not shape or translation.
     assert_allclose(after.dofs, before.dofs, atol=1e-12)
     assert_array_equal(after.shape_weights, before.shape_weights)
     assert after.figure_scale == 1.0 and not after.figure_translation.any()

@@ -33,7 +33,7 @@ def grabbed(actor, joint, view, place, orientation="local"):
 
 
 def spot(angle, radius=RADIUS):
-    """Return a position on a circle around the origin's joint, counter-clockwise from the right."""
+    """Return a position on a circle around the joint, counter-clockwise from the right."""
     return (300 + radius * np.cos(angle), 300 - radius * np.sin(angle))
 
 

@@ -117,7 +117,7 @@ def _type_seed(hand, text):
     hand.step(2)
 
 
-def test_same_seed_gives_the_same_shape(shape):
+def test_equal_seeds_result_in_equal_shapes(shape):
     for _ in range(3):
         shape.click("Random")
     _type_seed(shape, "1")
@@ -133,7 +133,7 @@ def test_invalid_seeds_are_clamped(shape):
         assert np.isfinite(_weights(shape)).all()
 
 
-def test_random_varies_the_first_ten_shapes_and_no_expression(drive_body):
+def test_random_shape_changes_the_first_ten_coefficients_and_no_expression(drive_body):
     hand = drive_body("smplx", n_shapes=10, n_expressions=5)
     hand.show_panel("Shape")
     hand.click("Random")
@@ -160,7 +160,7 @@ def test_reset_of_the_pose_keeps_the_shape(shape):
     assert not shape.state.actor.pose.dofs.any()
 
 
-def test_pose_correctives_change_the_picture_of_a_bent_body_only(shape):
+def test_pose_correctives_change_only_the_image_of_a_bent_body(shape):
     straight = shape.scene_picture()
     shape.click("Pose correctives")
     shape.step(2)
@@ -211,7 +211,7 @@ def test_open_mesh_has_no_volume(shape, texts):
     assert "none: open mesh (4 boundary edges)" in texts and "Mass" not in texts
 
 
-def test_doubled_vertices_do_not_open_a_mesh(shape):
+def test_mesh_with_doubled_vertices_is_still_closed(shape):
     figure = shape.state.actor.figure
     positions = figure.mesh.positions[figure.mesh.triangles].reshape(-1, 3)
     triangles = np.arange(len(positions)).reshape(-1, 3)

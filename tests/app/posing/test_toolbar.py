@@ -56,7 +56,7 @@ def test_buttons_and_keys_activate_tools(arm):
     assert seen == ["rotate", "move", "select"] * 2
 
 
-def test_only_posing_tools_show_the_other_buttons(arm):
+def test_buttons_of_posing_are_shown_only_with_a_posing_tool(arm):
     assert "tool Mirror" not in arm.state.item_rects
     arm.key("e")
     arm.step(2)
@@ -108,7 +108,7 @@ def test_greyed_buttons_show_their_reason(arm):
     assert no_tool(state) == "this actor is not shown"
 
 
-def test_greyed_button_does_nothing(arm):
+def test_greyed_button_has_no_effect(arm):
     arm.key("e")
     arm.step(2)
     arm.click("tool Key")
@@ -170,7 +170,7 @@ def test_click_on_a_handle_does_not_pause(moved, shake):
     time = moved.state.clock.time
     moved.move((x + shake, y))
     moved.step(3)
-    # Time stands still while the handle is held.
+    # Time does not advance while the handle is held.
     assert moved.state.clock.playing and moved.state.clock.time == time
     moved.let_go()
     moved.step(3)
@@ -196,7 +196,7 @@ def test_key_button_adds_the_pose_to_the_clip_and_can_be_undone(moved):
     assert moved.dofs()[2] == pytest.approx(0.5)  # halfway through the clip
 
 
-def test_slider_pauses_the_clip_too(moved):
+def test_slider_drag_pauses_the_clip(moved):
     moved.state.clock.playing = True
     moved.step(2)
     x, y = moved.place("shoulder.x")

@@ -128,7 +128,7 @@ def test_annotations_and_legend_are_drawn_in_every_frame(moving, tmp_path):
         ):
             pictures = [np.array(one.convert("RGB")).astype(int) for one in (marked, plain)]
         changed = np.abs(pictures[0] - pictures[1]).max(axis=-1) > 8
-        # The selected joint's dot, 1.5 times as large as the others.
+        # The dot of the selected joint is 1.5 times as large as the others.
         yellow = np.abs(pictures[0] - 255 * np.array(HIGHLIGHT[:3])).max(axis=-1) < 6
         assert yellow.sum() > 20 and changed[yellow].any()
         # The white dot of the vertex moves with the figure.

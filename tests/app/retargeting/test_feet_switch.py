@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import threading
+from importlib import import_module
+
 import numpy as np
 import pytest
 from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.two_people import BODY, figure_of
 from rig.retargeting.walking import RATE, walk
 
+from viewer.app.files.state import Files
+from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.feet import plants_feet, toggle_feet
+from viewer.formats import Source, read
+from viewer.loading import bundled_body
+from viewer.loading.capturing import Builder
+from viewer.rig.captures.capture import Capture, CapturePart
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.retimed import with_rate
+from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.planted_feet import plant_feet
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor, Scene
+
+driven_clip_module = import_module("viewer.rig.retargeting.driven_clip")
 
 
 @pytest.fixture
@@ -52,3 +67,77 @@ def test_figures_without_a_motion_of_another_skeleton_have_no_switch(hand):
     toggle_feet(hand.state)
     assert not plants_feet(hand.state)
     assert hand.says("no motion of another skeleton drives this figure")
+
+
+def test_long_motions_are_retargeted_in_the_background(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    before = actor.clip
+    toggle_feet(hand.state)
+    job = hand.state.job
+    assert job.title.startswith("Retargeting ") and job.can_cancel
+    assert actor.clip is before
+    toggle_feet(hand.state)  # refused while the job runs
+    assert hand.state.job is job and hand.says("wait for: Retargeting")
+    hand.finish_job()
+    plain, _ = retarget(actor.drive.motion, actor.figure)
+    assert not plants_feet(hand.state) and hand.says("Feet: as retargeted")
+    np.testing.assert_array_equal(actor.clip.rotations, plain.rotations)
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert actor.clip is before and plants_feet(hand.state)
+
+
+def test_cancelled_retargeting_changes_nothing(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    before = actor.clip, actor.drive
+    toggle_feet(hand.state)
+    hand.state.job.cancel()
+    hand.finish_job()
+    hand.step(3)
+    assert (actor.clip, actor.drive) == before and hand.state.job is None
+
+
+def captured(count: int) -> Capture:
+    """Return a capture of somebody who stands still."""
+
+    def parts():
+        for first in range(0, count, 20):
+            timing = Timing(RATE, np.where(np.arange(count) // 20 == first // 20,
+                                           np.arange(count) - first, -1), holds=False)  # fmt: skip
+            names = ("pelvis", "left_hip", "right_hip", "spine1")
+            motion = BodyMotion("take", timing, names, np.zeros((20, 4, 3)), np.zeros((20, 3)))
+            yield CapturePart(first + 20, {0: motion})
+
+    return Capture("take", count, 0, parts, up="y")
+
+
+def test_captures_are_retargeted_to_the_end_in_the_background(drive, monkeypatch):
+    model, target = read(Source.open(bundled_body())), figure_of(BODY, "other")
+    threads = []
+
+    def planted(*arguments):
+        threads.append(threading.get_ident())
+        return plant_feet(*arguments)
+
+    monkeypatch.setattr(driven_clip_module, "plant_feet", planted)
+    builder = Builder(captured(100), model)
+    builder.read_some()
+    builder.place("y")
+    builder.carry_to(target)
+    hand = drive(scene=Scene(list(builder.actors)), size=(1000, 1000))
+    hand.app.frame.stream([builder])
+    (actor,) = builder.actors
+    hand.state.clock.pose(actor, again=True)
+    actor.clip = with_rate(actor.clip, 12.0)  # as the timeline does
+    stream = hand.state.of(Files).stream
+    for _ in range(500):
+        hand.step()
+        if hand.state.of(Files).stream is None:
+            break
+        stream.wait()
+    assert stream.is_done and stream.error == "" and stream.finishing >= 0.0
+    assert actor.clip.n_rows == 100 and actor.clip.timing.frame_rate == 12.0
+    assert plants_feet(hand.state)
+    assert len(threads) == 1 and threads[0] != threading.get_ident()

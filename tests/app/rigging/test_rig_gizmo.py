@@ -165,7 +165,7 @@ def test_moved_template_keeps_its_fitted_pose_but_not_its_residual(hand):
     assert hand.state.of(Rigging).placing.fitted is laid
 
 
-def test_drag_undone_while_its_error_is_measured_stays_undone(hand, monkeypatch):
+def test_drag_undone_while_its_error_is_measured_is_not_restored(hand, monkeypatch):
     gate = threading.Event()
 
     def late(*given):

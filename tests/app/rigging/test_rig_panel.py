@@ -98,7 +98,7 @@ def test_align_button_describes_what_it_does(rigging, monkeypatch, fits):
         assert said[-1] == words
 
 
-def test_template_posed_after_aligning_says_so(rigging, texts):
+def test_template_posed_after_aligning_is_reported(rigging, texts):
     hand = rigging()
     hand.state.scene.actors[1].pose.dofs[8] = 0.0
     texts.clear()

@@ -1,4 +1,4 @@
-"""The axis gizmo: a click turns the camera to an axis within a fifth of a second; a drag orbits."""
+"""The axis gizmo: a click rotates the camera to an axis in a fifth of a second; a drag orbits."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_click_on_an_axis_end_looks_from_there(seen, axis, sign):
     assert seen.undo_steps == 0
 
 
-def test_second_click_looks_from_the_other_side(seen):
+def test_second_click_looks_from_the_opposite_side(seen):
     seen.key("_1")
     seen.step(15)
     seen.click(end_of(seen, 2))

@@ -60,7 +60,7 @@ def test_hidden_joints_are_not_hovered(hand):
     assert hand.state.of(Hovered).joint == -1 and not keys(hand)
 
 
-def test_outlines_are_seen_in_the_window_but_not_in_pictures(bones):
+def test_outlines_are_drawn_in_the_window_but_not_in_pictures(bones):
     plain = bones.scene_picture()
     bones.menu("menu View", "Selection outlines")
     bones.state.selected_joint = 1

@@ -230,7 +230,7 @@ def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     assert vertices() == "12"
 
 
-def test_check_box_of_vertex_colours_appears_if_there_are_any(drive, tmp_path):
+def test_check_box_of_vertex_colours_is_shown_with_vertex_colours(drive, tmp_path):
     rows = "0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"
     names = [f"float {name}" for name in "xyz"] + [
         f"uchar {name}" for name in ("red", "green", "blue")
@@ -248,5 +248,5 @@ def test_check_box_of_vertex_colours_appears_if_there_are_any(drive, tmp_path):
     assert (hand.scene_picture() != before).any()
 
 
-def test_check_box_of_vertex_colours_is_hidden_if_there_are_none(tall):
+def test_check_box_of_vertex_colours_is_hidden_without_vertex_colours(tall):
     assert "Vertex colours" not in tall.state.item_rects

@@ -47,7 +47,7 @@ def test_click_activates_the_actor_under_it(pair):
     assert pair.state.chosen_actor == 0
 
 
-def test_click_on_the_background_changes_nothing(pair):
+def test_click_on_the_background_has_no_effect(pair):
     pair.state.choose_actor(1)
     x, y, width, _ = pair.state.view_rect
     click(pair, (x + width - 5, y + 5))

@@ -120,7 +120,7 @@ def test_normalising_scales_the_drawn_weights(drive, rig):
     np.testing.assert_allclose(values, [0] * 4 + [half] * 4 + [0] * 4, atol=1e-12)
 
 
-def test_panel_of_a_lone_skeleton_shows_a_message(drive, rig, texts):
+def test_panel_of_a_skeleton_without_a_skin_shows_a_message(drive, rig, texts):
     hand = drive(rig[0])
     hand.show_panel("Skinning")
     texts.clear()

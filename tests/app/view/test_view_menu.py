@@ -49,7 +49,7 @@ def test_menu_toggles_picking_of_vertices(hand):
     assert not hand.state.of(Weights).picks_vertices
 
 
-def test_skin_alone_has_no_joints_to_show(drive, rig):
+def test_joint_display_is_greyed_without_a_skeleton(drive, rig):
     hand = drive(rig[1])
     for text in ("X-ray", "Joint names", "Joint axes", "Unpin vertex"):
         hand.menu("menu View", text)
@@ -57,7 +57,7 @@ def test_skin_alone_has_no_joints_to_show(drive, rig):
     assert not hand.state.options.xray and not hand.state.options.joint_names
 
 
-def test_skeleton_alone_has_no_vertices_to_show(drive, rig):
+def test_vertex_display_is_greyed_without_a_skin(drive, rig):
     lone = drive(rig[0])
     for text in ("Weights of the selected joint", "Pick vertices", "Inspect vertex under cursor"):
         lone.menu("menu View", text)

@@ -246,8 +246,8 @@ def test_hover_shows_what_a_click_would_select(column):
     assert not any(line.startswith("click") for line in column.state.of(Weights).hover.lines)
 
 
-def test_hover_over_a_dot_names_its_joint(column):
-    column.key("b")  # x-ray: dots and bones lie over the skin
+def test_hover_over_a_dot_shows_the_name_of_its_joint(column):
+    column.key("b")  # in x-ray mode, dots and bones are drawn over the skin
     actor = column.state.actor
     place = joint_matrices(actor.figure, actor.pose)[0][:3, 3]
     rest(column, seen_at(column, place + np.array([0.0, 1e-3, 0.0])))

@@ -70,7 +70,7 @@ def test_selected_joint_without_influence_is_replaced_with_a_note(tipped):
     assert shown(tipped) == (0.0, 0.0)
 
 
-def test_chosen_view_is_kept(tipped):
+def test_chosen_view_is_not_replaced(tipped):
     tipped.state.options.scalar = "entropy"
     start_heat_map(tipped.state)
     assert tipped.state.options.scalar == "entropy" and tipped.state.selected_joint == -1

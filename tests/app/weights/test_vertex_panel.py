@@ -193,7 +193,7 @@ def test_every_influence_has_a_line_and_dot_and_label(pinned):
     actor.placement[:3, 3] = 10.0, 0.0, 0.0
     found = vertex_annotation(explanation, actor, True, (960, 720))  # scale 1
     assert found.style.on_top
-    # Weakest influence first: dark line, line, dark dot, dot. The vertex comes last, dark and
+    # The weakest influence is first: dark line, line, dark dot, dot. The vertex is last, dark and
     # white.
     shift = np.array([10.0, 0, 0])
     starts, ends = found.segments.starts - shift, found.segments.ends - shift
@@ -209,7 +209,7 @@ def test_every_influence_has_a_line_and_dot_and_label(pinned):
     assert_allclose(found.segments.colors[[1, 5], 3], 0.35 + 0.65 * 0.5)
     assert found.labels.texts == tuple(f"{name}  0.500" for name in explanation.names)
     assert_allclose(found.labels.points - shift, explanation.images)
-    assert found.labels.ranks.tolist() == [1, 2]  # the name of the selected joint comes first
+    assert found.labels.ranks.tolist() == [1, 2]  # the name of the selected joint is first
     alone = vertex_annotation(explanation, actor, False, (960, 720))
     assert alone.labels is None and len(alone.segments.widths) == 2
 
@@ -278,7 +278,7 @@ def test_panel_needs_no_horizontal_scrolling(drive, rig, texts, width, digits):
     assert listed[listed.index("sum w") + 1] == f"{1.0:.{digits}f}"
 
 
-def test_weight_gets_its_own_line_after_a_long_name(drive, rig, texts):
+def test_weight_is_on_a_separate_line_after_a_long_name(drive, rig, texts):
     hand = drive(*rig, size=(1280, 800), samples=1)
     names = ("root", "a_name_that_is_as_long_as_some_are")
     object.__setattr__(hand.state.actor.figure.skeleton, "names", names)

@@ -291,7 +291,7 @@ def test_isolines_box_shows_the_default_and_keeps_overrides(bent):
     assert bent.state.options.isolines is True
 
 
-def test_legend_box_draws_the_legend_into_pictures(bent):
+def test_legend_check_box_draws_the_legend_in_pictures(bent):
     choose(bent, "methods")
     before = bent.scene_picture()
     bent.click("Legend in pictures")

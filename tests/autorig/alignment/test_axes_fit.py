@@ -1,4 +1,4 @@
-"""A scale along each axis: found exactly, with the rotation if requested."""
+"""Fit of a scale along each axis, with the rotation if requested."""
 
 import numpy as np
 import pytest

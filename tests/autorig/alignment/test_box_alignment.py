@@ -1,4 +1,4 @@
-"""Bounding-box alignment."""
+"""Alignment of bounding boxes."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def test_axis_along_which_both_are_flat_keeps_its_scale():
     assert_allclose(matrix[2, 3], 2.0)
 
 
-def test_flat_mesh_is_not_scaled_onto_a_solid_one():
+def test_flat_mesh_is_not_scaled_to_a_solid_one():
     with pytest.raises(RigError) as problem:
         align_boxes(np.array([[0.0, 0, 5], [1, 1, 5]]), np.array([[0.0, 0, 0], [2, 3, 7]]))
     assert str(problem.value) == (

@@ -1,4 +1,4 @@
-"""Iterated closest points recover known alignments."""
+"""Iterated closest points, which must recover known alignments."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def sides(scale=1.05, triangles=None):
     return Triangles(positions, all_triangles, 600), Triangles(moved, chosen, 600)
 
 
-def test_iterate_then_slide_find_the_alignment_exactly():
+def test_iterate_followed_by_slide_finds_the_alignment_exactly():
     template, target = sides()
     found = slide(template, target, iterate(template, target, START, 10, True), 25, True)
     assert_allclose(found.rotation, ROTATION, atol=1e-9)
@@ -37,7 +37,7 @@ def test_iterate_then_slide_find_the_alignment_exactly():
 
 
 @pytest.mark.slow
-def test_iterate_alone_converges_monotonically():
+def test_iterate_converges_monotonically_without_slide():
     template, target = sides()
     errors = [
         trimmed_rms(
@@ -48,7 +48,7 @@ def test_iterate_alone_converges_monotonically():
     assert errors[0] > 2 * errors[1] > 3 * errors[2]
 
 
-def test_kept_scale_is_kept():
+def test_fixed_scale_is_kept():
     template, target = sides(scale=1.0)
     found = slide(template, target, iterate(template, target, START, 10, False), 25, False)
     assert found.scale == 1.0
@@ -69,7 +69,7 @@ def test_border_edges_are_not_correspondences():
     square = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
     side = Triangles(square, np.array([[0, 1, 2], [0, 2, 3]]), 10)
     found = side.find(np.array([[0.5, 0.2, 0.3], [0.5, -0.4, 0.0], [0.5, 0.5, 1.0]]))
-    # The last lies over the diagonal, which both triangles share.
+    # The last point is over the diagonal, which both triangles share.
     assert found.usable.tolist() == [True, False, True]
     assert_allclose(found.positions[1], [0.5, 0.0, 0.0])
 

@@ -1,4 +1,4 @@
-"""Candidate orientations and the best fit."""
+"""Candidate orientations and the selection of the best."""
 
 import numpy as np
 import pytest
@@ -32,19 +32,19 @@ def test_cube_has_24_rotations_starting_with_the_identity():
     assert all(np.linalg.det(turn) == pytest.approx(1.0) for turn in rotations)
 
 
-def test_known_axes_leave_fewer_rotations():
+def test_known_axes_reduce_the_number_of_rotations():
     four = axis_rotations("y", up="z")
     assert len(four) == 4
     assert all((turn @ [0, 1, 0] == [0, 0, 1]).all() for turn in four)
-    # Up and forward known: y to z, z to -y leaves x as it is.
+    # If up and forward are known, y maps to z and z to -y, so x is unchanged.
     (one,) = axis_rotations("y", up="z", facing="-y")
     assert_allclose(one, [[1, 0, 0], [0, 0, -1], [0, 1, 0]])
-    # Figures with z up face +x.
+    # Figures with z up are assumed to face +x.
     (one,) = axis_rotations("z", up="y", facing="z")
     assert_allclose(one @ [1, 0, 0], [0, 0, 1])
 
 
-def test_axes_that_contradict_each_other_are_refused():
+def test_contradictory_axes_are_refused():
     with pytest.raises(RigError) as problem:
         axis_rotations("y", up="z", facing="-z")
     assert str(problem.value) == "expected a facing perpendicular to the up axis z, found -z"
@@ -61,11 +61,11 @@ def test_axis_direction_has_a_sign():
     ("ratio", "scale"),
     [(0.9, 1.0), (1.2, 1.2), (110.0, 100.0), (0.0011, 0.001), (40.0, 39.37), (0.025, 1 / 39.37)],
 )
-def test_ratios_near_a_unit_are_that_unit(ratio, scale):
+def test_ratios_near_a_unit_are_rounded_to_that_unit(ratio, scale):
     assert unit_scale(ratio) == pytest.approx(scale)
 
 
-def test_mesh_with_another_unit_and_up_axis_is_aligned():
+def test_mesh_with_a_different_unit_and_up_axis_is_aligned():
     positions, triangles = tube()
     quarter = turn([1, 0, 0], np.pi / 2)
     other = cloud(1000.0 * positions @ quarter.T, triangles)

@@ -1,4 +1,4 @@
-"""Template joints fitted to the pose of the target."""
+"""Fit of the template's joints to the pose of the target."""
 
 import numpy as np
 import pytest
@@ -51,7 +51,7 @@ def test_bent_joint_is_found():
     assert_allclose(np.degrees(np.linalg.norm(found.rotated[1])), 40.1, atol=3.0)
 
 
-def test_dofs_stay_within_limits_and_quaternions_hold_the_remainder():
+def test_dofs_are_within_limits_and_quaternions_store_the_remainder():
     figure = arm(limit=0.2)
     free = arm()
     found, gaps = fitted(free, bent(free), figure)
@@ -65,7 +65,7 @@ def test_longer_limb_is_found():
     longer = resized(figure, limbs_of(figure), np.array([1.0, 1.3]), np.ones(2))
     found, gaps = fitted(longer, bent(longer), figure)
     assert np.sqrt(np.mean(gaps**2)) < 2e-3
-    # Overall scale and limb scales are ambiguous: only their product is determined.
+    # Overall scale and limb scales are ambiguous, so only their product is determined.
     along = found.grown[0]
     assert_allclose(along[1] - along[0], np.log(1.3), atol=0.08)
 
@@ -77,7 +77,7 @@ def test_known_size_is_kept():
     assert np.abs(found.grown).max() < 1e-6
 
 
-def test_too_few_pairs_leave_the_template_as_it_is():
+def test_too_few_pairs_do_not_change_the_template():
     figure = arm()
     far = START.apply(deform(figure)[0]) + 1000.0
     side = Triangles(far, figure.mesh.triangles, 500)

@@ -1,4 +1,4 @@
-"""One linear step of the pose fit recovers known motions."""
+"""One linear step of the pose fit, which must recover known motions."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,8 @@ NONE = np.zeros((2, 3)), np.zeros((2, 2))
 
 def solved(targets, scales=True, before=NONE):
     every = np.arange(len(X))
-    # Each vertex three times, with normals along x, y and z: as good as distances of points.
+    # Each vertex occurs three times with normals along x, y and z, which is equivalent to distances
+    # of points.
     normals = np.repeat(np.eye(3), len(X), axis=0)
     pairs = Pairs(np.tile(every, 3), np.tile(targets, (3, 1)), normals, every, targets)
     return solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, *before, scales)
@@ -50,7 +51,7 @@ def test_overall_translation_and_scale_are_found():
 
 def test_longer_limb_is_distinguished_from_overall_scale():
     fraction = LIMBS.fractions[:, 1]
-    # The base is 5 % longer: its own vertices stretch, and the tip moves with it.
+    # The base is 5 % longer; its vertices stretch, and the tip moves with it.
     up = 0.05 * ((1 - fraction) * X[:, 1] + fraction)
     step = solved(X + up[:, None] * [0.0, 1.0, 0.0])
     along, across = step.limb_growths + step.growth
@@ -72,10 +73,11 @@ def test_steps_are_bounded():
 
 
 def test_unsupported_rotations_of_earlier_iterations_decay():
-    # The tip's own axis is y: a rotation about it slides a round section along itself; here there
+    # The axis of the tip is y, and a rotation about it slides a round section along itself; there
     # is only one pair, which does not constrain the tip.
     pairs = Pairs(np.array([0]), X[:1], np.array([[0.0, 0, 1.0]]), np.array([0]), X[:1])
     rotated = np.array([[0.0, 0, 0], [0, 0.1, 0]])
     step = solve_step(LAID, LIMBS, PARENTS, pairs, SIZE, rotated, np.zeros((2, 2)), True)
-    # Penalty 3e-6 on total rotation against 1e-5 on one step: 0.1 * 3 / 13 is reverted.
+    # The penalties are 3e-6 on the total rotation and 1e-5 on one step, so 0.1 * 3 / 13 is
+    # reverted.
     assert step.rotation_vectors[1, 1] == pytest.approx(-0.1 * 3 / 13, rel=1e-6)

@@ -1,4 +1,4 @@
-"""Alignment with pose and proportions: people with lowered arms, of other sizes, from behind."""
+"""Alignment with pose and proportions: people with lowered arms, of other sizes, facing away."""
 
 import re
 
@@ -20,7 +20,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 pytestmark = pytest.mark.slow
 
-# An eighth of the usual number: a fit takes far less time, and is nearly as good.
+# With an eighth of the usual number of points, a fit is much faster and nearly as good.
 SAMPLES = 250
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
@@ -54,7 +54,7 @@ def standing():
     )
 
 
-def test_person_with_lowered_arms_is_found_from_behind(standing):
+def test_person_with_lowered_arms_facing_away_is_aligned(standing):
     figure, target, joints = standing
     found, pose = aligned(figure, target)
     assert found.alignment.how == "fit"
@@ -69,7 +69,7 @@ def test_person_with_lowered_arms_is_found_from_behind(standing):
     assert found.lines[0].key == "R003.pose"
 
 
-def test_person_with_an_inside_out_mesh_is_found_too(standing):
+def test_person_with_an_inside_out_mesh_is_aligned(standing):
     figure, target, joints = standing
     found, _ = aligned(figure, mesh_of(target.positions, target.triangles[:, ::-1]))
     assert found.alignment.how == "fit"
@@ -90,7 +90,7 @@ def test_template_is_not_posed_if_disabled(standing):
     assert found.pose is pose and found.figure is figure and found.lines == ()
 
 
-def test_template_that_fits_is_not_posed():
+def test_template_that_already_fits_is_not_posed():
     figure = arm()
     found, pose = aligned(figure, figure.mesh)
     assert found.pose is pose and found.figure is figure and found.lines == ()
@@ -144,7 +144,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     assert found[2] == cure
 
 
-def test_known_scales_are_not_searched_for():
+def test_known_scales_are_not_searched():
     figure = load(bundled_body()).actors[0].figure
     target = mesh_of(figure.mesh.positions * [1.3, 1.0, 0.8], figure.mesh.triangles)
     asked, _ = aligned(figure, target, fits=False, scale="axes")

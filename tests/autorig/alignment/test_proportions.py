@@ -1,4 +1,4 @@
-"""Limb length and girth: effect on vertices, joints and bind pose."""
+"""Limb length and girth, and their effect on vertices, joints and bind pose."""
 
 from dataclasses import replace
 
@@ -35,7 +35,7 @@ def test_joint_without_vertices_has_no_axis():
     assert_allclose(still.mesh.positions, figure.mesh.positions, atol=1e-12)
 
 
-def test_factors_of_one_change_nothing():
+def test_factors_of_one_have_no_effect():
     figure = arm()
     same = resized(figure, limbs_of(figure), ONES, ONES)
     assert_allclose(same.mesh.positions, figure.mesh.positions, atol=1e-12)
@@ -52,7 +52,7 @@ def test_longer_limb_moves_its_descendants():
     assert_allclose(after[high], before[high] + [0, 1, 0], atol=1e-12)
     assert_allclose(longer.skeleton.rest_translations[1], [0, 2, 0], atol=1e-12)
     assert_allclose(longer.skin.inverse_bind[1, :3, 3], [0, -2, 0], atol=1e-12)
-    # At rest joints move nothing: binding and skeleton agree.
+    # At rest the joints move no vertex, because binding and skeleton agree.
     assert_allclose(deform(longer, rest_pose(longer.skeleton))[0], after, atol=1e-12)
 
 
@@ -72,5 +72,5 @@ def test_offsets_follow_a_rotated_bind_pose():
     skin = replace(figure.skin, inverse_bind=np.linalg.inv(bind))
     rotated = replace(figure, skin=skin)
     longer = resized(rotated, limbs_of(rotated), np.array([2.0, 1.0]), ONES)
-    # One more unit along y is one along x in axes rotated by 90 degrees about z.
+    # One more unit along y is a unit along x in axes rotated by 90 degrees about z.
     assert_allclose(longer.skeleton.rest_translations[1], [1, 1, 0], atol=1e-12)

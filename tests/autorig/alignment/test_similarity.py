@@ -1,4 +1,4 @@
-"""Similarities: fitted to pairs generated from one, and to hand-calculated pairs."""
+"""Similarities, fitted to generated and hand-calculated pairs of points."""
 
 import numpy as np
 import pytest
@@ -29,8 +29,8 @@ def test_fit_never_reflects():
     assert_allclose(np.linalg.det(found.rotation), 1.0, atol=EXACT)
 
 
-def test_fixed_scale_is_kept_and_the_rest_fitted():
-    # Two lengths, 1 and 3: the fit may only move their centre.
+def test_fixed_scale_is_kept_and_rotation_and_translation_fitted():
+    # The lengths are 1 and 3; the fit may only move their centre.
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     found = fit_similarity(points, 3.0 * points, scale=1.0)
     assert found.scale == 1.0

@@ -1,4 +1,4 @@
-"""Complete alignment: unchanged, searched, by landmarks or given; and its report."""
+"""Alignment by search, by landmarks or as given, and its report; skipped if unnecessary."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from viewer.rig.mesh import vertex_normals
 pytestmark = pytest.mark.slow
 
 POSITIONS, TRIANGLES = tube()
-# An eighth of the usual number: a search takes far less time.
+# With an eighth of the usual number of points, a search is much faster.
 SAMPLES = 250
 TEMPLATE = Posed(POSITIONS, TRIANGLES)
 
@@ -36,14 +36,14 @@ def aligned(positions, triangles=TRIANGLES, report=silent, up="y", **settings):
     return align(TEMPLATE, Posed(positions, triangles), up, AlignmentSettings(**settings), report)
 
 
-def test_aligned_target_is_left_alone():
+def test_alignment_of_an_aligned_target_is_unchanged():
     found = aligned(POSITIONS)
     assert found.how == "in place"
     assert (found.similarity.matrix == np.eye(4)).all() and found.error < 1e-12
 
 
-def test_aligned_part_is_left_alone_despite_an_offset():
-    # A shirt: the middle of the tube, 2 % of its size away from it.
+def test_alignment_of_an_aligned_part_with_an_offset_is_unchanged():
+    # The target is like a shirt, the middle of the tube offset by 2 % of its size.
     middle = (POSITIONS[TRIANGLES][:, :, 1] > 0.5).all(axis=1)
     middle &= (POSITIONS[TRIANGLES][:, :, 1] < 1.5).all(axis=1)
     shirt = POSITIONS * [1.06, 1.0, 1.06]
@@ -54,8 +54,9 @@ def test_aligned_part_is_left_alone_despite_an_offset():
     assert found.away > 0.05 > found.error
 
 
-def test_aligned_shell_is_left_alone_although_a_larger_template_is_nearer():
-    # 2 % of the size away on all sides: a larger tube would be closer almost everywhere.
+def test_alignment_of_a_shell_is_unchanged_although_a_larger_template_is_nearer():
+    # The shell is 2 % of the size away on all sides, so a larger tube would be closer almost
+    # everywhere.
     normals = vertex_normals(POSITIONS, TRIANGLES)
     found = aligned(POSITIONS + 0.05 * normals)
     assert found.how == "in place"
@@ -79,20 +80,20 @@ def test_small_rotation_is_found_although_the_boxes_nearly_agree():
     assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
-def test_template_keeps_its_size_if_asked():
+def test_template_keeps_its_size_if_requested():
     rotation = turn([0, 1, 0], 0.4)
     found = aligned(POSITIONS @ rotation.T + [0.5, 0, 0], scale="none")
     assert found.similarity.scale == 1.0
     assert_allclose(found.similarity.rotation, rotation, atol=1e-8)
 
 
-def test_axes_are_scaled_independently_if_asked():
+def test_axes_are_scaled_independently_if_requested():
     found = aligned(POSITIONS * [1.15, 1.0, 0.9] + [1.0, 0, 0], scale="axes")
     assert_allclose(found.similarity.scale * found.similarity.factors, [1.15, 1.0, 0.9], atol=0.02)
     assert (found.similarity.factors != 1.0).any()
 
 
-def test_only_landmarks_matter_without_refinement():
+def test_only_landmarks_are_used_without_refinement():
     rotation = turn([0, 0, 1], 1.1)
     points = POSITIONS[[3, 50, 200, 300]]
     pairs = np.stack([points, 2.0 * points @ rotation.T + [9.0, 0, 0]], axis=1)
@@ -200,13 +201,13 @@ def test_matrices_that_stretch_along_axes_of_either_space_are_accepted():
         ),
     ],
 )
-def test_report_for_a_shared_origin_says_whether_anything_was_done(scale, angle, words):
+def test_report_for_a_shared_origin_states_whether_the_template_was_moved(scale, angle, words):
     similarity = Similarity(scale, turn([1, 0, 0], angle), np.zeros(3), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.0, 0.0, (0.0, 0.0), "in place"))
     assert str(lines[0]) == f"alignment: {words}, translation (0, 0, 0)"
 
 
-def test_report_is_complete_and_warns_of_a_bad_fit():
+def test_report_is_complete_and_warns_of_a_poor_fit():
     similarity = Similarity(2.0, turn([0, 1, 0], np.pi / 2), np.array([1.0, 0, -2]), np.ones(3))
     lines = alignment_lines(Alignment(similarity, 0.05, 0.1, (0.05, 0.1), "search"))
     assert [line.labelled for line in lines] == [

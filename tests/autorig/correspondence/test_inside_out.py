@@ -1,4 +1,4 @@
-"""Parts wound the wrong way: closed parts and the bulk of a mesh are flipped, linings are not."""
+"""Parts with inverted winding: closed parts and most of a mesh are flipped, linings are not."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ OUTWARD = np.array(
 
 
 def two(first, second):
-    """Return two unit cubes side by side with the triangles given of each."""
+    """Return two unit cubes side by side with the given triangles of each."""
     positions = np.concatenate([CUBE, CUBE + np.array([3.0, 0.0, 0.0])])
     return positions, np.concatenate([first, np.asarray(second) + 8]).astype(np.int32)
 
@@ -29,7 +29,7 @@ def found(positions, triangles, islands):
     return wound_backwards(weld(positions, triangles), np.array(islands)).tolist()
 
 
-def test_sample_cube_is_wound_outward():
+def test_cube_of_the_tests_is_wound_outward():
     assert volume(CUBE, OUTWARD) == pytest.approx(1.0)
 
 
@@ -48,7 +48,7 @@ def test_unrequested_part_is_kept():
     assert not any(found(positions, triangles, []))
 
 
-def test_open_lining_is_kept_and_an_open_whole_is_flipped():
+def test_open_lining_is_kept_and_open_mesh_is_flipped():
     inner = OUTWARD[2:, ::-1]  # a face of two triangles is missing
     lining = two(OUTWARD, inner)
     assert not any(found(*lining, [1]))
@@ -60,7 +60,7 @@ def test_vertices_without_triangles_belong_to_no_part():
     assert found(positions, OUTWARD[:, ::-1].astype(np.int32), [0, 1]) == [True] * 8 + [False]
 
 
-def test_flipping_keeps_materials_and_texture_with_their_corners():
+def test_flipping_keeps_materials_and_texture_at_their_corners():
     positions, triangles = tube()
     mesh = mesh_of(positions, triangles[:, ::-1])
     again = with_reversed_winding(mesh, np.ones(len(positions), dtype=bool))

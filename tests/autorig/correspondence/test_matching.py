@@ -15,7 +15,7 @@ FLAT = Template(
 
 
 def triangle(height=0.0, tilt=0.0, flipped=False):
-    """Return a triangle about the z axis: raised, rotated about x, facing +z if not flipped."""
+    """Return a triangle around the z axis, raised and rotated about x; it faces +z or -z."""
     positions = 0.1 * np.array([[1.0, 0, 0], [-0.5, 0.8, 0], [-0.5, -0.8, 0]])
     turn = np.array(
         [[1, 0, 0], [0, math.cos(tilt), -math.sin(tilt)], [0, math.sin(tilt), math.cos(tilt)]]
@@ -39,8 +39,8 @@ def test_match_accepts_by_angle():
         np.testing.assert_allclose(np.degrees(found.angles), degrees, atol=1e-9)
 
 
-def test_match_accepts_larger_angles_where_the_surfaces_touch():
-    # All corners within 0.1, that is 0.5 % of 20.
+def test_match_accepts_larger_angles_if_the_surfaces_touch():
+    # All corners are within 0.1, which is 0.5 % of 20.
     for degrees, expected in ((59.0, True), (61.0, False)):
         found = match(FLAT, triangle(0.0, math.radians(degrees)), 20.0, MatchSettings())
         assert found.matched.tolist() == [expected] * 3
@@ -56,19 +56,19 @@ def test_match_flips_an_inside_out_island():
 def test_match_does_not_flip_an_island_that_is_partly_folded_over():
     positions = np.array([[0.0, 0, 0.3], [1, 0, 0.3], [1, 1, 0.3], [0, 1, 0.3], [0.5, 0.9, 0.3]])
     triangles = np.array([[0, 1, 2], [0, 2, 3], [2, 3, 4]])
-    # The last triangle lies on the others; vertex 4 alone faces only down.
+    # The last triangle covers the others; only vertex 4 faces only down.
     found = match(FLAT, weld(positions, triangles), 10.0, MatchSettings())
     assert found.inside_out.tolist() == []
     assert not found.matched[4] or found.angles[4] < math.radians(30)
 
 
-def test_match_accepts_flipped_normals_if_asked():
+def test_match_accepts_flipped_normals_if_requested():
     # A strip of two triangles that face up and two that face down.
     positions = np.array([[x, 0.5 * (x % 2), 0.3] for x in range(6)]) * [0.2, 1, 1]
     mesh = weld(positions, np.array([[0, 2, 1], [1, 2, 3], [2, 3, 4], [3, 5, 4]]))
     as_given = match(FLAT, mesh, 10.0, MatchSettings())
     assert as_given.inside_out.tolist() == []
-    # Vertex 0 and 1 have only triangles facing up, 4 and 5 only such facing down.
+    # Vertices 0 and 1 have only triangles that face up, 4 and 5 only triangles that face down.
     assert as_given.matched[[0, 1]].tolist() == [True, True]
     assert as_given.matched[[4, 5]].tolist() == [False, False]
     either = match(FLAT, mesh, 10.0, MatchSettings(flipped_normals=True))
@@ -76,29 +76,30 @@ def test_match_accepts_flipped_normals_if_asked():
     np.testing.assert_allclose(either.angles, 0.0, atol=1e-7)
 
 
-def test_match_uses_distance_alone_for_vertices_without_normals():
+def test_match_uses_only_distance_for_vertices_without_normals():
     positions = np.array([[0.0, 0, 0.4], [3, 3, 0.6], [1, 0, 0], [2, 0, 0], [2, 1, 0]])
     found = match(FLAT, weld(positions, np.array([[2, 3, 4]])), 10.0, MatchSettings())
     assert found.matched.tolist() == [True, False, True, True, True]
     assert found.angles[:2].tolist() == [0.0, 0.0]
 
 
-def test_match_takes_the_side_of_a_thin_sheet_that_faces_the_same_way():
-    # The template is a plate of thickness 0.02; the target its upper side, sunk below the middle.
+def test_match_uses_the_side_of_a_thin_sheet_that_faces_the_same_way():
+    # The template is a plate of thickness 0.02; the target is its upper side, sunk below the
+    # middle.
     x = np.array([[-1.0, -1], [1, -1], [1, 1], [-1, 1]])
     upper = np.column_stack([x, np.full(4, 0.01)])
     lower = np.column_stack([x, np.full(4, -0.01)])
     plate = Template(
         np.concatenate([upper, lower]), np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
     )
-    # One island of two triangles: upright on the far right, sunk on the left.
+    # An island of two triangles is raised on the far right and sunk on the left.
     target = weld(
         np.array([[-0.5, -0.2, -0.006], [-0.3, -0.2, -0.006], [-0.4, 0.2, -0.006],
                   [0.5, -0.2, 0.01], [0.7, -0.2, 0.01], [0.6, 0.2, 0.01], [0.55, 0.3, 0.01],
                   [0.6, -0.4, 0.01]]),
         np.array([[0, 1, 2], [1, 3, 2], [3, 4, 5], [3, 5, 6], [3, 7, 4]]),
     )  # fmt: skip
-    found = match(plate, target, 4.0, MatchSettings())  # near is 0.02
+    found = match(plate, target, 4.0, MatchSettings())  # the near distance is 0.02
     assert found.inside_out.tolist() == []
     assert found.matched.all()
     np.testing.assert_allclose(found.points.positions[:, 2], 0.01, atol=1e-12)
@@ -117,7 +118,7 @@ def test_normals_of_both_sides_of_a_sheet_cancel_out():
 
 def test_template_has_smooth_normals_across_seams():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0], [0, 1, 0], [0, 0, 1.0]])
-    template = Template(positions, np.array([[0, 1, 2], [3, 4, 5]]))  # face +z and +x
+    template = Template(positions, np.array([[0, 1, 2], [3, 4, 5]]))  # these face +z and +x
     half = math.sqrt(0.5)
     np.testing.assert_allclose(template.normals[[0, 3]], [[half, 0, half]] * 2, atol=1e-12)
 

@@ -7,7 +7,7 @@ from viewer.errors import RigError
 pytest.importorskip("scipy")
 
 
-def test_nearest_vertices_agree_with_all_distances():
+def test_nearest_vertices_match_a_search_of_all_distances():
     rng = np.random.default_rng(1)
     template, points = rng.normal(size=(200, 3)), rng.normal(size=(100, 3))
     table = np.linalg.norm(points[:, None] - template[None], axis=2)

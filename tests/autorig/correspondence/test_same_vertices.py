@@ -1,4 +1,4 @@
-"""Vertices that two meshes share, and vertices that only lie close to each other."""
+"""Vertices shared by two meshes, as opposed to vertices that are only close to each other."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ COUNT = 9
 
 
 def grid(step=1.0, start=0.0):
-    """Return a grid in the plane z = 0, two triangles per cell."""
+    """Return a grid in the plane z = 0 with two triangles per cell."""
     line = start + step * np.arange(COUNT)
     x, y = np.meshgrid(line, line, indexing="ij")
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(COUNT * COUNT)], axis=1)
@@ -39,27 +39,27 @@ def test_moved_vertices_are_recognised_in_any_order():
     assert (found((positions, triangles), (moved, rank[triangles].astype(np.int32))) == order).all()
 
 
-def test_offset_shell_still_has_the_same_vertices():
+def test_offset_shell_has_the_same_vertices():
     positions, triangles = grid()
     lifted = positions + np.array([0.0, 0.0, 3.0])
     assert (found((positions, triangles), (lifted, triangles)) == np.arange(81)).all()
 
 
 @pytest.mark.parametrize(("step", "start"), [(0.5, 0.0), (1.0, 0.5), (2.0, 0.0)])
-def test_another_tessellation_has_other_vertices(step, start):
+def test_different_tessellation_has_different_vertices(step, start):
     same = found(grid(), grid(step, start))
     assert (same >= 0).mean() < 0.05
 
 
-def test_rotated_tessellation_has_other_vertices():
+def test_rotated_tessellation_has_different_vertices():
     positions, triangles = grid()
     cosine, sine = np.cos(0.5), np.sin(0.5)
     rotated = (positions - 4.0) @ np.array([[cosine, sine, 0], [-sine, cosine, 0], [0, 0, 1]]) + 4.0
     same = found((positions, triangles), (rotated, triangles))
-    assert (same >= 0).mean() < 0.2  # those near the centre of rotation
+    assert (same >= 0).mean() < 0.2  # vertices near the centre of rotation remain
 
 
-def test_points_near_vertices_snap_and_others_stay():
+def test_points_snap_to_near_vertices_only():
     positions, triangles = grid()
     asked = np.array([[0.2, 0.1, 1.0], [3.4, 3.3, 0.0]])
     points = Surface(positions, triangles).closest(asked)

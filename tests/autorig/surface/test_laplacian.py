@@ -16,7 +16,7 @@ ROUNDING = 1e-12
 
 
 def grid(count, rng=None):
-    """Return a flat grid of count x count vertices, the inner ones jittered."""
+    """Return a flat grid of count x count vertices with jittered inner vertices."""
     x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))
     positions = np.stack([x.ravel(), y.ravel(), np.zeros(count * count)], axis=1)
     index = np.arange(count * count).reshape(count, count)
@@ -30,9 +30,10 @@ def grid(count, rng=None):
     return positions, triangles.astype(np.int32), inner
 
 
-def test_cotangent_laplacian_of_a_right_triangle():
+def test_cotangent_laplacian_of_a_right_triangle_matches_hand_calculation():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-    # Cotangents: 0 at the right angle, 1 at the others; each edge gets half of the opposite one.
+    # The cotangents are 0 at the right angle and 1 at the other angles; each edge gets half of the
+    # opposite one.
     expected = [[1.0, -0.5, -0.5], [-0.5, 0.5, 0.0], [-0.5, 0.0, 0.5]]
     found = cotangent_laplacian(positions, np.array([[0, 1, 2]])).toarray()
     np.testing.assert_allclose(found, expected, atol=ROUNDING)
@@ -61,7 +62,7 @@ def test_cotangent_laplacian_stays_positive_with_slivers():
     operator = cotangent_laplacian(positions, triangles).toarray()
     assert np.isfinite(operator).all()
     np.testing.assert_allclose(operator, operator.T, atol=ROUNDING)
-    # The largest eigenvalue is of order 100: rounding of that.
+    # The tolerance is rounding of the largest eigenvalue, which is of order 100.
     np.testing.assert_allclose(operator.sum(axis=1), 0.0, atol=1e-10)
     assert np.linalg.eigvalsh(operator).min() > -1e-10
 
@@ -87,12 +88,12 @@ def test_voronoi_areas_of_an_equilateral_triangle_are_thirds():
 
 
 def test_voronoi_areas_of_an_obtuse_triangle_are_half_and_quarters():
-    positions = np.array([[0.0, 1, 0], [-3, 0, 0], [3, 0, 0]])  # area 3, obtuse at the first
+    positions = np.array([[0.0, 1, 0], [-3, 0, 0], [3, 0, 0]])  # area 3, obtuse at the first corner
     found = voronoi_areas(positions, np.array([[0, 1, 2]]))
     np.testing.assert_allclose(found, [1.5, 0.75, 0.75], atol=ROUNDING)
 
 
-def test_voronoi_areas_add_up_to_the_area():
+def test_voronoi_areas_sum_to_the_area():
     rng = np.random.default_rng(3)
     positions = rng.normal(size=(30, 3))
     triangles = rng.permuted(np.tile(np.arange(30), (50, 1)), axis=1)[:, :3]
@@ -117,10 +118,10 @@ def test_non_manifold_island_gets_the_graph_laplacian():
     np.testing.assert_allclose(areas[5:], [0.25, 0.125, 0.125], atol=ROUNDING)
 
 
-def test_laplacian_gives_every_vertex_a_positive_area():
+def test_every_vertex_of_the_laplacian_has_a_positive_area():
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5]])
     _, areas = laplacian(weld(positions, np.array([[0, 1, 2]])))
-    # 1e-9 of the mean of 1/4, 1/8 and 1/8.
+    # The minimum is 1e-9 of the mean of 1/4, 1/8 and 1/8.
     assert areas[3] == pytest.approx(1e-9 / 6.0, rel=1e-9)
     _, areas = laplacian(weld(positions, np.zeros((0, 3), dtype=np.int32)))
     assert areas.tolist() == [1.0, 1.0, 1.0, 1.0]

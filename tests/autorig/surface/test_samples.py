@@ -1,4 +1,4 @@
-"""Surface samples: on the surface, in proportion to area."""
+"""Surface samples, which are on the surface and in proportion to area."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ POSITIONS = np.array([[0.0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 1], [0, 0, 4], [
 TRIANGLES = np.array([[0, 1, 2], [3, 4, 5]])
 
 
-def test_samples_are_distributed_by_area_and_lie_on_their_triangle():
+def test_samples_are_distributed_by_area_and_are_on_their_triangle():
     found = sample_surface(POSITIONS, TRIANGLES, 800)
     on_first = found.positions[:, 2] == 0.0
     assert on_first.sum() == 200
@@ -25,12 +25,12 @@ def test_samples_are_distributed_by_area_and_lie_on_their_triangle():
 
 def test_samples_are_uniform_within_a_triangle():
     flat = sample_surface(POSITIONS, TRIANGLES[:1], 4000).positions
-    # The middle of the samples is that of the triangle, and a quarter lies in each quarter.
+    # The centroid of the samples is that of the triangle, and each quarter has a quarter of them.
     assert_allclose(flat.mean(axis=0), [2 / 3, 2 / 3, 0.0], atol=0.01)
     assert abs((flat[:, :2].max(axis=1) < 1).mean() - 0.5) < 0.01
 
 
-def test_same_mesh_gives_the_same_samples():
+def test_same_mesh_has_the_same_samples():
     first, second = (sample_surface(POSITIONS, TRIANGLES, 50).positions for _ in range(2))
     assert (first == second).all()
 
@@ -47,7 +47,7 @@ def test_mesh_without_area_is_refused(triangles):
 
 
 def test_vertices_are_sampled_by_area_without_repetition():
-    # One large and one small triangle apart: three vertices of the large one at most.
+    # One large and one small triangle are apart, so at most three vertices are of the large one.
     positions = np.concatenate([100.0 * POSITIONS[:3], POSITIONS[3:]])
     assert even_vertices(positions, TRIANGLES, 10).tolist() == [0]
     line = np.arange(101.0)

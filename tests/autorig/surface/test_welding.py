@@ -9,7 +9,7 @@ SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 
 
 def test_weld_joins_the_corners_of_a_seam():
-    # Two triangles of a square, each with its own three vertices.
+    # The two triangles of a square have three separate vertices each.
     positions = SQUARE[[0, 1, 2, 0, 2, 3]]
     welded = weld(positions, np.array([[0, 1, 2], [3, 4, 5]]))
     assert welded.vertices.tolist() == [0, 1, 2, 0, 2, 3]
@@ -24,7 +24,7 @@ def test_weld_treats_minus_zero_as_zero():
 
 
 def test_weld_joins_vertices_that_differ_by_rounding():
-    # The median edge is 1, so vertices within 1e-4 are one.
+    # The median edge is 1, so vertices within 1e-4 are joined.
     positions = SQUARE[[0, 1, 2, 0, 2, 3]].copy()
     positions[3, 2] = 0.5e-4
     positions[4, 2] = 2e-4
@@ -59,7 +59,7 @@ def test_weld_of_an_empty_mesh_is_empty():
     assert len(welded.positions) == 0
 
 
-def test_weld_of_coincident_points():
+def test_weld_of_coincident_points_is_one_vertex():
     welded = weld(np.ones((3, 3)), np.array([[0, 1, 2]]))
     assert welded.vertices.tolist() == [0, 0, 0]
     assert welded.triangles.shape == (0, 3)

@@ -1,4 +1,4 @@
-"""Winding numbers of a cube, closed and with one face missing."""
+"""Winding numbers of a cube that is closed or has one face missing."""
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -22,9 +22,9 @@ def test_winding_number_of_an_inside_out_cube_is_minus_one():
 
 
 def test_missing_face_subtracts_its_solid_angle():
-    # Seen from the centre each of the six faces covers a sixth.
+    # Seen from the centre, each of the six faces covers a sixth of the sphere.
     assert_allclose(winding_numbers(CORNERS, CUBE[2:], MIDDLE[None]), [5 / 6], atol=1e-12)
 
 
-def test_no_points_give_no_winding_numbers():
+def test_no_points_have_no_winding_numbers():
     assert winding_numbers(CORNERS, CUBE, np.zeros((0, 3))).shape == (0,)

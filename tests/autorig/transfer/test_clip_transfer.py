@@ -11,7 +11,7 @@ from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 
-SKELETON = arm().skeleton  # DOFs 0 to 2 translate, the others rotate
+SKELETON = arm().skeleton  # DOFs 0 to 2 translate, the remaining DOFs rotate
 
 
 def curve(target):
@@ -42,7 +42,7 @@ def test_frames_keep_rotations_and_scale_translations():
     )
     found = transfer_clip(clip, SKELETON, 10.0, 2.0)
     assert_array_equal(found.rotations, rotations)
-    # Joints move inside the figure, whose scale of 2 is already part of the lengths.
+    # Joints move inside the figure, and its scale of 2 is already part of the lengths.
     assert_allclose(found.translations, 20.0)
     assert_allclose(found.figure_translations, [[10.0, 0, 0], [20.0, 0, 0]])
     assert_allclose(found.figure_scales, [1.0, 1.5])
@@ -65,7 +65,7 @@ def test_path_is_scaled_by_leg_length():
     assert_allclose(found.figure_translations, 12.0)
 
 
-def test_frames_without_translations_keep_none():
+def test_frames_without_translations_have_none_after_transfer():
     clip = SampledClip("turn", Timing(30.0, np.array([0])), np.ones((1, 2, 4)))
     found = transfer_clip(clip, SKELETON, 10.0)
     assert found.translations is None and found.figure_translations is None

@@ -23,7 +23,7 @@ def points(barycentric):
 
 
 def strip(count):
-    """Return a strip of triangles along x, two vertices a step."""
+    """Return a strip of triangles along x with two vertices per step."""
     positions = np.array([[x, y, 0.0] for x in range(count) for y in (0.0, 1.0)])
     first = 2 * np.arange(count - 1)
     triangles = np.concatenate(
@@ -52,7 +52,7 @@ def test_offsets_fade_out_away_from_the_template():
         triangles, 1.0,
     )  # fmt: skip
     along = found.values()[0, ::2, 0]
-    # Ten rounds reach ten steps to both sides, and never rise on the way.
+    # Ten rounds extend by ten steps to both sides and decrease monotonically.
     assert_allclose(along[:9], 1.0, atol=1e-12)
     assert_allclose(along[31:], 0.0, atol=1e-12)
     assert (np.diff(along) <= 1e-12).all() and 0.3 < along[19] < 1.0 and 0.0 < along[21] < 0.7

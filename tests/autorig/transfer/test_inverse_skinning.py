@@ -1,4 +1,4 @@
-"""Inverse skinning: linear blend skinning is inverted, and singular vertices are reported."""
+"""Inversion of linear blend skinning, and reports of singular vertices."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ EXACT = 1e-12
 
 
 def palette(angle):
-    """Return palette matrices: the base at rest, the tip rotated about z through (0, 1, 0)."""
+    """Return the palette of a base at rest and a tip rotated about z through (0, 1, 0)."""
     matrices = np.tile(np.eye(4), (2, 1, 1))
     rotation = turn([0, 0, 1], angle)
     matrices[1, :3, :3] = rotation
@@ -23,7 +23,7 @@ def palette(angle):
 
 
 def skinned(positions, skin, matrices):
-    """Skin vertex by vertex, straight from the formula."""
+    """Skin vertex by vertex, directly by the formula."""
     moved = []
     for vertex, point in enumerate(positions):
         span = slice(skin.starts[vertex], skin.starts[vertex + 1])
@@ -34,7 +34,7 @@ def skinned(positions, skin, matrices):
     return np.array(moved)
 
 
-def test_skinned_mesh_is_unposed_exactly():
+def test_skinned_mesh_is_inverted_exactly():
     figure = arm()
     matrices = palette(1.2)
     posed = skinned(figure.mesh.positions, figure.skin, matrices)
@@ -44,16 +44,17 @@ def test_skinned_mesh_is_unposed_exactly():
 
 
 @pytest.mark.parametrize(("degrees", "guarded"), [(156.0, False), (158.0, True), (180.0, True)])
-def test_half_and_half_is_singular_beyond_157_degrees(degrees, guarded):
-    # The smallest singular value of (I + R) / 2 is cos(angle / 2): 0.208 and 0.191 here.
+def test_equal_weights_are_singular_beyond_157_degrees(degrees, guarded):
+    # The smallest singular value of (I + R) / 2 is cos(angle / 2), here 0.208 and 0.191.
     skin = skin_from_lists([[(0, 0.5), (1, 0.5)]], np.tile(np.eye(4), (2, 1, 1)))
     found = invert_skinning(np.array([[0.3, 0.2, 0.1]]), skin, palette(np.radians(degrees)))
     assert found.guarded.tolist() == [guarded]
     assert np.abs(found.positions).max() < 10.0
 
 
-def test_guarded_vertex_is_unposed_with_the_nearest_rotation():
-    # The mean of the identity and 160 degrees about z is cos(80 deg) times an 80 degree rotation.
+def test_singular_vertex_is_inverted_with_the_nearest_rotation():
+    # The mean of the identity and 160 degrees about z is cos(80 deg) times a rotation by 80
+    # degrees.
     angle = np.radians(160.0)
     skin = skin_from_lists([[(0, 0.5), (1, 0.5)]], np.tile(np.eye(4), (2, 1, 1)))
     matrices = palette(angle)
@@ -63,7 +64,7 @@ def test_guarded_vertex_is_unposed_with_the_nearest_rotation():
     assert_allclose(found.positions[0], turn([0, 0, 1], -angle / 2) @ (point - shift), atol=EXACT)
 
 
-def test_vertex_without_influence_stays():
+def test_vertex_without_influence_does_not_move():
     skin = skin_from_lists([[], [(1, 1.0)]], np.tile(np.eye(4), (2, 1, 1)))
     found = invert_skinning(np.ones((2, 3)), skin, palette(0.5))
     assert_allclose(found.positions[0], [1.0, 1.0, 1.0])
@@ -78,7 +79,7 @@ def test_repair_moves_only_the_neighbourhood_and_improves_the_pose():
     assert found.guarded.any() and not found.guarded.all()
     mended = repair_tears(found, posed, figure.mesh.triangles)
     assert (mended[found.guarded] != found.positions[found.guarded]).any()
-    # Three rings away from the fold, at least 0.45 from y = 1, nothing moves.
+    # No vertex moves three rings away from the fold, at least 0.45 from y = 1.
     away = np.abs(figure.mesh.positions[:, 1] - 1.0) > 0.45
     assert (mended[away] == found.positions[away]).all()
     before, after = (
@@ -88,7 +89,7 @@ def test_repair_moves_only_the_neighbourhood_and_improves_the_pose():
     assert after < 0.5 * before
 
 
-def test_nothing_is_repaired_without_singular_vertices():
+def test_no_vertex_is_repaired_without_singular_vertices():
     figure = arm()
     matrices = palette(0.3)
     posed = skinned(figure.mesh.positions, figure.skin, matrices)

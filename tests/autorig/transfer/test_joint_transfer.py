@@ -1,4 +1,4 @@
-"""Joints transferred with the surrounding surface."""
+"""Transfer of joints with the surrounding surface."""
 
 import numpy as np
 import pytest
@@ -26,13 +26,13 @@ def table(regressor, n_vertices):
     return dense
 
 
-def test_boundary_is_where_a_joint_and_its_parent_both_have_weight():
+def test_boundary_has_weights_of_both_a_joint_and_its_parent():
     influences = [
         [(0, 1.0)],
         [(0, 0.25), (1, 0.75)],
         [(1, 0.5), (2, 0.5)],
         [(2, 0.5), (0, 0.5)],
-        [(1, 0.2), (0, 0.8), (1, 0.2)],  # a joint listed twice counts once, with the sum
+        [(1, 0.2), (0, 0.8), (1, 0.2)],  # a joint listed twice is used once with the sum
     ]
     skin = skin_from_lists(influences, np.tile(np.eye(4), (3, 1, 1)))
     child = [0.0, 0.25 * 0.75, 0.0, 0.0, 0.4 * 0.8]
@@ -46,7 +46,7 @@ def test_skin_without_influences_has_no_boundary():
 
 
 def regressor():
-    # Joint 1 rests on vertices 0 and 1, joint 2 on vertex 2 alone, the root on nothing.
+    # Joint 1 depends on vertices 0 and 1, joint 2 on vertex 2 only, and the root on none.
     return JointRegressor(3, [1, 1, 2], [0, 1, 2], [0.5, 0.5, 1.0])
 
 
@@ -62,7 +62,7 @@ def test_joints_move_by_the_weighted_mean_of_their_surface():
 
 def test_joint_without_surface_follows_its_parent():
     found = transfer_joints(JOINTS, PARENTS, regressor(), SHIFTS, np.array([True, False, False]))
-    # Half of joint 1's weights are left, which is enough; none of joint 2's.
+    # Half of the weights of joint 1 remain, which is enough, but none of joint 2.
     assert_allclose(found.positions, [[0, 0, 0], [1, 1, 0], [1, 2, 0]])
     assert found.transferred.tolist() == [False, True, False]
     assert found.measurable.tolist() == [False, True, True]
@@ -75,7 +75,7 @@ def test_rows_that_cancel_out_are_ignored():
     assert not found.transferred.any()
 
 
-def test_shifts_lead_to_the_surface_and_are_trusted_where_it_is_close_and_similar():
+def test_shifts_point_to_the_surface_and_are_used_if_it_is_close_and_similar():
     square = np.array([[-1.0, 0, -1], [1, 0, -1], [1, 0, 1], [-1, 0, 1]])
     triangles = np.array([[0, 1, 2], [0, 2, 3]])
     points = np.array([[0.0, 0.1, 0], [0, 0.9, 0], [0.2, 0.1, 0.3], [0.5, -0.1, 0]])
@@ -85,7 +85,7 @@ def test_shifts_lead_to_the_surface_and_are_trusted_where_it_is_close_and_simila
     assert matched.tolist() == [True, False, False, True]
 
 
-def test_joints_inside_and_outside_the_mesh():
+def test_joints_inside_and_outside_the_mesh_are_distinguished():
     positions, triangles = tube()
     joints = np.array([[0.0, 1.0, 0.05], [0.0, 3.0, 0.0], [0.9, 1.0, 0.0]])
     assert outside(positions, triangles, joints).tolist() == [False, True, True]

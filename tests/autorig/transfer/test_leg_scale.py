@@ -1,4 +1,4 @@
-"""Leg-length ratio, calculated by hand for a two-legged stick figure."""
+"""The ratio of leg lengths, calculated by hand for a stick figure with two legs."""
 
 from dataclasses import replace
 
@@ -28,7 +28,7 @@ def test_only_leg_length_affects_the_ratio(up):
 def test_feet_are_taken_from_the_first_skeleton():
     tiptoe = stick()
     raised = tiptoe.rest_translations.copy()
-    raised[4, 1] += 0.2  # one foot is 0.2 higher: on average 0.9 below the root
+    raised[4, 1] += 0.2  # one foot is 0.2 higher, so the mean is 0.9 below the root
     assert leg_scale(stick(), replace(tiptoe, rest_translations=raised), "y", 7.0) == (
         pytest.approx(0.9)
     )
@@ -36,7 +36,7 @@ def test_feet_are_taken_from_the_first_skeleton():
 
 @pytest.mark.parametrize("leg", [0.0, 0.1, -1.0])
 def test_figures_without_legs_have_no_ratio(leg):
-    # The root is the lowest joint, or nearly so.
+    # The root is (nearly) the lowest joint.
     assert leg_scale(stick(leg=leg), stick(), "y", 7.0) == 7.0
 
 
@@ -45,5 +45,5 @@ def test_skeleton_of_one_joint_has_no_ratio():
     assert leg_scale(one, one, "y", 2.5) == 2.5
 
 
-def test_feet_above_the_root_give_the_fallback():
+def test_feet_above_the_root_result_in_the_fallback():
     assert leg_scale(stick(), stick(leg=-1.0), "y", 2.0) == 2.0

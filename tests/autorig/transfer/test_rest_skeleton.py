@@ -1,4 +1,4 @@
-"""Rest skeletons fitted to posed joints: forward kinematics is inverted."""
+"""Rest skeletons fitted to posed joints by inverting forward kinematics."""
 
 from dataclasses import replace
 
@@ -34,14 +34,14 @@ def placed_joints(figure, pose, similarity):
     )
 
 
-def test_same_proportions_give_the_scaled_skeleton_and_bind_matrices():
+def test_same_proportions_result_in_the_scaled_skeleton_and_bind_matrices():
     figure = arm()
     pose = bent(figure)
     pose.figure_scale = 1.5
     pose.figure_translation[:] = 3.0, 2.0, 1.0
     joints = placed_joints(figure, pose, PLACED)
     found = fit_rest_skeleton(figure, pose, PLACED, joints, np.ones(2, bool))
-    # 5 by the alignment, 1.5 by the pose.
+    # The alignment scales by 5, the pose by 1.5.
     assert_allclose(found.skeleton.rest_translations, [[0, 0, 0], [0, 7.5, 0]], atol=EXACT)
     assert_allclose(
         np.linalg.inv(found.inverse_bind)[:, :3, 3], [[0, 0, 0], [0, 7.5, 0]], atol=EXACT
@@ -49,11 +49,11 @@ def test_same_proportions_give_the_scaled_skeleton_and_bind_matrices():
     assert found.lines == () and found.pose.figure_scale == 1.0
 
 
-def test_pose_places_joints_as_found_with_the_aligned_rotations():
+def test_pose_has_the_fitted_joint_positions_and_the_aligned_rotations():
     figure = arm()
     pose = bent(figure)
     joints = placed_joints(figure, pose, PLACED)
-    joints[1] += [0.5, 0.3, -0.2]  # the target's upper arm is longer
+    joints[1] += [0.5, 0.3, -0.2]  # the upper arm of the target is longer
     found = fit_rest_skeleton(figure, pose, PLACED, joints, None)
     world = placement_matrix(found.pose) @ world_matrices(found.skeleton, found.pose)
     assert_allclose(world[:, :3, 3], joints, atol=1e-11)
@@ -61,11 +61,11 @@ def test_pose_places_joints_as_found_with_the_aligned_rotations():
     assert_allclose(world[:, :3, :3], wanted, atol=EXACT)
 
 
-def test_bind_matrices_keep_rotations_and_take_the_new_lengths():
+def test_bind_matrices_keep_rotations_and_get_the_new_lengths():
     figure = arm()
     bind = np.linalg.inv(figure.skin.inverse_bind)
     bind[0, :3, :3] = turn([0, 0, 1], np.pi / 2)
-    bind[1] = bind[0] @ np.linalg.inv(figure.skin.inverse_bind)[1]  # bound when bent to -x
+    bind[1] = bind[0] @ np.linalg.inv(figure.skin.inverse_bind)[1]  # bound in a pose bent to -x
     bent_bind = Figure(
         "bent", figure.mesh, figure.skeleton, replace(figure.skin, inverse_bind=np.linalg.inv(bind))
     )
@@ -87,8 +87,8 @@ def test_root_limits_are_widened_and_lengths_scaled():
     joints = placed_joints(figure, pose, PLACED)
     found = fit_rest_skeleton(figure, pose, PLACED, joints, None)
     limits = found.skeleton.dof_limits
-    assert_allclose(limits[:3], np.tile([-4.0, 4.0], (3, 1)))  # lengths, five times
-    assert_allclose(limits[6:], np.tile([-0.8, 0.8], (3, 1)))  # the tip's angles
+    assert_allclose(limits[:3], np.tile([-4.0, 4.0], (3, 1)))  # lengths are scaled by five
+    assert_allclose(limits[6:], np.tile([-0.8, 0.8], (3, 1)))  # angles of the tip
     angles = found.pose.dofs[3:6]
     assert (limits[3:6, 0] <= angles).all() and (angles <= limits[3:6, 1]).all()
     assert told(found.lines) == [("R008.limits-widened", {"joint": "base"})]
@@ -130,8 +130,8 @@ def spread() -> Figure:
 @pytest.mark.parametrize(
     ("transferred", "left", "right"),
     [
-        ([True] * 4, 1.25, 1.25),  # both were measured: their mean
-        ([True, True, False, True], 1.4, 1.4),  # one was measured: used for both
+        ([True] * 4, 1.25, 1.25),  # both joints were measured, so their mean is used
+        ([True, True, False, True], 1.4, 1.4),  # one joint was measured and is used for both
         ([True, False, False, True], 1.25, 1.25),
     ],
 )
@@ -144,7 +144,7 @@ def test_symmetric_skeletons_stay_symmetric(transferred, left, right):
     found = fit_rest_skeleton(figure, pose, straight, joints, np.array(transferred))
     offsets = found.skeleton.rest_translations
     assert_allclose(offsets[1:3], [[left, 0, 0], [-right, 0, 0]], atol=EXACT)
-    # The middle joint is its own mirror counterpart: it returns to the middle.
+    # The middle joint is its own mirror counterpart and returns to the middle.
     assert_allclose(offsets[3], [0, 1, 0], atol=EXACT)
 
 
@@ -161,7 +161,7 @@ def test_bind_pose_agrees_with_the_rest_pose():
 
 
 def test_root_uses_angles_within_its_limits():
-    # Rotated by 120 degrees about y: as angles (180, 60, 180) or (0, 120, 0).
+    # A rotation by 120 degrees about y has the angles (180, 60, 180) or (0, 120, 0).
     figure = arm(limit=2.2)
     pose = rest_pose(figure.skeleton)
     similarity = Similarity(1.0, turn([0, 1, 0], np.radians(120)), np.zeros(3), np.ones(3))

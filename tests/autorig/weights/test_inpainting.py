@@ -27,7 +27,7 @@ def wavy_grid(count=9):
 
 
 def problem(rng):
-    """Return operators of a grid, weights of three joints of five, and what is unknown."""
+    """Return the operators of a grid, weights of three of five joints, and the unknown vertices."""
     mesh = wavy_grid()
     operator, areas = laplacian(mesh)
     count = len(areas)
@@ -35,12 +35,12 @@ def problem(rng):
     weights[:, [0, 2, 3]] = rng.dirichlet([1, 1, 1], count)
     unknown = np.zeros(count, dtype=bool)
     unknown[30:52] = True
-    weights[unknown] = 99.0  # must not be read
+    weights[unknown] = 99.0  # these must not be read
     return operator, areas, weights, unknown
 
 
 def minimiser(energy, weights, unknown):
-    """Minimise trace(W^T Q W) with known rows held, as one dense system with multipliers."""
+    """Minimise trace(W^T Q W) with fixed known rows, as one dense system with multipliers."""
     count, known = len(weights), np.nonzero(~unknown)[0]
     hold = np.zeros((len(known), count))
     hold[np.arange(len(known)), known] = 1.0
@@ -65,14 +65,14 @@ def test_inpainting_minimises_the_energy():
     found, method = run(operator, areas, weights, unknown)
     assert method == "direct"
     expected = minimiser(smooth_energy(operator, areas), weights, unknown)
-    # Solved weights below 1e-6 count as 0.
+    # Solved weights below 1e-6 are set to 0.
     np.testing.assert_allclose(found.toarray(), expected, atol=3e-6)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
     assert found.data.min() > 0.0
     assert set(found.indices) == {0, 2, 3}
 
 
-def test_inpainting_with_one_joint_gives_that_joint():
+def test_inpainting_with_one_joint_returns_that_joint():
     operator, areas, weights, unknown = problem(np.random.default_rng(2))
     weights[:] = [0, 1, 0, 0, 0]
     found, _ = run(operator, areas, weights, unknown)
@@ -80,13 +80,13 @@ def test_inpainting_with_one_joint_gives_that_joint():
     assert found.nnz == unknown.sum()
 
 
-def test_inpainting_without_unknown_vertices_gives_no_rows():
+def test_inpainting_without_unknown_vertices_returns_no_rows():
     operator, areas, weights, unknown = problem(np.random.default_rng(2))
     found, _ = run(operator, areas, weights, np.zeros_like(unknown))
     assert found.shape == (0, 5)
 
 
-def test_inpainting_skips_vertices_that_are_neither_known_nor_wanted():
+def test_inpainting_skips_vertices_that_are_neither_known_nor_requested():
     operator, areas, weights, unknown = problem(np.random.default_rng(3))
     far = sparse.csr_array(sparse.block_diag([operator, sparse.csr_array((2, 2))]))
     weights = np.concatenate([weights, np.full((2, 5), 7.0)])
@@ -129,7 +129,7 @@ def test_inpainting_falls_back_to_harmonic_weights(monkeypatch, times, method):
     monkeypatch.setattr("scipy.sparse.linalg.splu", failing(times))
     operator, areas, weights, unknown = problem(np.random.default_rng(5))
     areas = areas.copy()
-    # Areas this uneven are beyond the conjugate gradients of the smooth energy.
+    # With areas this uneven, the conjugate gradients of the smooth energy do not converge.
     areas[unknown] *= np.logspace(-16, 0, unknown.sum())
     found, used = run(operator, areas, weights, unknown)
     assert used == method
@@ -139,7 +139,7 @@ def test_inpainting_falls_back_to_harmonic_weights(monkeypatch, times, method):
 
 def test_inpainting_reports_when_every_fallback_fails(monkeypatch):
     operator, areas, weights, unknown = problem(np.random.default_rng(6))
-    # Disconnected from all known vertices.
+    # The vertex is disconnected from all known vertices.
     inside, outside = np.nonzero(unknown)[0], np.nonzero(~unknown)[0]
     dense = operator.toarray()
     dense[np.ix_(inside, outside)] = 0.0

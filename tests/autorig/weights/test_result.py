@@ -56,7 +56,7 @@ def islands(counts):
     return RigidIslands(10 * number, np.array(counts), number, np.zeros(len(counts)))
 
 
-def test_rigid_part_report_names_the_largest_first():
+def test_rigid_part_report_lists_the_largest_first():
     assert told(rigid_lines(islands([1, 30]))) == [
         ("R007.part", {"n": 30, "vertex": 10, "joint": 1}),
         ("R007.part", {"n": 1, "vertex": 0, "joint": 0}),

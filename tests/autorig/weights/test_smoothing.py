@@ -8,7 +8,7 @@ sparse = pytest.importorskip("scipy.sparse")
 STRIP = np.array([[0, 1, 2], [2, 1, 3]])  # edges 01 02 12 13 23
 
 
-def test_smoothing_blends_in_a_fifth_of_the_neighbour_mean():
+def test_smoothing_adds_a_fifth_of_the_neighbour_mean():
     weights = sparse.csr_array(np.array([[1.0, 0], [0, 1], [0, 1], [0, 1]]))
     active = np.array([True, False, False, True])
     found = smooth(weights, STRIP, active, 1).toarray()

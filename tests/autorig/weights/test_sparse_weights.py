@@ -11,7 +11,7 @@ BIND = np.tile(np.eye(4), (3, 1, 1))
 ALL = np.array([[0, 1, 2]])
 
 
-def test_weight_matrix_adds_up_and_scales():
+def test_weight_matrix_sums_and_normalises_weights():
     skin = skin_from_lists([[(0, 0.5), (2, 1.0), (0, 0.5)], [(1, 4.0)], [(1, 1), (2, 0)]], BIND)
     matrix = weight_matrix(skin, ALL)
     assert matrix.toarray().tolist() == [[0.5, 0.0, 0.5], [0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
@@ -23,12 +23,12 @@ def test_weight_matrix_ignores_negative_weights():
     assert weight_matrix(skin, ALL).toarray()[0].tolist() == [1.0, 0.0, 0.0]
 
 
-def test_weight_matrix_needs_weights_only_for_used_vertices():
+def test_weight_matrix_requires_weights_only_for_used_vertices():
     skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], []], BIND)
     assert weight_matrix(skin, ALL).toarray()[3].tolist() == [0.0, 0.0, 0.0]
 
 
-def test_weight_matrix_names_the_first_vertex_without_weights():
+def test_weight_matrix_reports_the_first_vertex_without_weights():
     skin = skin_from_lists([[(0, 1.0)], [(1, 0.0)], []], BIND)
     with pytest.raises(RigError) as caught:
         weight_matrix(skin, ALL)
@@ -37,7 +37,7 @@ def test_weight_matrix_names_the_first_vertex_without_weights():
     )
 
 
-def test_weight_matrix_refuses_a_skin_of_another_mesh():
+def test_weight_matrix_refuses_a_skin_of_a_different_mesh():
     skin = skin_from_lists([[(0, 1.0)], [(1, 1.0)]], BIND)
     with pytest.raises(RigError) as caught:
         weight_matrix(skin, ALL)
@@ -51,7 +51,7 @@ def test_skin_of_is_the_inverse_of_weight_matrix():
     assert weight_matrix(skin, ALL).toarray().tolist() == rows.toarray().tolist()
 
 
-def test_skin_of_keeps_the_strongest_if_asked():
+def test_skin_of_keeps_the_strongest_weights_if_requested():
     rows = sparse.csr_array(np.array([[0.25, 0, 0.75], [0, 1, 0], [0.5, 0.125, 0.375]]))
     skin = skin_of(rows, BIND, 1)
     assert skin.joints.tolist() == [2, 1, 0]

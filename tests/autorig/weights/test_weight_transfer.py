@@ -22,7 +22,7 @@ def silent(fraction, what):
 
 
 def tube(rings=13, sides=16, length=3.0):
-    """Return an open tube along x, radius 0.5, facing outwards."""
+    """Return an open tube of radius 0.5 along x that faces outwards."""
     rotations = np.linspace(0, 2 * np.pi, sides + 1)[:-1]
     x = np.repeat(np.linspace(0, length, rings), sides)
     around = np.tile(rotations, rings)
@@ -68,7 +68,7 @@ def test_tube_faces_outwards():
     assert (normals[:, 1:] * positions[:, 1:]).sum(axis=1).min() > 0.0
 
 
-def test_transfer_onto_itself_changes_nothing():
+def test_transfer_onto_itself_does_not_change_weights():
     positions, triangles = tube()
     result = transfer(positions, triangles)
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
@@ -80,15 +80,16 @@ def test_transfer_onto_itself_changes_nothing():
     np.testing.assert_allclose(result.distances, 0.0, atol=1e-12)
 
 
-def test_transfer_mixes_weights_between_vertices():
-    # Rings elsewhere: on the surface of the flat-sided tube weights depend on x alone.
+def test_transfer_interpolates_weights_between_vertices():
+    # The target has different rings; on the flat-sided tube, weights depend only on x.
     positions, triangles = tube(rings=29)
     result = transfer(positions, triangles)
     np.testing.assert_allclose(dense(result), along(positions[:, 0]), atol=1e-12)
 
 
 def test_transfer_ignores_corners_with_zero_barycentric_weight():
-    # Rings between the template's sides: closest points lie on edges, up to rounding.
+    # The rings are rotated between the template's sides, so closest points are on edges up to
+    # rounding.
     positions, triangles = tube()
     x = positions[:, 0].copy()
     half = np.pi / 16
@@ -113,7 +114,7 @@ def test_transfer_inpaints_vertices_away_from_the_template():
     assert (result.matched | result.inpainted).all()
     found = dense(result)
     np.testing.assert_allclose(found.sum(axis=1), 1.0, atol=1e-12)
-    # The third joint does not reach this far; the others swap across the bump.
+    # The third joint has no weight this far; the weights of the others change across the bump.
     assert found[bump, 2].max() < 0.05
     order = [found[np.isclose(x, value), 0].mean() for value in np.unique(x[bump])]
     assert order == sorted(order, reverse=True)
@@ -125,7 +126,7 @@ def test_transfer_keeps_seams_closed():
     bump = np.abs(positions[:, 0] - 0.75) < 0.2
     positions[bump, 1:] *= 2.5
     whole = transfer(positions, triangles)
-    # Every triangle with vertices of its own.
+    # Every triangle has separate vertices.
     corners = triangles.ravel()
     split = transfer(positions[corners], np.arange(len(corners), dtype=np.int32).reshape(-1, 3))
     np.testing.assert_allclose(dense(split), dense(whole)[corners], atol=1e-9)
@@ -171,7 +172,7 @@ def test_transfer_does_not_depend_on_unit_or_position():
         WeightSettings(),
         silent,
     )
-    # Rounding of coordinates of order 100, through a system of condition 1e6.
+    # The tolerance is rounding of coordinates of order 100 in a system with condition number 1e6.
     np.testing.assert_allclose(dense(there), dense(here), atol=1e-7)
 
 
@@ -245,14 +246,14 @@ def test_transfer_reports_negative_template_weights():
     np.testing.assert_allclose(dense(result)[0], [1.0, 0.0, 0.0], atol=1e-12)
 
 
-def test_result_makes_a_skin():
+def test_result_is_converted_to_a_skin():
     positions, triangles = tube()
     skin = transfer(positions, triangles).skin(BIND)
     assert skin.n_vertices == len(positions)
     assert Mesh(positions, positions, triangles).n_vertices == skin.n_vertices
 
 
-def test_nearest_weights_copies_rows():
+def test_nearest_weights_are_copied_rows():
     skin = skin_from_lists([[(0, 0.5), (1, 0.25)], [(2, 1.0)]], BIND)
     result = nearest_weights(
         np.array([[0.0, 0, 0], [1, 0, 0]]), skin, np.array([[0.9, 0, 0], [0.1, 0, 0], [0, 0, 5.0]])

@@ -13,7 +13,7 @@ from viewer.batching.worker import worker_rank
 
 @dataclass
 class Job:
-    """Append a line to the item's file; some names crash, hang or fail."""
+    """Append a line to the file of an item; some names crash, hang or fail."""
 
     uses_gpu: bool = False
     seconds: float = 0.0
@@ -34,7 +34,7 @@ class Job:
 
 
 class Missing:
-    """A job that can be pickled, but not unpickled: the worker lacks a module."""
+    """A job that can be pickled but not unpickled, because the worker lacks a module."""
 
     def __reduce__(self):
         return fail, ()
@@ -45,6 +45,6 @@ def fail() -> None:
 
 
 def items(count: int, **names: int) -> list[Item]:
-    """Return items, some of which have special names, by index."""
+    """Return items, with special names for some indices."""
     by_index = {index: name for name, index in names.items()}
     return [Item(n, (), "", by_index.get(n, f"{n}.x")) for n in range(count)]

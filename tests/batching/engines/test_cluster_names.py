@@ -12,7 +12,7 @@ from viewer.batching.engines._cluster_text import parse_cluster
 from viewer.errors import ViewerError
 
 
-def test_names_of_clusters() -> None:
+def test_names_of_clusters_are_recognised() -> None:
     assert parse_cluster("local").kind == "local"
     found = parse_cluster("tcp://10.0.0.1:8786")
     assert (found.kind, found.address) == ("address", "tcp://10.0.0.1:8786")
@@ -32,13 +32,13 @@ def test_names_of_clusters() -> None:
         ("slurm:partition=a\nb", "found "),
     ],
 )
-def test_other_names_are_refused(text, message) -> None:
+def test_unknown_cluster_names_are_refused(text, message) -> None:
     with pytest.raises(ViewerError) as caught:
         parse_cluster(text)
     assert message in str(caught.value)
 
 
-# Importing it here would replace the Ctrl-C handler of the test process.
+# Importing dask-jobqueue here would replace the Ctrl-C handler of the test process.
 needs_jobqueue = pytest.mark.skipif(find_spec("dask_jobqueue") is None, reason="no dask-jobqueue")
 
 
@@ -53,7 +53,7 @@ def test_job_script_contains_the_slurm_options() -> None:
     for wanted in ("-p gpu", "-A lab", "-t 2:00:00", "--cpus-per-task=4", "--gres=gpu:1"):
         assert f"#SBATCH {wanted}" in lines
     assert "#SBATCH --exclusive" in lines
-    # Four workers with 2 GiB each, all of which declare a GPU.
+    # All four workers have 2 GiB and declare a GPU.
     assert "#SBATCH --mem=8G" in lines
     command = lines[-1]
     for wanted in ("--nworkers 4", "--nthreads 1", "--resources GPU=1", "--memory-limit 2.00GiB"):
@@ -63,7 +63,7 @@ def test_job_script_contains_the_slurm_options() -> None:
 
 
 @needs_jobqueue
-def test_slurm_needs_sbatch(monkeypatch) -> None:
+def test_missing_sbatch_is_reported(monkeypatch) -> None:
     from viewer.batching.engines import dask_cluster
 
     monkeypatch.setenv("PATH", "")

@@ -1,4 +1,4 @@
-"""Batches on Dask workers: real schedulers and processes, some of which are killed."""
+"""Batches on Dask workers, with real schedulers and processes, some of which are killed."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def finished(job, some, limits, on_result=lambda result: None):
     return {result.item.index: result for result in results}
 
 
-def test_cluster_of_this_machine_reports_crashes_hangs_and_defects() -> None:
+def test_local_cluster_reports_crashes_hangs_and_defects() -> None:
     some = items(40, crash=5, hang=11, **{"raise": 20})
     found = finished(Job(), some, Limits(2, retries=0, timeout=1.0, cluster="local"))
     assert {n: one.status for n, one in found.items() if one.status != "done"} == {
@@ -62,7 +62,7 @@ def test_cluster_of_this_machine_reports_crashes_hangs_and_defects() -> None:
     assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
 
 
-def test_items_of_a_killed_worker_run_elsewhere(address, tmp_path) -> None:
+def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path) -> None:
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
     first = []
 
@@ -85,7 +85,7 @@ def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
     finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
     assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
-    with Client(address) as client:  # an earlier test may have killed one of them
+    with Client(address) as client:  # an earlier test may have killed a worker
         client.wait_for_workers(2, timeout=60)
     finished(Job(seconds=0.05), some, Limits(2, cluster=address))
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
@@ -106,7 +106,9 @@ def test_stopping_finishes_running_items_and_starts_no_more(address) -> None:
     assert {one.status for one in results} == {"done"}
 
 
-def test_workers_without_the_package_or_of_another_version(address, monkeypatch) -> None:
+def test_workers_without_the_package_or_with_another_version_are_refused(
+    address, monkeypatch
+) -> None:
     def refusal(job):
         with pytest.raises(ViewerError) as caught:
             list(dask_cluster.run(items(5), job, Limits(cluster=address)))
@@ -131,7 +133,7 @@ def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
             list(dask_cluster.run(items(3), Job(), limits))
 
 
-def test_address_without_a_scheduler(monkeypatch) -> None:
+def test_address_without_a_scheduler_is_reported(monkeypatch) -> None:
     from viewer.batching.engines import _clusters
 
     monkeypatch.setattr(_clusters, "_CONNECT", 0.3)

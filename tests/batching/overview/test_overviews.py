@@ -1,4 +1,4 @@
-"""Overviews: order of their content, and pages that never execute untrusted text."""
+"""Overviews: order of their content, and pages that do not execute untrusted text."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ EVIL = "<script>alert(1)</script>\" onload='x'"
 
 
 class Page(HTMLParser):
-    """Elements of a page, and its rows as text."""
+    """The elements of a page, and its rows as text."""
 
     def __init__(self, path) -> None:
         super().__init__()
@@ -38,7 +38,7 @@ class Page(HTMLParser):
             self.rows[-1][-1] += data
 
     def row(self, name):
-        """Return the row that begins with a name."""
+        """Return the row that starts with a name."""
         return next(row for row in self.rows if row[0].strip() == name)
 
 
@@ -97,7 +97,7 @@ def compared(index, relative, status="done"):
     return Result(Item(index, (), "", f"s{index}"), status, values={"comparisons": [row]})
 
 
-def test_page_of_diff_sorts_by_distance_and_names_the_vertex(tmp_path) -> None:
+def test_page_of_diff_sorts_by_distance_and_shows_the_vertex(tmp_path) -> None:
     results = [compared(0, 0.0), compared(1, 0.125), compared(2, 0.25)]
     save_overview(tmp_path / "o.html", "diff", results)
     page = Page(tmp_path / "o.html")
@@ -118,7 +118,7 @@ def has(pixels, color):
     return int((np.abs(pixels[..., :3].astype(int) - color).max(axis=-1) < 3).sum())
 
 
-def test_sheet_has_every_picture_and_marks_failed_items(tmp_path, monkeypatch) -> None:
+def test_sheet_shows_every_picture_and_marks_failed_items(tmp_path, monkeypatch) -> None:
     red, green = (200, 0, 0), (0, 160, 0)
     failed = Result(Item(2, (), "", "2.glb"), "failed", 2, message="expected a mesh")
     results = [drawn(tmp_path, 3, red), failed, drawn(tmp_path, 0, red), drawn(tmp_path, 1, green)]
@@ -144,13 +144,13 @@ def test_page_of_render_contains_small_pictures(tmp_path) -> None:
     assert len(sources) == 1 and sources[0].startswith("data:image/jpeg;base64,")
 
 
-def test_sheet_of_failures_alone_is_drawn(tmp_path) -> None:
+def test_sheet_of_failures_only_is_drawn(tmp_path) -> None:
     failed = Result(Item(0, (), "", "a"), "failed", 2, message="no mesh")
     (line,) = save_overview(tmp_path / "o.png", "render", [failed])
     assert line.endswith("o.png: 1 item, 1 of them failed") and (tmp_path / "o.png").exists()
 
 
-def test_other_files_and_batches_without_pictures_are_refused(tmp_path) -> None:
+def test_unsupported_suffixes_and_batches_without_pictures_are_refused(tmp_path) -> None:
     with pytest.raises(UnsupportedFormatError, match=r'expected \.html, \.png.*, found "\.pdf"'):
         check_overview("o.pdf")
     with pytest.raises(ViewerError, match=r"no picture was written; name a page such as o\.html"):

@@ -61,7 +61,9 @@ def refusal(path: Path, expected=(), alike=ALIKE) -> str:
         (["made/fox.glb", "made/readme.txt"], ["made"]),
     ],
 )
-def test_files_like_those_of_the_reference_are_found(tmp_path, names, result, is_zip) -> None:
+def test_files_with_the_suffixes_of_the_reference_are_found(
+    tmp_path, names, result, is_zip
+) -> None:
     if is_zip:
         path = zipped(tmp_path / "bob.zip", dict.fromkeys(names, "x"))
     else:
@@ -130,7 +132,7 @@ def test_archives_in_archives_and_folders_are_opened(tmp_path) -> None:
 
 @pytest.mark.parametrize("name", ["/etc/a.skel", "../a.skel", "x/../../a.skel", "C:\\a.skel",
                                   "\\a.skel", "x\\..\\..\\a.skel", "C:a.skel"])  # fmt: skip
-def test_paths_that_lead_outside_are_refused(tmp_path, name) -> None:
+def test_paths_outside_the_archive_are_refused(tmp_path, name) -> None:
     path = zipped(tmp_path / "bob.zip", {name: "x", "b.skin": "x"})
     assert "expected a path inside the archive, found one that leads outside" in refusal(path)
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]
@@ -150,7 +152,7 @@ def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch) ->
     assert refusal(path) == ": expected at most 1 file, found 2"
 
 
-def test_a_directory_that_understates_sizes_unpacks_no_more_than_it_states(tmp_path) -> None:
+def test_directory_with_understated_sizes_unpacks_only_the_stated_sizes(tmp_path) -> None:
     path = zipped(tmp_path / "bob.zip", {"a.skel": bytes(1 << 20), "a.skin": "x"})
     data = path.read_bytes()
     directory = data.index(b"PK\x01\x02")

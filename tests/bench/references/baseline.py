@@ -1,8 +1,6 @@
-"""The minimal program that draws and saves a frame: numpy, moderngl, Pillow, one shader, one PNG.
-
-Run as ``python references/baseline.py OUTPUT.png``; what ``viewer render`` is measured against.
-Draws as many triangles as the bundled figure has, 1280 x 720, four samples a pixel, without reading
-any file.
+"""A minimal program that draws and saves a frame with numpy, moderngl, Pillow and one shader.
+``viewer render`` is compared with ``python references/baseline.py OUTPUT.png``, which draws as many
+triangles as the bundled figure has at 1280 x 720, four samples per pixel, without reading any file.
 """
 
 from __future__ import annotations
@@ -34,7 +32,7 @@ void main() {
 
 
 def main() -> None:
-    """Draw a ball and write it."""
+    """Draw a ball and write the picture."""
     context = moderngl.create_context(
         standalone=True, backend="egl", libegl="libEGL.so.1", libgl="libGL.so.1"
     )

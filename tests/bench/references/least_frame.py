@@ -1,9 +1,9 @@
 """A minimal program that draws frames of a moving figure, for ``bench_frames.py``.
 
-Vertices as in the file, with their four strongest influences as attributes; one shader skins and
-projects them, another shades them with two lights; back faces are culled, the background has one
-colour, and the picture is read as OpenGL stores it. It has no options, textures or error handling:
-a lower bound for the same driver, not a goal.
+The four strongest influences of each vertex are attributes; one shader skins and projects the
+vertices, another shades them with two lights. Back faces are culled, the background has one colour,
+and the picture is read as OpenGL stores it. Without options, textures or error handling, it is a
+lower bound for the same driver, not a goal.
 """
 
 from __future__ import annotations
@@ -53,16 +53,16 @@ void main() {
 
 
 class LeastFrame:
-    """Draws a figure and reads the picture.
+    """A figure that is drawn and read as a picture.
 
     Parameters
     ----------
     context : moderngl.Context
-        The context in use.
+        The current context.
     figure : Figure
         Figure with a mesh, a skeleton and a skin.
     camera : Camera
-        The camera, which does not move.
+        The fixed camera.
     box : (2, 3)
         Bounds for the depth range.
     size : (int, int)
@@ -115,7 +115,7 @@ class LeastFrame:
         self.rest[:, :3, 3], self.rest[:, 3, 3] = self.skeleton.rest_translations, 1.0
 
     def frame(self, angles: Floats) -> bytes:
-        """Pose the joints, (J, 3) Euler angles in radians; draw; return the picture's bytes."""
+        """Pose by (J, 3) Euler angles in radians, draw, and return the bytes of the picture."""
         world = self.rest.copy()
         world[:, :3, :3] = _rotations(angles)
         for above, below in self.levels:
@@ -133,7 +133,7 @@ class LeastFrame:
 
 
 def _strongest(figure: Figure) -> tuple[Floats, Floats]:
-    """Return the four strongest joints of each vertex and their normalized weights, (V, 4)."""
+    """Return the four strongest joints of each vertex and their normalised weights, (V, 4)."""
     skin, count = figure.require_skin(), figure.require_mesh().n_vertices
     joints, weights = np.zeros((count, 4)), np.zeros((count, 4))
     for vertex in range(count):
@@ -145,7 +145,7 @@ def _strongest(figure: Figure) -> tuple[Floats, Floats]:
 
 
 def _levels(parents: Floats) -> list[tuple[Floats, Floats]]:
-    """Return the passes of pointer doubling: indices of ancestors and of joints."""
+    """Return the passes of pointer doubling: indices of ancestors and joints."""
     ancestors, passes = parents.copy(), []
     below = np.flatnonzero(ancestors >= 0)
     while len(below):

@@ -1,4 +1,4 @@
-"""``viewer batch``: results equal to single runs, exit codes, and early refusals."""
+"""``viewer batch``: results that equal single runs, exit codes, and early refusals."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def rigs(tmp_path, monkeypatch) -> Path:
     return tmp_path
 
 
-def test_items_are_written_as_the_command_writes_them(rigs, capsys):
+def test_items_are_written_as_by_the_command(rigs, capsys):
     assert run(["convert", "in/a/one.skel", "tiny.skin", "-o", "one.npz"]) == 0
     command = ["batch", "convert", "in", "--with", "tiny.skin", "--to", "npz", "-o", "out"]
     assert run(command) == 1
@@ -67,7 +67,7 @@ def test_joint_maps_are_named_by_their_items(rigs, capsys):
     assert not (rigs / "other").exists()
 
 
-def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
+def test_items_do_not_fill_the_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("VIEWER_CACHE", str(tmp_path / "cache"))
     points = " ".join(f"{n}.25 {n}.5 1" for n in range(4000))
     normals, weights = "0 0 1 " * 4000, "1 0 1 " * 4000
@@ -82,7 +82,7 @@ def test_items_leave_nothing_in_the_cache(tmp_path, monkeypatch):
     assert (tmp_path / "cache").exists()
 
 
-def test_resume_runs_only_what_is_not_done(rigs, capsys):
+def test_resume_runs_only_unfinished_items(rigs, capsys):
     command = [
         "batch",
         "convert",
@@ -101,7 +101,7 @@ def test_resume_runs_only_what_is_not_done(rigs, capsys):
     assert run([*command, "--report", "r.jsonl", "--resume"]) == 0
     assert "1 done, 2 unchanged" in capsys.readouterr().out
     assert Path("a-one.obj").stat().st_mtime_ns == written and Path("b-bad.obj").exists()
-    # Other options or shared files give other results.
+    # Other options or shared files lead to other results.
     assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
     assert "3 done" in capsys.readouterr().out
     Path("tiny.skin").write_text(skin_text() + "\n")
@@ -151,7 +151,7 @@ def test_warnings_are_recorded_as_data(rigs, capsys):
 
 
 @pytest.mark.slow
-def test_pictures_are_drawn_by_workers(rigs):
+def test_workers_draw_pictures(rigs):
     from PIL import Image
 
     command = ["batch", "render", "in/a", "--with", "tiny.skin", "-o", "out", "--size", "32x24"]
@@ -160,7 +160,7 @@ def test_pictures_are_drawn_by_workers(rigs):
         assert picture.size == (32, 24)
 
 
-def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch, ctrl_c):
+def test_interrupted_batch_reports_how_to_resume(rigs, capsys, monkeypatch, ctrl_c):
     from viewer.commands import info
 
     monkeypatch.setattr(info, "run", lambda arguments: ctrl_c() or 0)
@@ -168,14 +168,14 @@ def test_interrupted_batch_says_how_to_resume(rigs, capsys, monkeypatch, ctrl_c)
     assert "2 items left; only batches with --report" in capsys.readouterr().out
 
 
-def test_shards_write_their_own_tables(rigs):
+def test_shards_write_separate_tables(rigs):
     for shard in ("0/2", "1/2"):
         run(["batch", "lint", "in", "--shard", shard, "--table", "t.csv"])
     rows = [len(Path(f"t.{n}-of-2.csv").read_text().splitlines()) for n in range(2)]
     assert rows == [3, 2] and not Path("t.csv").exists()
 
 
-def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
+def test_additional_sheets_replace_no_file(rigs, capsys, monkeypatch):
     from viewer.batching.overview import sheet
 
     monkeypatch.setattr(sheet, "PER_SHEET", 2)
@@ -185,7 +185,7 @@ def test_further_sheets_replace_no_file(rigs, capsys, monkeypatch):
     assert "s-2.png: already exists" in capsys.readouterr().err
     (rigs / "in" / "b" / "p-2.skel").write_text(SKEL)
     assert run([*command, "out/b/p.png"]) == 2
-    assert "sheet 2: out/b/p-2.png: expected a file of its own" in capsys.readouterr().err
+    assert "sheet 2: out/b/p-2.png: expected a separate file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(
@@ -244,7 +244,7 @@ def test_python_refuses_limits_below_zero(rigs, wrong):
         (["lint", "in", "--sharp"], "did you mean"),
     ],
 )
-def test_wrong_usage_is_refused_before_the_start(rigs, capsys, words, part):
+def test_invalid_usage_is_refused_before_the_start(rigs, capsys, words, part):
     assert run(["batch", *words]) == 2
     said = capsys.readouterr()
     assert said.err.count("\n") == 1 and part in said.err, said.err

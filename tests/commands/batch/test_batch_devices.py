@@ -10,7 +10,7 @@ from viewer.commands._batch import jobs
 from viewer.commands._batch.jobs import CommandJob
 
 
-def test_workers_that_render_use_their_own_device_unless_one_is_given(monkeypatch) -> None:
+def test_workers_that_render_use_separate_devices_unless_one_is_given(monkeypatch) -> None:
     used = []
     monkeypatch.setattr(render, "run", lambda arguments: used.append(arguments.gpu) or 0)
     monkeypatch.setattr(jobs, "_device", lambda: 3)
@@ -21,5 +21,5 @@ def test_workers_that_render_use_their_own_device_unless_one_is_given(monkeypatc
     assert used == [3, 1]
 
 
-def test_the_process_of_the_batch_itself_has_the_default_device() -> None:
+def test_process_of_the_batch_uses_the_default_device() -> None:
     assert jobs._device() is None

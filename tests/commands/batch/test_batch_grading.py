@@ -64,7 +64,7 @@ def rows_of(path: Path) -> dict[str, dict[str, str]]:
         return {row["name"]: row for row in csv.DictReader(stream)}
 
 
-def test_every_submission_has_a_row_and_none_stops_the_others(course, capsys) -> None:
+def test_every_submission_has_a_row_and_failures_do_not_stop_the_others(course, capsys) -> None:
     code = run(["batch", "diff", "solution/arm.skel+solution/arm.skin", "subs", "--poses", "0",
                 "--tolerance", "1e-6", "--table", "t.csv", "--overview", "o.html"])  # fmt: skip
     assert code == 1
@@ -85,7 +85,7 @@ def test_every_submission_has_a_row_and_none_stops_the_others(course, capsys) ->
         "eve.zip": ("failed", "2", "no"),
         "fay.zip": ("failed", "2", ""),
     }
-    # The third vertex is displaced by 0.5.
+    # The displacement of the third vertex is 0.5.
     assert float(rows["bob + co"]["vertices_max"]) == pytest.approx(0.5, abs=1e-6)
     assert rows["bob + co"]["vertices_worst"] == "vertex 2"
     assert rows["cy"]["message"] == "subs/cy: expected 1 file matching *.skin, found arm.skel"
@@ -95,7 +95,7 @@ def test_every_submission_has_a_row_and_none_stops_the_others(course, capsys) ->
     assert not Path("arm.skel").exists()
 
 
-def test_python_grades_with_expected_names_and_workers_see_the_same(course) -> None:
+def test_python_grading_with_expected_names_is_equal_in_workers(course) -> None:
     zipped(course / "gus.zip", rig() | {"old.skel": "x", "old.skin": "x"})
     names = [str(course / "dee.zip"), str(course / "gus.zip")]
     options = ["solution", "--expect", "arm.skel", "--expect", "arm.skin", "--poses", "0"]
@@ -122,14 +122,14 @@ def test_files_that_cannot_be_written_are_refused_first(course, options, message
     assert Path("grades.csv").read_text() == "keep"
 
 
-def test_plus_separates_files_unless_it_is_part_of_a_name(course) -> None:
+def test_plus_sign_separates_files_unless_it_is_part_of_a_name(course) -> None:
     folder = course / "bob + co" / "project"
     files = [folder / "arm.skel", folder / "arm.skin"]
     assert input_files("+".join(map(str, files))) == files
     assert input_files(str(folder)) == files
 
 
-def test_full_disk_is_no_fault_of_an_archive_and_stops_no_other(course, capsys, monkeypatch):
+def test_full_disk_is_not_reported_as_an_error_of_the_archive(course, capsys, monkeypatch):
     from viewer.batching.submissions import unpacking
 
     def fill(*_: object) -> None:

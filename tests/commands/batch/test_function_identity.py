@@ -15,7 +15,7 @@ def defined(source: str) -> Any:
     return names["job"]
 
 
-def test_changed_functions_differ():
+def test_changed_functions_have_different_identities():
     sources = [
         "def job(item): return max(item.files)",
         "def job(item): return min(item.files)",
@@ -28,7 +28,7 @@ def test_changed_functions_differ():
         "def outer(n):\n def job(item): return job(n)\n return job\njob = outer(2)",
     ]
     assert len({identity_of(defined(source)) for source in sources}) == len(sources)
-    # Nested code and sets stay equal when they are created again.
+    # Nested code and sets remain equal when they are created again.
     assert all(identity_of(defined(one)) == identity_of(defined(one)) for one in sources)
 
 

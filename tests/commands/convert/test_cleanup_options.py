@@ -1,4 +1,4 @@
-"""Clean-up options of ``viewer convert``: values, errors, printed changes, written frames."""
+"""Clean-up options of ``viewer convert``: values, errors, printed changes, and written frames."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_other_options_are_parsed():
         ("interpolate:12,split", ["--gaps=split", "--fill-gaps=12"], ("split", False, 12)),
     ],
 )
-def test_one_option_has_the_meaning_of_its_older_names(text, older, results):
+def test_option_of_gaps_has_the_meaning_of_its_older_names(text, older, results):
     def parse(words):
         parser = Parser()
         add_arguments(parser)
@@ -74,7 +74,7 @@ def test_one_option_has_the_meaning_of_its_older_names(text, older, results):
         *(("check", text) for text in ("hold", "interpolate:5")),
     ],
 )
-def test_other_values_of_gaps_are_refused(use, text):
+def test_unknown_values_of_gaps_are_refused(use, text):
     parser = argparse.ArgumentParser(exit_on_error=False)
     add_gap_arguments(parser.add_argument_group(), use)
     with pytest.raises(argparse.ArgumentError, match="expected "):
@@ -120,7 +120,7 @@ def test_changes_are_printed_and_written(tmp_path, capsys):
         assert len(arrays["poses"]) == 13 and float(arrays["mocap_framerate"]) == 60.0
 
 
-def test_a_video_beside_a_folder_of_images_is_refused(capsys):
+def test_video_together_with_a_folder_of_images_is_refused(capsys):
     command = ["convert", "a.bvh", "-o", "b.bvh", "--video", "a.mp4", "--images", "pictures"]
     assert run(command) == 2
     assert "--video and --images: expected one of them" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""``viewer convert`` with captures: keypoints alone, absent people, and untracked people."""
+"""``viewer convert`` with captures: keypoints without bodies, absent and untracked people."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def convert(*arguments):
 
 
 def standing(person, x):
-    """Return keypoints of somebody upright along z: only hips and nose are seen."""
+    """Return keypoints of a person upright along z, of whom only hips and nose are detected."""
     rows = np.zeros((25, 4))
     rows[8], rows[0] = (x, 0, 1, 1.0), (x, 0, 1.6, 0.5)
     return {"id": person, "keypoints3d": rows.tolist()}
@@ -27,7 +27,7 @@ def standing(person, x):
 
 @pytest.fixture
 def keypoints(tmp_path):
-    """Frames 10 to 12: person 0 in all, person 4 in the last."""
+    """Frames 10 to 12, with person 0 in all and person 4 in the last."""
     frames = {10: [standing(0, 0.0)], 11: [standing(0, 0.1)]}
     write_frames(
         tmp_path / "kp" / "keypoints3d", {**frames, 12: [standing(0, 0.2), standing(4, 2)]}
@@ -37,7 +37,7 @@ def keypoints(tmp_path):
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model, and bodies in frames 20 to 23: person 0 always, 7 in the first two."""
+    """A model, and bodies in frames 20 to 23: person 0 in all and person 7 in the first two."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     frames = {frame: [body(0), body(7)] if frame < 22 else [body(0)] for frame in range(20, 24)}
@@ -79,9 +79,11 @@ def test_keypoints_at_one_frame_keep_the_frame_number(keypoints, tmp_path, capsy
 
 
 @pytest.mark.parametrize("arguments", [["m.bvh"], ["m"], ["m.npz", "--as", "amass"]])
-def test_keypoints_alone_are_not_joint_motion(keypoints, tmp_path, capsys, arguments):
+def test_keypoints_without_bodies_are_refused_as_joint_motion(
+    keypoints, tmp_path, capsys, arguments
+):
     name, *others = arguments
-    assert convert(keypoints, "-o", tmp_path / name, *others) == 2
+    assert convert(keypoints, "-o", tmp_path / name, "--fps", 30, *others) == 2
     assert capsys.readouterr().err == (
         "viewer: there are only keypoints: a motion of joints cannot be written "
         "(.npz stores points)\n"
@@ -93,14 +95,13 @@ def test_keypoints_omitted_next_to_bodies_are_reported(recording, tmp_path, caps
     write_frames(tmp_path / "take" / "keypoints3d", {20: [points(0)]})
     assert convert(*recording, "-o", tmp_path / "w.bvh") == 0
     assert capsys.readouterr().out.splitlines()[-1] == (
-        "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+        "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+        "keypoints3d folder"
     )
 
 
 @pytest.mark.parametrize("name", ["w.bvh", "w.npz", "w-{person}.glb"])
-def test_absent_people_are_omitted_and_the_others_keep_their_names(
-    recording, tmp_path, capsys, name
-):
+def test_absent_people_are_omitted_without_renaming_the_others(recording, tmp_path, capsys, name):
     assert convert(*recording, "-o", tmp_path / name, "--frames", "22:24") == 0
     suffix = name.partition(".")[2]
     assert [path.name for path in tmp_path.glob("w*")] == [f"w-0.{suffix}"]
@@ -126,7 +127,7 @@ def test_glb_of_the_only_person_present_keeps_its_name(recording, tmp_path, caps
 
 
 @pytest.mark.parametrize("kind", ["glb", "bvh"])
-def test_person_in_a_name_is_replaced(recording, tmp_path, kind):
+def test_person_field_in_a_name_is_replaced(recording, tmp_path, kind):
     assert convert(*recording, "-o", tmp_path / f"p{{person}}_take.{kind}") == 0
     names = sorted(path.name for path in tmp_path.glob("p*"))
     assert names == [f"p0_take.{kind}", f"p7_take.{kind}"]
@@ -159,15 +160,15 @@ def test_empty_capture_is_refused_before_anything_is_written(recording, tmp_path
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     before = {path.name for path in tmp_path.iterdir()}
     assert convert(*recording, "-o", tmp_path / name, "--frames", "23:24") == 2
-    message = "nobody is present in frame 23: there is nothing to write"
+    message = "no person is present in frame 23: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
     assert {path.name for path in tmp_path.iterdir()} == before
 
 
-def test_time_at_which_everyone_is_absent_is_refused(recording, tmp_path, capsys):
+def test_time_without_any_present_person_is_refused(recording, tmp_path, capsys):
     (tmp_path / "take" / "smpl" / "000023.json").write_text("[]")
     assert convert(*recording, "-o", tmp_path / "w.obj", "--frame", 23) == 2
-    message = "nobody is present at that time: there is nothing to write"
+    message = "no person is present at that time: there is nothing to write"
     assert capsys.readouterr().err.endswith(f"viewer: {message}\n")
 
 
@@ -181,7 +182,7 @@ def test_untracked_people_have_unique_names(recording, tmp_path, capsys):
     assert lines[-1] == (
         "w-untracked.bvh, w-untracked-2.bvh: not tracked, possibly a different person in each frame"
     )
-    assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # people with a track come first
+    assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # people with a track are listed first
 
 
 def test_untracked_people_round_trip_untracked(recording, tmp_path):
@@ -204,7 +205,7 @@ def test_motion_of_one_frame_is_written(recording, tmp_path):
     assert lines[lines.index("MOTION") + 1] == "Frames: 1"
 
 
-def test_upside_down_keypoints_are_written_upright_at_one_frame_too(keypoints, tmp_path):
+def test_single_frame_of_upside_down_keypoints_is_written_upright(keypoints, tmp_path):
     assert convert(keypoints, "--up=-z", "-o", tmp_path / "m.npz", "--frame", 12) == 0
     with np.load(tmp_path / "m-4.npz") as arrays:
         assert str(arrays["up"]) == "z"

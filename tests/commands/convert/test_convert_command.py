@@ -1,4 +1,4 @@
-"""``viewer convert``: the requested output, verified by independent readers."""
+"""``viewer convert``: requested outputs, verified by independent readers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.cli import run
 from viewer.export import EXPORTERS
 
-DIGITS = 5e-9  # half of the ninth digit, of numbers below 10
+DIGITS = 5e-9  # half of the ninth digit of numbers below 10
 EXACT = 1e-12
 SUFFIXES = ", ".join(
     {"/": "a folder for EasyMocap"}.get(suffix, suffix)
@@ -47,14 +47,14 @@ def listed(numbers):
     return ",".join(map(repr, np.ravel(numbers).tolist()))
 
 
-# The seed job
+# Body models
 
 
 SHAPE = [1.2, -0.5, 0.0, 2.0]
 POSE = 0.4 * np.sin(np.arange(72.0))
 
 
-def test_smpl_parameters_become_an_obj_in_one_line(tmp_path, capsys):
+def test_smpl_parameters_are_converted_to_an_obj_in_one_command(tmp_path, capsys):
     path, arrays = write_model(tmp_path)
     out = tmp_path / "person.obj"
     options = ["--shape", "1.2,-0.5,0,2", "--pose", listed(POSE)]
@@ -79,7 +79,7 @@ def test_every_member_of_the_family_is_posed(tmp_path, kind):
     assert_allclose(found["own_numbers"], pose, rtol=0, atol=EXACT)
 
 
-def test_ply_holds_the_same_mesh(tmp_path):
+def test_ply_contains_the_same_mesh(tmp_path):
     path, arrays = write_model(tmp_path)
     out = tmp_path / "person.ply"
     assert run(["convert", path, "--pose", listed(POSE), "-o", str(out)]) == 0
@@ -139,14 +139,14 @@ def test_correctives_may_be_disabled(tmp_path):
     assert_allclose(found["vertices"], vertices, rtol=0, atol=EXACT)
 
 
-# DOFs, clips
+# DOFs and clips
 
 
 def test_dofs_pose_and_place_the_figure(tmp_path):
     rig = write_twist(tmp_path)
     dofs = ["--dof", "low.z=90deg", "--dof", "figure.scale=2", "--dof", "figure.ty=10"]
     found = arrays_of(tmp_path, *rig, *dofs)
-    # (1, y) rotated to (-y, 1), doubled, and 10 up.
+    # (1, y) is rotated to (-y, 1), doubled, and moved up by 10.
     expected = [[0, 12, 0], [-2, 12, 0], [-4, 12, 0]]
     assert_allclose(found["vertices"], expected, rtol=0, atol=EXACT)
     assert_allclose(found["joints"], [[0, 10, 0], [-2, 10, 0]], rtol=0, atol=EXACT)
@@ -155,7 +155,7 @@ def test_dofs_pose_and_place_the_figure(tmp_path):
 @pytest.mark.parametrize(
     ("options", "x"),
     [
-        (["--time", "0.5"], -1 + 0.5 * 2),  # the clip starts at 1 s; before it holds
+        (["--time", "0.5"], -1 + 0.5 * 2),  # the clip starts at 1 s and is constant before
         (["--time", "1.5"], 1),
         (["--frame", "0"], 0),
         (["--frame", "30"], 2),
@@ -189,7 +189,7 @@ HALF = math.sqrt(0.5)
 @pytest.mark.parametrize(
     ("options", "radius"),
     [
-        ([], HALF),  # LBS: the middle of a rotation by 90 degrees
+        ([], HALF),  # with LBS, the middle of a rotation by 90 degrees
         (["--method", "lbs"], HALF),
         (["--method", "dqs"], 1),
         (["--method", "mix", "--blend-factor", "0"], HALF),
@@ -197,7 +197,7 @@ HALF = math.sqrt(0.5)
         (["--method", "mix"], (1 + HALF) / 2),
     ],
 )
-def test_method_decides_the_radius_of_a_twist(tmp_path, options, radius):
+def test_method_determines_the_radius_of_a_twist(tmp_path, options, radius):
     found = arrays_of(tmp_path, *write_twist(tmp_path), "--dof", "high.y=90deg", *options)
     # Both methods rotate the middle vertex by 45 degrees about y, towards -z.
     expected = [[1, 0, 0], [radius * HALF, 1, -radius * HALF], [0, 2, -1]]
@@ -208,7 +208,7 @@ def test_influences_are_pruned_and_weights_normalised(tmp_path):
     rows = [f"0 {vertex} {0.5 if vertex == 1 else 1}" for vertex in range(7)]
     weights = "\n".join([*rows, "0 7 0.6", "1 7 0.3"])
     box = write_box(tmp_path / "box", skinning_weights=weights)
-    turned = ["--pose", pose_190(6, n8=math.pi / 2)]  # joint 1 about z: (1, 2) to (-2, 1)
+    turned = ["--pose", pose_190(6, n8=math.pi / 2)]  # joint 1 about z moves (1, 2) to (-2, 1)
     found = arrays_of(tmp_path, box, *turned)["vertices"]
     assert_allclose(found[1], [0.5, 0, 0], rtol=0, atol=EXACT)
     assert_allclose(found[7], [0.6 - 0.3 * 2, 0.6 * 2 + 0.3, 0.9 * 3], rtol=0, atol=EXACT)
@@ -222,7 +222,7 @@ def test_influences_are_pruned_and_weights_normalised(tmp_path):
 # Files
 
 
-def test_rig_is_written_from_a_body_and_opens_again(tmp_path, capsys):
+def test_rig_is_written_from_a_body_and_read_back(tmp_path, capsys):
     path, arrays = write_model(tmp_path)
     out = tmp_path / "person.skin"
     options = ["--pose", listed(POSE), "--shape", "1", "--no-correctives"]
@@ -273,7 +273,7 @@ def test_input_is_never_replaced(tmp_path, capsys):
     assert "twist.skel: input files are never overwritten" in capsys.readouterr().err
 
 
-def test_several_actors_become_numbered_files(tmp_path, capsys):
+def test_several_actors_are_written_to_numbered_files(tmp_path, capsys):
     first, second = write_twist(tmp_path, "a"), write_twist(tmp_path, "b")
     path, arrays = write_model(tmp_path)
     out = tmp_path / "out.obj"
@@ -282,12 +282,12 @@ def test_several_actors_become_numbered_files(tmp_path, capsys):
     counts = [" 3 vertices, 1 triangle", " 3 vertices, 1 triangle", " 48 vertices, 92 triangles"]
     paths = [out, tmp_path / "out-2.obj", tmp_path / "out-3.obj"]
     assert lines == [f"{path}:{text}" for path, text in zip(paths, counts, strict=True)]
-    # Placement in the scene is not exported.
+    # The placement in the scene is not exported.
     assert_array_equal(read_obj(paths[1]).v, read_obj(paths[0]).v)
     assert_allclose(read_obj(paths[2]).v, arrays["v_template"], rtol=0, atol=DIGITS)
 
 
-def test_existing_numbered_file_stops_before_any_is_written(tmp_path, capsys):
+def test_existing_numbered_file_is_refused_before_any_is_written(tmp_path, capsys):
     (tmp_path / "out-2.obj").write_text("precious")
     rigs = [*write_twist(tmp_path, "a"), *write_twist(tmp_path, "b")]
     assert run(["convert", *rigs, "-o", str(tmp_path / "out.obj")]) == 5
@@ -296,7 +296,7 @@ def test_existing_numbered_file_stops_before_any_is_written(tmp_path, capsys):
     assert (tmp_path / "out-2.obj").read_text() == "precious"
 
 
-def test_actor_that_cannot_be_written_reverts_the_others(tmp_path, capsys):
+def test_actor_that_cannot_be_written_reverts_all_files(tmp_path, capsys):
     rig = write_twist(tmp_path)
     (tmp_path / "arms.skel").write_text(ARMS_SKEL)
     (tmp_path / "out.obj").write_text("precious")
@@ -327,7 +327,7 @@ def test_actor_that_cannot_be_written_reverts_the_others(tmp_path, capsys):
         ),
     ],
 )
-def test_impossible_output_is_one_line(tmp_path, capsys, out, code, message):
+def test_impossible_output_is_refused_in_one_line(tmp_path, capsys, out, code, message):
     rig = write_twist(tmp_path)
     before = sorted(tmp_path.iterdir())
     assert run(["convert", *rig, "-o", str(tmp_path / out)]) == code
@@ -354,7 +354,9 @@ def test_invalid_output_name_is_exit_code_5(tmp_path, capsys, out):
         (["arms.skel", "--pose", "no.json", "-o", "x.npz"], "no.json: MISSING"),
     ],
 )
-def test_error_is_one_line_and_writes_nothing(tmp_path, monkeypatch, capsys, arguments, message):
+def test_error_is_reported_in_one_line_without_written_files(
+    tmp_path, monkeypatch, capsys, arguments, message
+):
     monkeypatch.chdir(tmp_path)
     write_twist(tmp_path)
     (tmp_path / "arms.skel").write_text(ARMS_SKEL)
@@ -371,7 +373,7 @@ def test_output_must_be_named(tmp_path, capsys):
     assert "-o/--output" in error and error.count("\n") == 1
 
 
-def test_without_files_the_fox_is_written(tmp_path):
+def test_fox_is_written_if_no_files_are_given(tmp_path):
     assert run(["convert", "-o", str(tmp_path / "fox.ply")]) == 0
     assert len(read_ply(tmp_path / "fox.ply").elements["vertex"]) > 1000
 

@@ -20,7 +20,7 @@ from viewer.rig.scene import Actor
 
 @pytest.fixture
 def walk(tmp_path):
-    """The tiny rig and a clip of its root: 0.5 to the right in a second, from second 1 on."""
+    """The tiny rig and a clip that starts at 1 s and moves the root right by 0.5 in a second."""
     skel, skin = write_rig(tmp_path)
     count = viewer.load(skel).actors[0].figure.skeleton.n_dofs
     moving = (
@@ -35,7 +35,7 @@ def walk(tmp_path):
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model, and a folder of five frames in which person 3 misses the middle one."""
+    """A model, and a folder of five frames in which person 3 is missing in the middle frame."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     folder = tmp_path / "take" / "smpl"
@@ -61,7 +61,7 @@ def convert(*arguments):
     return run(["convert", *map(str, arguments)])
 
 
-def test_numbered_meshes_are_the_posed_ones(walk, tmp_path, capsys):
+def test_numbered_meshes_are_the_posed_meshes(walk, tmp_path, capsys):
     out = tmp_path / "w_{frame:03}.obj"
     assert convert(*walk, "-o", out, "--fps", 4, "--frames", "1:4") == 0
     assert "3 files, w_001.obj to w_003.obj" in capsys.readouterr().out
@@ -75,7 +75,7 @@ def test_numbered_meshes_are_the_posed_ones(walk, tmp_path, capsys):
     assert not (tmp_path / "w_000.obj").exists()
 
 
-def test_arrays_of_all_frames(walk, tmp_path):
+def test_arrays_contain_all_frames(walk, tmp_path):
     out = tmp_path / "walk.npz"
     assert convert(*walk, "-o", out, "--fps", 4) == 0
     with np.load(out) as arrays:
@@ -86,14 +86,14 @@ def test_arrays_of_all_frames(walk, tmp_path):
         assert_allclose(moved[4], np.broadcast_to([0.5, 0, 0], moved[4].shape), atol=1e-12)
 
 
-def test_one_pose_where_a_time_is_given(walk, tmp_path):
+def test_single_pose_is_written_if_a_time_is_given(walk, tmp_path):
     out = tmp_path / "pose.npz"
     assert convert(*walk, "-o", out, "--time", 1.5) == 0
     with np.load(out) as arrays:
         assert arrays["vertices"].ndim == 2
 
 
-def test_each_person_gets_a_file(recording, tmp_path, capsys):
+def test_each_person_is_written_to_a_file(recording, tmp_path, capsys):
     assert convert(*recording, "-o", tmp_path / "walk.bvh") == 0
     written = sorted(path.name for path in tmp_path.glob("*.bvh"))
     assert written == ["walk-0.bvh", "walk-3.bvh"]
@@ -151,14 +151,14 @@ def test_invalid_requests_are_refused(walk, tmp_path, monkeypatch, capsys, argum
     assert set(tmp_path.iterdir()) == before
 
 
-def test_still_figures_have_no_frames_to_write(tmp_path, capsys):
+def test_static_figures_are_refused_for_motion_output(tmp_path, capsys):
     skel, skin = write_rig(tmp_path)
     for options in (["-o", tmp_path / "w_{frame}.obj"], ["--frames", ":9", "-o", tmp_path / "w"]):
         assert convert(skel, skin, *options) == 2
         assert "no file has a motion: a motion cannot be written" in capsys.readouterr().err
 
 
-def test_existing_files_need_force(walk, tmp_path, capsys):
+def test_existing_files_require_force(walk, tmp_path, capsys):
     (tmp_path / "w.bvh").write_text("precious")
     assert convert(*walk, "-o", tmp_path / "w.bvh") == 5
     assert (tmp_path / "w.bvh").read_text() == "precious"
@@ -167,7 +167,7 @@ def test_existing_files_need_force(walk, tmp_path, capsys):
 
 
 def test_upside_down_worlds_are_written_upright(recording, tmp_path):
-    # With y pointing down, a body's joints are rotated by 180 degrees about x.
+    # With y pointing down, the joints of a body are rotated by 180 degrees about x.
     assert convert(*recording, "--up=-y", "-o", tmp_path / "a.npz", "--as", "npz") == 0
     assert convert(*recording, "--up=y", "-o", tmp_path / "b.npz", "--as", "npz") == 0
     with np.load(tmp_path / "a-0.npz") as a, np.load(tmp_path / "b-0.npz") as b:
@@ -186,7 +186,7 @@ def test_upside_down_worlds_are_written_upright(recording, tmp_path):
         (["-o", "w.skel", "--as", "easymocap"], ("--as easymocap", "/", "found w.skel")),
     ],
 )
-def test_invalid_name_is_a_usage_error_before_anything_is_read(
+def test_invalid_name_is_a_usage_error_before_files_are_read(
     tmp_path, monkeypatch, capsys, arguments, words
 ):
     monkeypatch.chdir(tmp_path)
@@ -216,7 +216,7 @@ def test_animations_are_written_with_their_keys(tmp_path, capsys, options, anima
     assert [animation.name for animation in figure.animations] == animations
 
 
-def test_a_figure_without_the_chosen_animation_is_written_in_its_pose(tmp_path, capsys):
+def test_figure_without_the_chosen_animation_is_written_in_its_pose(tmp_path, capsys):
     figure = two_parts()
     export_clips(Actor(figure), tmp_path / "both.glb")
     export_clips(Actor(figure), tmp_path / "wave.glb", clips=[figure.animations[0].clip()])
@@ -228,7 +228,7 @@ def test_a_figure_without_the_chosen_animation_is_written_in_its_pose(tmp_path, 
     assert "wave: vertices differ from the pose by up to" in said and "0 animations" not in said
 
 
-def test_only_gltf_is_optimised(tmp_path, capsys):
+def test_optimisation_of_other_formats_is_refused(tmp_path, capsys):
     export_clips(Actor(two_parts()), tmp_path / "in.glb")
     command = ["convert", str(tmp_path / "in.glb"), "-o", f"{tmp_path}/out.bvh", "--optimize"]
     assert run(command) == 2

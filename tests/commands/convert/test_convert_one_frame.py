@@ -1,4 +1,4 @@
-"""``viewer convert`` of one pose: at a frame or time, or of still figures."""
+"""``viewer convert`` of one pose, at a frame or time, or of static figures."""
 
 from __future__ import annotations
 
@@ -19,9 +19,10 @@ from viewer.cli import run
 
 STILL = "one frame: nothing moves, so the current pose was written"
 POINTS = (
-    "keypoints next to bodies are not written (take body25 0): open only the keypoints3d folder"
+    "keypoints next to bodies are not written (take body25 0): to write them, open only the "
+    "keypoints3d folder"
 )
-PRINTED = 1e-5  # units: six decimals, summed along an arm
+PRINTED = 1e-5  # in units, for six decimals summed along an arm
 
 
 def convert(*arguments):
@@ -37,7 +38,7 @@ def arms(tmp_path):
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model, bodies 0 and 7 in frames 20 to 23, 7 missing in 22, and keypoints of 0."""
+    """A model, bodies 0 and 7 in frames 20 to 23 with 7 missing in 22, and keypoints of 0."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     frames = {frame: [body(0, seed=frame), body(7)] for frame in range(20, 24)}
@@ -51,13 +52,13 @@ def written(folder, pattern):
     return sorted(path.name for path in folder.glob(pattern))
 
 
-def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
+def test_static_figure_is_converted_to_a_bvh_of_its_pose(arms, tmp_path, capsys):
     out = tmp_path / "out.bvh"
     options = ["--dof", "root.z=90deg", "--dof", "root.tx=3", "--dof", "left.y=0.5"]
     assert convert(arms, *options, "-o", out) == 0
     bvh = PlainBvh(out)
     assert bvh.n_frames == 1
-    # Rotated by a right angle: x becomes y. The left hand rotated out of there.
+    # The rotation by 90 degrees maps x to y; the left hand is rotated further.
     places = bvh.places(0)
     assert_allclose(places["root"], [3, 0, 0], atol=PRINTED)
     assert_allclose(places["left"], [3, 1, 0], atol=PRINTED)
@@ -69,7 +70,7 @@ def test_still_figure_becomes_a_bvh_of_its_pose(arms, tmp_path, capsys):
     assert lines[1:] == [STILL]
 
 
-def test_rest_frame_and_rate_are_as_requested(arms, tmp_path):
+def test_requested_rest_frame_and_rate_are_used(arms, tmp_path):
     out = tmp_path / "out.bvh"
     assert convert(arms, "--dof", "root.z=90deg", "--rest-frame", "--fps", 50, "-o", out) == 0
     bvh = PlainBvh(out)
@@ -79,22 +80,22 @@ def test_rest_frame_and_rate_are_as_requested(arms, tmp_path):
 
 
 @pytest.mark.parametrize("options", [["-o", "x.bvh"], ["--body", "-o", "x.bvh"]])
-def test_bundled_figures_become_bvh(tmp_path, monkeypatch, capsys, options):
+def test_bundled_figures_are_converted_to_bvh(tmp_path, monkeypatch, capsys, options):
     monkeypatch.chdir(tmp_path)
     assert convert(*options) == 0
     assert PlainBvh(tmp_path / "x.bvh").n_frames == 1
     assert capsys.readouterr().out.splitlines()[-1] == STILL
 
 
-def test_animals_become_bvh(tmp_path):
+def test_animals_are_converted_to_bvh(tmp_path):
     folder = write_box(tmp_path / "pig")
     assert convert(folder, "--dof", "figure.ty=2", "-o", tmp_path / "x.bvh") == 0
     places = PlainBvh(tmp_path / "x.bvh").places(0)
-    # Six joints at the origin, moved by two metres along y; z is up there, and becomes y.
+    # Six joints at the origin are moved by two metres along y; z is up in the model and becomes y.
     assert_allclose(list(places.values()), np.tile([0, 0, -200], (6, 1)), atol=PRINTED)
 
 
-def test_each_of_several_figures_gets_a_file(arms, tmp_path, capsys):
+def test_each_of_several_figures_is_written_to_a_file(arms, tmp_path, capsys):
     assert convert(arms, *write_twist(tmp_path), "-o", tmp_path / "x.bvh") == 0
     assert written(tmp_path, "*.bvh") == ["x-2.bvh", "x.bvh"]
     assert PlainBvh(tmp_path / "x-2.bvh").names == ["low", "high"]
@@ -111,7 +112,7 @@ def test_omitted_figures_without_joints_are_reported(tmp_path, capsys):
     assert lines[-2:] == [STILL, "stone: no joints, not written"]
 
 
-def test_still_body_becomes_parameters_of_its_family(tmp_path, capsys):
+def test_static_body_is_converted_to_parameters_of_its_family(tmp_path, capsys):
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     pose = np.round(0.3 * np.sin(np.arange(72.0)), 3)
@@ -131,7 +132,7 @@ def test_still_body_becomes_parameters_of_its_family(tmp_path, capsys):
     assert lines[1] == lines[-1] == STILL
 
 
-def test_keys_hold_one_pose_and_move_the_rig_there(arms, tmp_path, capsys):
+def test_keys_contain_the_pose_and_move_the_rig_to_it(arms, tmp_path, capsys):
     options = ["--dof", "root.z=90deg", "--dof", "root.tx=3"]
     assert convert(arms, *options, "-o", tmp_path / "a.anim") == 0
     lines = capsys.readouterr().out.splitlines()
@@ -151,14 +152,14 @@ def test_figures_without_dofs_have_no_keys(tmp_path, capsys):
     assert not written(tmp_path, "*")
 
 
-def test_mesh_alone_cannot_be_written_as_bvh(tmp_path, capsys):
+def test_mesh_without_joints_cannot_be_written_as_bvh(tmp_path, capsys):
     (tmp_path / "stone.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     assert convert(tmp_path / "stone.obj", "-o", tmp_path / "x.bvh") == 2
     message = "no file has a motion: a motion cannot be written"
     assert capsys.readouterr().err == f"viewer: {message}\n"
 
 
-# At a frame or time
+# Poses at a frame or time
 
 
 @pytest.mark.parametrize(
@@ -170,7 +171,7 @@ def test_mesh_alone_cannot_be_written_as_bvh(tmp_path, capsys):
         (["--frame", "5", "--fps", "10"], 1.0, 5, "one frame: the pose at frame 5"),
     ],
 )
-def test_one_frame_of_a_clip(tmp_path, capsys, options, x, frame, line):
+def test_one_frame_of_a_clip_is_written(tmp_path, capsys, options, x, frame, line):
     rig = write_twist(tmp_path)
     (tmp_path / "walk.anim").write_text(clip_text())
     assert convert(*rig, tmp_path / "walk.anim", *options, "-o", tmp_path / "x.bvh") == 0
@@ -181,7 +182,7 @@ def test_one_frame_of_a_clip(tmp_path, capsys, options, x, frame, line):
     assert f"1 frame ({frame}) at " in lines[0] and lines[-1] == line
 
 
-def test_one_frame_of_a_clip_as_keys(tmp_path, capsys):
+def test_one_frame_of_a_clip_is_written_as_keys(tmp_path, capsys):
     rig = write_twist(tmp_path)
     (tmp_path / "walk.anim").write_text(clip_text())
     out = tmp_path / "x.anim"
@@ -220,7 +221,7 @@ def test_one_frame_of_a_capture_keeps_its_number(recording, tmp_path, capsys):
     assert lines[1:] == ["one frame: the pose at frame 21", POINTS]
 
 
-def test_numbered_mesh_of_one_frame(recording, tmp_path, capsys):
+def test_numbered_mesh_of_one_frame_is_written(recording, tmp_path, capsys):
     assert convert(*recording, "--frame", 21, "-o", tmp_path / "m_{frame:04}.obj") == 0
     assert convert(*recording, "--frame", 21, "-o", tmp_path / "plain.obj") == 0
     assert written(tmp_path, "m_*") == ["m_0021-0.obj", "m_0021-7.obj"]
@@ -230,7 +231,7 @@ def test_numbered_mesh_of_one_frame(recording, tmp_path, capsys):
 
 
 @pytest.mark.parametrize("name", ["w.bvh", "w", "w.obj"])
-def test_people_absent_at_that_frame_are_omitted(recording, tmp_path, capsys, name):
+def test_people_absent_in_the_frame_are_omitted(recording, tmp_path, capsys, name):
     assert convert(*recording, "--frame", 22, "-o", tmp_path / name) == 0
     if name == "w":
         records = json.loads((tmp_path / "w" / "smpl" / "000022.json").read_text())
@@ -254,13 +255,13 @@ def test_range_and_single_frame_exclude_each_other(recording, tmp_path, capsys, 
 @pytest.mark.parametrize("suffix", ["obj", "ply", "glb", "json", "txt", "skel", "npz"])
 def test_bodies_are_written_without_their_keypoints(recording, tmp_path, capsys, suffix):
     assert convert(*recording, "--frame", 21, "-o", tmp_path / f"w.{suffix}") == 0
-    # glTF holds several figures.
+    # glTF can contain several figures.
     files = ["w.glb"] if suffix == "glb" else [f"w-0.{suffix}", f"w-7.{suffix}"]
     assert written(tmp_path, f"w*.{suffix}") == files
     assert capsys.readouterr().out.splitlines()[-1] == POINTS
 
 
-def test_still_figures_omitted_next_to_a_motion_are_reported(arms, tmp_path, capsys):
+def test_static_figures_omitted_next_to_a_motion_are_reported(arms, tmp_path, capsys):
     rig = write_twist(tmp_path)
     (tmp_path / "walk.anim").write_text(clip_text())
     files = [*rig, tmp_path / "walk.anim", arms]
@@ -277,7 +278,7 @@ def test_still_figures_omitted_next_to_a_motion_are_reported(arms, tmp_path, cap
 @pytest.mark.parametrize(
     ("gaps", "ids"), [([], [0]), (["--gaps", "hold"], [0, 7]), (["--gaps", "split"], [0])]
 )
-def test_gaps_in_folders_and_meshes_are_closed_if_asked(recording, tmp_path, gaps, ids):
+def test_gaps_in_folders_and_meshes_are_filled_if_requested(recording, tmp_path, gaps, ids):
     assert convert(*recording, *gaps, "-o", tmp_path / "out") == 0
     records = json.loads((tmp_path / "out" / "smpl" / "000022.json").read_text())
     assert [record["id"] for record in records] == ids

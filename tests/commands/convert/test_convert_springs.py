@@ -35,7 +35,7 @@ def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     (wanted,) = load(path, motion=MotionSettings(springs=bakes)).actors
     (found,) = load(out).actors
     for time in (0.5, 1.0):
-        # The file is in single precision.
+        # The file has single precision.
         assert_allclose(places(found, time), places(wanted, time), rtol=0, atol=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Single poses of captures as files: y is up in glTF, and other formats record the up axis."""
+"""Single poses of captures as files, with y up in glTF and a recorded up axis in other formats."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OVER = np.diag([1.0, -1.0, -1.0])
 
 @pytest.fixture
 def recording(tmp_path):
-    """A model with y up, and a folder of two frames with a person upright along z."""
+    """A model with y up, and a folder of two frames of a person upright along z."""
     path = tmp_path / "SMPL.npz"
     np.savez(path, **model("smpl"))
     folder = tmp_path / "take" / "smpl"
@@ -37,7 +37,7 @@ def recording(tmp_path):
 
 
 def wanted(recording, up="z"):
-    """Return the vertices in the capture's own world, without correctives."""
+    """Return the vertices in the world of the capture, without correctives."""
     folder, path = recording
     settings = MotionSettings(model=path, up=up)
     (actor,) = viewer.load(folder, motion=settings).actors
@@ -60,8 +60,8 @@ def test_gltf_of_one_frame_has_y_up(recording, tmp_path, up, turn):
     assert_allclose(found, wanted(recording, up) @ turn.T, rtol=0, atol=1e-5)
 
 
-def test_standing_people_stand_in_gltf(recording, tmp_path):
-    convert(recording, tmp_path / "pose.glb")  # z is found to be up
+def test_standing_people_are_upright_in_gltf(recording, tmp_path):
+    convert(recording, tmp_path / "pose.glb")  # z is detected as the up axis
     gltf = Gltf(tmp_path / "pose.glb")
     world = gltf.world()
     head, pelvis = (world[gltf.named(name), :3, 3] for name in ("head", "pelvis"))

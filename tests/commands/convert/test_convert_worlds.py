@@ -1,4 +1,4 @@
-"""Upside-down captures round-trip through ``viewer convert``."""
+"""Round trips of upside-down captures through ``viewer convert``."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def smpl(tmp_path):
 
 @pytest.fixture
 def hanging(tmp_path):
-    """Bodies upright along y, rotated upside down explicitly."""
+    """Bodies upright along y that are explicitly rotated upside down."""
     frames = {}
     for frame in range(3):
         record = body(0, seed=0.01 * frame)
@@ -48,7 +48,10 @@ def convert(*arguments):
 
 def test_upside_down_world_is_reported_when_detected(hanging, smpl):
     scene = viewer.load(smpl, hanging)
-    told = f"{hanging}: -y up, estimated from the poses: everything is flipped; --up overrides it"
+    told = (
+        f"{hanging}: -y up, estimated from the poses: the capture is upside down and is rotated "
+        "upright; --up overrides it"
+    )
     assert told in scene.warnings
     assert scene.up == "y"
     assert_allclose(scene.actors[0].placement[:3, :3], OVER, atol=1e-12)
@@ -66,7 +69,7 @@ def test_amass_keeps_the_capture_values_and_round_trips(hanging, smpl, tmp_path)
     convert(hanging, "--model", smpl, "-o", tmp_path / "m.npz")
     (path,) = tmp_path.glob("m*.npz")
     first = viewer.load(smpl, hanging)
-    with np.load(smpl) as arrays:  # J0 of the shaped body, from the model's own arrays
+    with np.load(smpl) as arrays:  # J0 of the shaped body, from the arrays of the model
         shape = first.actors[0].pose.shape_weights
         vertices = arrays["v_template"] + arrays["shapedirs"][:, :, : len(shape)] @ shape
         regressor = arrays["J_regressor"]
@@ -86,7 +89,7 @@ def test_amass_keeps_the_capture_values_and_round_trips(hanging, smpl, tmp_path)
         assert_allclose(one.placement, other.placement, atol=1e-12)
 
 
-def test_amass_with_another_requested_up_axis_is_upright(hanging, smpl, tmp_path):
+def test_amass_with_a_different_requested_up_axis_is_upright(hanging, smpl, tmp_path):
     convert(hanging, "--model", smpl, "-o", tmp_path / "m.npz", "--to-up", "y")
     (path,) = tmp_path.glob("m*.npz")
     scene = viewer.load(smpl, path)

@@ -44,7 +44,7 @@ CHANNEL = """  channel {
 
 
 def write(folder, tip="3", height="4", weights=("0.5", "0.5")):
-    """Write a rig of two joints and a rectangle of 3 x ``height``; its size is 5 at height 4."""
+    """Write a rig of two joints and a rectangle of 3 x ``height``, with a size of 5 at height 4."""
     folder.mkdir(exist_ok=True)
     (folder / "a.skel").write_text(SKEL % tip)
     (folder / "a.skin").write_text(SKIN % (height, *weights))
@@ -76,7 +76,7 @@ def test_folder_equals_itself_at_any_tolerance(tmp_path, capsys):
     ]
 
 
-def test_worst_joint_vertex_and_weight_are_named_and_exit_code_is_set(tmp_path, capsys):
+def test_worst_joint_vertex_and_weight_are_reported_and_exit_code_is_set(tmp_path, capsys):
     first = write(tmp_path / "a")
     second = write(tmp_path / "b", height="4.5", weights=("0.25", "0.75"))
     arguments = (first, second, "--poses", "0")
@@ -85,13 +85,12 @@ def test_worst_joint_vertex_and_weight_are_named_and_exit_code_is_set(tmp_path, 
     assert "    vertices: at most 0.5 (10 % of the size) (vertex 2, own pose)," in lines[3]
     assert lines[4] == "    weights: at most 0.5 (vertex 2), mean 0.125"
     assert lines[-1] == "  differs by more than the tolerance of 0.09"
-    assert said(capsys, *arguments, "--tolerance", "0.5")[0] == 0  # the weights' 0.5 is within
-    assert said(capsys, *arguments)[0] == 0  # no tolerance was given
+    # The 0.5 of the weights is within the tolerance.
+    assert said(capsys, *arguments, "--tolerance", "0.5")[0] == 0
+    assert said(capsys, *arguments)[0] == 0  # no tolerance is given
 
 
-def test_many_comparisons_form_a_table_and_an_unreadable_one_does_not_stop_the_others(
-    tmp_path, capsys
-):
+def test_several_comparisons_are_printed_as_a_table_and_errors_do_not_stop_them(tmp_path, capsys):
     reference = write(tmp_path / "ref")
     good, other = write(tmp_path / "good"), write(tmp_path / "other", tip="3.5")
     broken = write(tmp_path / "broken")
@@ -106,12 +105,12 @@ def test_many_comparisons_form_a_table_and_an_unreadable_one_does_not_stop_the_o
     assert lines[3].endswith('a.skel:2: offset of joint base: expected a number, found "zero"')
 
 
-def test_a_stray_skeleton_is_named_and_the_figure_of_the_same_name_is_compared(tmp_path, capsys):
+def test_extra_skeleton_is_reported_and_the_figure_of_equal_name_compared(tmp_path, capsys):
     reference, other = write(tmp_path / "ref"), write(tmp_path / "other", tip="3.5")
-    # It comes before a.skel, and is the reference's own skeleton.
+    # It precedes a.skel and equals the skeleton of the reference.
     (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
     code, lines, _ = said(capsys, reference, other, "--poses", "0", "--tolerance", "1")
-    assert code == 1  # there is one data set without a tolerance
+    assert code == 1  # one mismatch has no tolerance
     assert lines[:3] == [
         f"{other}:",
         f"  only in {other}: 0 (a skeleton)",
@@ -132,7 +131,7 @@ def test_pairing_by_different_names_is_reported(tmp_path, capsys):
     (tmp_path / "other" / "a.skel").rename(tmp_path / "other" / "b.skel")
     (tmp_path / "other" / "a.skin").rename(tmp_path / "other" / "b.skin")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
-    assert not any("held against" in line for line in lines)  # there is no other figure
+    assert not any("held against" in line for line in lines)  # the only figure is compared
     (tmp_path / "other" / "c.skel").write_text(SKEL % "3")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
     assert lines[1:4] == [
@@ -142,7 +141,7 @@ def test_pairing_by_different_names_is_reported(tmp_path, capsys):
     ]
 
 
-def test_json_holds_mismatches_as_text_and_as_data(tmp_path, capsys):
+def test_json_contains_mismatches_as_text_and_as_data(tmp_path, capsys):
     reference, other = write(tmp_path / "ref"), write(tmp_path / "other")
     (tmp_path / "other" / "0.skel").write_text(SKEL % "3")
     assert run(["diff", reference, other, "--json", "--poses", "0", "--tolerance", "1"]) == 1
@@ -154,7 +153,7 @@ def test_json_holds_mismatches_as_text_and_as_data(tmp_path, capsys):
     assert found["values"]["actor"] == {"text": "0 (a skeleton)", "values": {"name": "0"}}
 
 
-def test_json_holds_every_joint_and_the_position_of_the_worst(tmp_path, capsys):
+def test_json_contains_every_joint_and_the_position_of_the_worst(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", tip="3.5")
     assert run(["diff", first, second, "--json", "--poses", "0", "--tolerance", "1"]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -171,7 +170,7 @@ def test_json_holds_every_joint_and_the_position_of_the_worst(tmp_path, capsys):
 def test_clips_are_compared_on_a_shared_skeleton(tmp_path, capsys):
     write(tmp_path / "a")
     for name, height in (("one", "0"), ("two", "0.25")):
-        # Root translation x, y, z, then the angles of base and tip: y moves.
+        # The channels are root translation x, y, z, then the angles of base and tip; y moves.
         channels = [CHANNEL % (height if channel == 1 else "0") for channel in range(9)]
         text = ANIM % 9 + "".join(channels) + "}\n"
         (tmp_path / f"{name}.anim").write_text(text)
@@ -183,18 +182,19 @@ def test_clips_are_compared_on_a_shared_skeleton(tmp_path, capsys):
         str(tmp_path / "a" / "a.skel"),
     )
     assert code == 0
-    # From 0 to 0.25 over a second: the mean of all frames is half of the maximum.
+    # The distance rises from 0 to 0.25 in a second, so the mean of all frames is half of the
+    # maximum.
     assert "joint positions: at most 0.25 " in lines[1] and ", mean 0.125 " in lines[1]
 
 
-def test_heat_map_shows_where_the_difference_is(tmp_path, capsys):
+def test_heat_map_shows_the_location_of_the_difference(tmp_path, capsys):
     first, second = write(tmp_path / "a"), write(tmp_path / "b", height="5")
     output = tmp_path / "heat.png"
     code, lines, _ = said(capsys, first, second, "--poses", "0", "-o", str(output))
     assert code == 0 and lines[-1] == f"{output}: the largest distance at each vertex"
     pixels = picture(output)
     assert pixels.shape == (960, 1280, 3)
-    # The map goes from dark violet to bright yellow: only the one vertex that moved is bright.
+    # The colour map is from dark violet to bright yellow; only the moved vertex is bright.
     bright = (pixels[200:, :, 0] > 220) & (pixels[200:, :, 2] < 160)
     dark = pixels[200:, :, :3].max(axis=2) < 90
     assert 100 < bright.sum() < dark.sum()
@@ -207,7 +207,7 @@ def test_heat_maps_of_several_pairs_form_one_sheet(tmp_path, capsys):
     output = tmp_path / "heat.png"
     _, lines, _ = said(capsys, first, second, first, "--poses", "0", "-o", str(output))
     assert lines[-1] == f"{output}: 2 heat maps with a common scale"
-    # Nothing differs on the second: it is dark, next to the bright corner of the first.
+    # The second figure has no differences and is dark, next to the bright corner of the first.
     sheet = picture(output)
     bright = (sheet[:, :, 0] > 220) & (sheet[:, :, 2] < 160)
     height = sheet.shape[0] // 2
@@ -215,7 +215,7 @@ def test_heat_maps_of_several_pairs_form_one_sheet(tmp_path, capsys):
     assert tops[0] > 100 and tops[1] == 0
 
 
-def test_picture_that_cannot_be_written_is_refused_before_anything_is_compared(tmp_path, capsys):
+def test_picture_that_cannot_be_written_is_refused_before_the_comparison(tmp_path, capsys):
     folder = write(tmp_path / "a")
     for other in (folder, str(tmp_path / "missing.skel")):
         code, lines, error = said(capsys, folder, other, "-o", str(tmp_path / "heat.mp4"))

@@ -72,18 +72,18 @@ def test_names_take_precedence_over_order() -> None:
     assert paired([rig("a"), rig("b")], [rig("b"), rig("c"), rig("a")]) == [(0, 2), (1, 0)]
 
 
-def test_same_name_prefers_the_same_format() -> None:
+def test_equal_names_prefer_the_same_format() -> None:
     assert paired([rig("a")], [skeleton("a"), surface("a"), rig("a")]) == [(0, 2)]
     assert paired([surface("a")], [rig("a"), skeleton("a")]) == [(0, 0)]
 
 
-def test_without_a_common_name_format_then_order_decides() -> None:
+def test_figures_without_common_names_are_paired_by_format_then_by_order() -> None:
     assert paired([rig("a"), skeleton("b")], [skeleton("x"), rig("y")]) == [(0, 1), (1, 0)]
     assert paired([rig("a"), rig("b")], [rig("x"), rig("y")]) == [(0, 0), (1, 1)]
     assert paired([rig("a")], [surface("x")]) == [(0, 0)]
 
 
-def test_an_exact_name_match_is_not_taken_by_an_earlier_figure() -> None:
+def test_exact_name_match_takes_precedence_over_an_earlier_figure() -> None:
     assert paired([rig("x"), rig("a")], [rig("a"), rig("b")]) == [(0, 1), (1, 0)]
 
 
@@ -96,7 +96,7 @@ def test_people_are_paired_by_their_number() -> None:
     assert found.second == (Phrase("lone-points", name=second[1].name),)
 
 
-def test_unpaired_figures_are_named_with_their_side() -> None:
+def test_unpaired_figures_are_reported_with_their_side() -> None:
     found = pair_actors([rig("a")], [skeleton("other"), surface("skin"), rig("a"), rig("b")])
     assert found.first == ()
     assert found.second == (
@@ -108,7 +108,7 @@ def test_unpaired_figures_are_named_with_their_side() -> None:
     assert found.first == (Phrase("lone-figure", name="a"),) and found.second == ()
 
 
-def test_a_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
+def test_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
     walk, mine = motion("walk"), motion("walk")
     first, second = [rig("a", walk)], [skeleton("stray", mine), rig("a")]
     for turned in (False, True):
@@ -119,7 +119,7 @@ def test_a_clip_on_an_unpaired_skeleton_is_used_for_the_pair() -> None:
             (),
             (Phrase("lone-skeleton", name="stray"),),
         )
-    assert second[0].clip is mine and second[1].clip is None  # both remain unchanged
+    assert second[0].clip is mine and second[1].clip is None  # both clips are unchanged
 
 
 def test_clips_are_paired_by_name_then_by_order() -> None:
@@ -131,7 +131,7 @@ def test_clips_are_paired_by_name_then_by_order() -> None:
     assert pairs[0][1].clip is run
 
 
-def test_a_clip_of_another_name_is_used_only_if_needed() -> None:
+def test_clip_with_a_different_name_is_used_only_if_necessary() -> None:
     run = motion("run")
     found = pair_actors([rig("a", motion("walk"))], [skeleton("s", run), rig("a")])
     assert found.pairs[0][1].clip is run

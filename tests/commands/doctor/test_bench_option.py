@@ -11,7 +11,7 @@ from viewer.errors import RenderError
 pytestmark = pytest.mark.slow
 
 
-def test_every_figure_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_all_measurements_are_made(monkeypatch: pytest.MonkeyPatch) -> None:
     commands: list[list[str]] = []
     monkeypatch.setattr(_benchmarks, "_process", lambda words, _: lambda: commands.append([*words]))
     for name, value in (("_SIZE", (32, 24)), ("_FRAMES", 1), ("_STARTS", 2), ("_INSTANCES", 2)):
@@ -22,25 +22,25 @@ def test_every_figure_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(found) == 11
     compared = [one.to for one in found if one.to]
     assert compared == ["import numpy", *3 * ["OpenGL context"], *2 * ["a still body"]]
-    assert len(commands) == 3 * 6  # a warm-up round and two measured ones
+    assert len(commands) == 3 * 6  # a warm-up round and two measured rounds
 
 
-def test_relative_times_name_their_reference() -> None:
+def test_relative_times_state_their_reference() -> None:
     assert str(Measured("a", 2.0)).split() == ["a", "2.00", "ms"]
     assert str(Measured("a", 2.0, 1.5, "b")).split() == ["a", "2.00", "ms", "1.50", "times", "b"]
 
 
-def test_failure_of_a_program_is_one_line() -> None:
+def test_failure_of_a_program_is_reported_in_one_line() -> None:
     run = _benchmarks._process(["-c", "import sys; print('x'); sys.exit('no\\nOpenGL')"], {})
     with pytest.raises(RenderError, match=r"^OpenGL$"):
         run()
 
 
-def test_programs_get_the_environment() -> None:
+def test_programs_receive_the_environment() -> None:
     _benchmarks._process(["-c", "import os; assert os.environ['A'] == 'b'"], {"A": "b"})()
 
 
-def test_doctor_measures_only_if_asked(
+def test_doctor_measures_only_on_request(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
 ) -> None:
     from viewer.cli import run

@@ -1,4 +1,4 @@
-"""``viewer render``: every option has its described effect; outputs are never lost."""
+"""``viewer render``: the effects of all options, and protection of existing files."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_distance_is_used_as_given(draw, rig):
         ["--show", "nothing"],
     ],
 )
-def test_invalid_value_is_one_line(rig, tmp_path, options, capsys):
+def test_invalid_value_is_refused_in_one_line(rig, tmp_path, options, capsys):
     out = tmp_path / "x.png"
     assert run(["render", str(rig[0]), "-o", str(out), *options]) in (2, 4)
     error = capsys.readouterr().err
@@ -151,7 +151,7 @@ def test_display_options_take_effect(draw, rig, options, change):
         assert (picture != draw()).any()
 
 
-def test_no_texture_leaves_the_plain_colour(draw):
+def test_option_no_texture_shows_the_plain_colour(draw):
     assert (draw("--no-texture", files=()) != draw(files=())).any()
 
 
@@ -160,7 +160,7 @@ def test_transparent_background_is_transparent(draw):
     assert picture[0, 0, 3] == 0 and picture[24, 32, 3] == 255
 
 
-def test_coloured_background_has_that_colour(draw):
+def test_coloured_background_has_the_given_colour(draw):
     picture = draw("--background", "#204060", "--no-grid")
     assert picture[0, 0].tolist() == [0x20, 0x40, 0x60, 255]
 
@@ -305,7 +305,7 @@ def test_suffix_chooses_the_format(rig, tmp_path, suffix):
 
 
 @pytest.mark.parametrize("suffix", [".psd", ".fits"])
-def test_non_image_suffix_is_refused_before_anything_is_read(tmp_path, suffix, capsys):
+def test_non_image_suffix_is_refused_before_files_are_read(tmp_path, suffix, capsys):
     out = tmp_path / f"x{suffix}"
     assert run(["render", "missing.skel", "-o", str(out), "--size", "40x30"]) == 2
     error = capsys.readouterr().err
@@ -334,13 +334,13 @@ def test_image_with_a_wrong_suffix_is_refused(rig, tmp_path, suffix, capsys):
     assert out.read_text() == "precious"
 
 
-def test_video_formats_are_listed_for_frame_ranges_too(rig, tmp_path, capsys):
+def test_video_formats_are_also_listed_for_frame_ranges(rig, tmp_path, capsys):
     out = tmp_path / "x.mov"
     assert run(["render", *map(str, rig), "-o", str(out), "--frames", "0:5"]) == 2
     assert " or a video (.mp4, .webm, .gif), found .mov\n" in capsys.readouterr().err
 
 
-def test_transparency_that_the_format_lacks_is_a_warning(rig, tmp_path, capsys):
+def test_transparency_unsupported_by_the_format_is_a_warning(rig, tmp_path, capsys):
     out = tmp_path / "x.jpg"
     arguments = ["-o", str(out), *SMALL, "--background", "transparent"]
     assert run(["render", *map(str, rig), *arguments]) == 0
@@ -369,5 +369,5 @@ def test_image_can_be_written_to_standard_output(rig, tmp_path, into):
     assert done.returncode == 0
     data = target.read_bytes() if into == "file" else done.stdout
     assert Image.open(io.BytesIO(data)).size == (40, 30)
-    assert data.endswith(b"IEND\xaeB`\x82")  # no text after the image
+    assert data.endswith(b"IEND\xaeB`\x82")  # no text follows the image
     assert b"40 x 30" in done.stderr

@@ -1,4 +1,4 @@
-"""``viewer render`` of body models: each option changes the expected part of the image."""
+"""``viewer render`` of body models, in which each option changes the expected part of the image."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SIDE = ["--orthographic", "--inclination", "0"]
 
 @pytest.fixture
 def draw(tmp_path):
-    """Return a function that renders and returns pixels, (H, W, 4); alpha is the silhouette."""
+    """Return a function that renders (H, W, 4) pixels; alpha is the silhouette."""
 
     def picture(*arguments):
         out = tmp_path / "drawn.png"
@@ -35,7 +35,7 @@ def draw(tmp_path):
 
 @pytest.fixture
 def box(tmp_path):
-    """1 x 2 x 3, z up; the lower half of its vertices are FEET, the upper half BACK."""
+    """A box of 1 x 2 x 3 with z up; the lower vertices are FEET, the upper BACK."""
     return write_box(tmp_path / "box")
 
 
@@ -61,8 +61,8 @@ def hues(pixels):
 # Body parts
 
 
-def test_hiding_one_part_keeps_the_other(draw, tmp_path):
-    # Two flags on one pole: one below, one above.
+def test_hiding_one_part_does_not_hide_the_other(draw, tmp_path):
+    # Two flags are on one pole, one above the other.
     flags = write_box(
         tmp_path / "flags",
         vertices="0 0 0\n2 0 0\n0 0 1\n0 0 2\n2 0 2\n0 0 3\n0 0 0\n0 0 0\n",
@@ -80,22 +80,22 @@ def test_hiding_one_part_keeps_the_other(draw, tmp_path):
     assert rows(upper)[1] < rows(lower)[0]
 
 
-def test_triangle_with_a_corner_in_a_shown_part_stays(draw, box):
-    # Only the lid of the box has all corners in its upper part: from the side nothing changes.
+def test_triangle_with_a_corner_in_a_visible_part_is_drawn(draw, box):
+    # Only the lid of the box has all corners in the upper part, so the side view does not change.
     assert not differing(draw(box, *SIDE), draw(box, *SIDE, "--hide-part", "BACK")).any()
     above = ["--orthographic", "--inclination", "60"]
     whole, open_box = draw(box, *above), draw(box, *above, "--hide-part", "BACK")
     changed = differing(whole, open_box)
     assert changed.any() and not changed[-20:].any()
-    assert (covered(whole) == covered(open_box)).all()  # the inside is seen instead
+    assert (covered(whole) == covered(open_box)).all()  # the inside is visible instead
 
 
-def test_hiding_all_parts_leaves_nothing(draw, box):
+def test_hiding_all_parts_draws_an_empty_picture(draw, box):
     picture = draw(box, "--hide-part", "FEET", "--hide-part", "back")
     assert not covered(picture).any()
 
 
-def test_hidden_part_without_vertices_changes_nothing(draw, box):
+def test_hidden_part_without_vertices_has_no_effect(draw, box):
     assert not differing(draw(box), draw(box, "--hide-part", "not_body")).any()
 
 
@@ -123,9 +123,9 @@ def test_reduced_mesh_is_a_corner_of_the_box(draw, box):
     view = [box, *SIDE, "--azimuth", "0"]
     whole, reduced = draw(*view), draw(*view, "--reduced")
     assert not (covered(reduced) & ~covered(whole)).any()
-    # Seen along an axis, four corners of a box are half of its rectangle.
+    # Along an axis, a triangle between corners of the box covers half of its rectangle.
     assert covered(reduced).sum() / covered(whole).sum() == pytest.approx(0.5, abs=0.03)
-    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # its base is complete
+    assert rows(covered(reduced))[1] == rows(covered(whole))[1]  # the base is complete
 
 
 def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):
@@ -136,7 +136,7 @@ def test_reduced_mesh_option_does_not_affect_other_figures(draw, tmp_path):
 # Values as colours
 
 
-def test_influence_limit_error_is_shown_where_there_are_many_influences(draw, box):
+def test_influence_limit_error_is_shown_at_vertices_with_many_influences(draw, box):
     # Joint 4 rotates the corner (1, 2, 3), the only one with more than four influences.
     posed = [box, *SIDE, "--pose", pose_190(6, n17=math.pi)]
     changed = []
@@ -146,21 +146,22 @@ def test_influence_limit_error_is_shown_where_there_are_many_influences(draw, bo
         nothing = draw(*view, "--scalar", "pruning", "--scalar-range=0:1e9")
         assert (covered(cut) == covered(nothing)).all()
         changed.append(differing(cut, nothing).sum() / covered(cut).sum())
-    # From one corner of the box two faces with this vertex are seen, from the other none.
+    # Two faces with this vertex are visible from one corner of the box, and none from the opposite
+    # one.
     assert min(changed) == 0 and max(changed) > 0.5
 
 
-# Figures without correctives or a symmetry map are drawn as usual.
+# Figures without correctives or a symmetry map are drawn normally.
 LACKED = ("correctives", "asymmetry")
 MOVING = [name for name, view in SCALARS.items() if view.moves and name not in LACKED]
 
 
 @pytest.mark.parametrize("name", MOVING)
-def test_every_error_of_a_figure_at_rest_is_0(draw, tmp_path, name):
+def test_all_errors_of_a_figure_at_rest_are_0(draw, tmp_path, name):
     rig = [*write_rig(tmp_path), "--dof", "arm.x=0", "--dof", "arm.z=0"]
     picture = draw(*rig, "--scalar", name, "--flat")
     found = hues(picture[covered(picture)])
-    # One colour, lit more or less; dark ones are rounded to a 255th.
+    # There is one colour with varying brightness; dark pixels are rounded to 1/255.
     assert len(found) and np.ptp(found, axis=0).max() < 0.04
 
 
@@ -187,7 +188,7 @@ def test_keypoints_are_drawn_as_small_markers(draw, tmp_path):
     np.savez(tmp_path / "body.npz", **model("smplx", 96))
     plain, marked = draw(tmp_path / "body.npz"), draw(tmp_path / "body.npz", "--keypoints")
     changed = differing(plain, marked)
-    # 51 of them, seen through the surface.
+    # All 51 are visible through the surface.
     assert 51 < changed.sum() < 0.5 * covered(plain).sum()
     assert changed[covered(plain)].any()
 

@@ -1,4 +1,4 @@
-"""``viewer render`` of motions as videos: all frames at their rate, from one camera."""
+"""``viewer render`` of motions as videos with all frames at their rate and one camera."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[3]
 
 @pytest.fixture
 def fox(tmp_path) -> list[str]:
-    """The bundled fox's files, and a half-second clip that rotates its head."""
+    """The files of the bundled fox, and a clip of half a second that rotates its head."""
     from viewer.loading import bundled_files
 
     channels = 3 + 3 * viewer.load().actors[0].figure.skeleton.n_joints
@@ -52,7 +52,7 @@ def test_video_shows_the_whole_clip(draw, fox, tmp_path, suffix):
     draw(fox, "{frame}.png")
     for frame in (0, 8, 15):
         difference = np.abs(shown[frame] - picture(tmp_path / f"{frame}.png")[..., :3])
-        # Half the resolution in colours, or 256 of them.
+        # The colours have half the resolution, or there are only 256.
         assert difference.mean() < 4.0, frame
     assert np.abs(shown[0] - shown[15]).mean() > 1.0
 
@@ -90,7 +90,7 @@ def test_video_that_skips_frames_keeps_the_speed(draw, walk):
     said = draw(walk, "z.gif", "--frames", "0:31:3", size="32x32")
     assert "11 frames, 1.1 s, 32 x 32, 10 frames per second (one of 3 frames" in said.out
     said = draw(walk, "{frame}.png", "--frames", "0:31:3", size="16x16")
-    assert "one of" not in said.out  # images are not played
+    assert "one of" not in said.out  # images have no speed
 
 
 def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
@@ -101,22 +101,22 @@ def test_speed_below_0_plays_backwards(draw, walk, tmp_path):
     assert np.abs(there[0] - back[0]).mean() > 4.0
 
 
-def test_turntable_needs_no_motion_and_loops(draw, tmp_path):
+def test_turntable_loops_and_needs_no_motion(draw, tmp_path):
     draw([], "x.mp4", "--turntable", "1", "--no-grid", "--video-quality", "95")
     shown = frames(tmp_path / "x.mp4")
     assert len(shown) == 30
     steps = [np.abs(a - b).mean() for a, b in zip(shown, [*shown[1:], shown[0]], strict=True)]
-    # The step from the last frame to the first is like the others, and none stands still.
+    # The step from the last frame to the first is like the others, and no step is zero.
     assert min(steps) > 0.3 * max(steps)
 
 
-def test_turntable_of_one_frame_of_a_motion(draw, walk, tmp_path):
+def test_turntable_of_one_frame_of_a_motion_is_drawn(draw, walk, tmp_path):
     draw(walk, "x.mp4", "--turntable", "0.2", "--frame", "15", "--no-grid")
     draw(walk, "x.png", "--frame", "15", "--no-grid")
     assert len(frames(tmp_path / "x.mp4")) == 6
 
 
-def test_gif_of_a_still_scene_is_a_single_image(draw, walk, tmp_path):
+def test_gif_of_a_static_scene_is_a_single_image(draw, walk, tmp_path):
     draw(walk[:2], "still.gif")
     draw(walk, "frame.gif", "--frame", "3")
     draw(walk, "moving.gif", size="32x32")
@@ -130,7 +130,7 @@ def test_gif_at_a_high_rate_reports_its_effective_rate(draw, walk, tmp_path):
     assert "51 frames, 1.02 s" in said.out and n_frames(tmp_path / "x.gif") == 51
 
 
-def test_transparent_videos(draw, fox, tmp_path):
+def test_videos_may_have_a_transparent_background(draw, fox, tmp_path):
     said = draw(fox, "x.mp4", "--background", "transparent", "--no-grid")
     shown = f"{tmp_path / 'x.mp4'}: this format has no transparency; composited on black"
     assert said.err == f"warning: {shown}\n"
@@ -145,11 +145,11 @@ def test_transparent_videos(draw, fox, tmp_path):
     assert alpha[0, 0] == 0 and alpha.max() == 255
 
 
-def test_missing_library_is_one_line(draw, walk, tmp_path, monkeypatch):
+def test_missing_library_is_reported_in_one_line(draw, walk, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "av", None)
     said = draw(walk, "x.mp4", code=2)
     assert said.err == ("viewer: videos need PyAV, which is not installed: pip install av\n")
-    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # images do not need it
+    draw(walk, "{frame}.png", "--frames", "0:2", size="16x16")  # images do not need the library
 
 
 @pytest.mark.parametrize("name", ["x.mp4", "x.gif", "x.webm"])
@@ -185,7 +185,7 @@ def test_interrupted_video_leaves_no_file(walk, tmp_path, name, number, code, wo
     (tmp_path / name).write_bytes(b"precious")
     process = start(walk, tmp_path, name)
     suffix = name[1:]
-    wait_for(lambda: len(names(tmp_path, suffix)) > 1)  # the temporary one has begun
+    wait_for(lambda: len(names(tmp_path, suffix)) > 1)  # the temporary file exists
     time.sleep(0.3)
     process.send_signal(number)
     _, error = process.communicate(timeout=60)

@@ -1,4 +1,4 @@
-"""Frame numbers on the command line: consistent in render, convert and info, and their limits."""
+"""Frame numbers on the command line, which are consistent in render, convert and info."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def keyed(start: float, end: float) -> Actor:
 # Ranges
 
 
-def test_ranges_are_read():
+def test_ranges_are_parsed():
     assert parse_range("3:") == Range(3, None) and parse_range(" :9:2") == Range(None, 9, 2)
     assert [str(parse_range(text)) for text in ("3:", ":9:2", "007:9", ":")] == [
         "3:", ":9:2", "7:9", ":",
@@ -58,7 +58,7 @@ def test_longest_capture_determines_the_frame_count():
     assert numbering_of(actors) == Numbering(100, 41, 0.0, 1.0 + 1.0 / 3.0, 30.0, True)
 
 
-def test_other_rates_and_keyed_clips_count_from_0():
+def test_frames_at_other_rates_and_of_keyed_clips_are_numbered_from_0():
     assert numbering_of([capture(30, 100)], 60.0) == Numbering(0, 59, 0.0, 29 / 30, 60.0, False)
     assert numbering_of([keyed(1.0, 2.0)]) == Numbering(0, 31, 1.0, 2.0, 30.0, True)
     assert numbering_of([keyed(1.0, 2.0)], 10.0) == Numbering(0, 11, 1.0, 2.0, 10.0, True)
@@ -78,13 +78,13 @@ HUNDRED = Numbering(100, 30, 0.0, 29 / 30, 30.0, False)
         ("129:", (29, 30)),
     ],
 )
-def test_span_counts_from_the_first_frame(text, span):
+def test_range_is_relative_to_the_first_frame(text, span):
     assert HUNDRED.span(parse_range(text)) == span
     assert HUNDRED.span(None) == (0, 30)
 
 
 @pytest.mark.parametrize("text", ["0:10", "100:131", "130:", "130:140", ":50", "90:110"])
-def test_span_outside_a_capture_is_refused_with_its_range(text):
+def test_range_outside_a_capture_is_refused_with_the_valid_range(text):
     with pytest.raises(ViewerError) as caught:
         HUNDRED.span(parse_range(text))
     assert str(caught.value) == (
@@ -108,7 +108,7 @@ def test_keyed_clips_extrapolate():
 
 def test_capture_times_match_its_frames():
     assert HUNDRED.time_of(100) == 0.0 and HUNDRED.time_of(115) == 0.5
-    # What is printed can be typed: 0.966667 is a little more than 29 / 30.
+    # The printed value is accepted, although 0.966667 is slightly more than 29 / 30.
     assert HUNDRED.checked_time(0.966667) == 29 / 30 and HUNDRED.checked_time(0.4) == 0.4
     for time in (-0.02, 0.985):
         with pytest.raises(ViewerError) as caught:
@@ -121,12 +121,13 @@ def test_capture_times_match_its_frames():
 
 @pytest.fixture
 def hundred(tmp_path):
-    """A model and frames 100 to 104 of one person, who moves by 1 along y per frame."""
+    """A model, and frames 100 to 104 of a person who moves by 1 along y per frame."""
     np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
     straight = {"Rh": [[0.0, 0.0, 0.0]], "poses": [[0.0] * 72], "shapes": [[0.0] * 10]}
     frames = {100 + n: [body(0, Th=[[0.0, float(n), 0.0]], **straight)] for n in range(5)}
     folder = write_frames(tmp_path / "take" / "smpl", frames)
-    return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
+    model_path = str(tmp_path / "SMPL.npz")
+    return [str(folder), "--model", model_path, "--up", "y", "--fps", "30"]
 
 
 def root_height(folder, *arguments) -> float:
@@ -143,7 +144,7 @@ def test_frame_number_matches_the_files(hundred, tmp_path):
         assert_allclose(height - first, frame - 100, atol=1e-9)
 
 
-def test_render_and_convert_give_frames_the_same_numbers(hundred, tmp_path):
+def test_render_and_convert_number_frames_equally(hundred, tmp_path):
     names = [f"{frame}" for frame in (101, 102, 103)]
     options = [*hundred, "--frames", "101:104"]
     size = ["--size", "16x16", "--quality", "draft"]
@@ -155,7 +156,7 @@ def test_render_and_convert_give_frames_the_same_numbers(hundred, tmp_path):
     with np.load(tmp_path / "m.npz") as arrays:
         assert arrays["frames"].tolist() == [101, 102, 103]
         assert_allclose(np.diff(arrays["joints"][:, 0, 1]), 1.0, atol=1e-9)
-    # The mesh at a given frame number is the one in the file of that number.
+    # The mesh at a frame number is that of the file with this number.
     found = {}
     for frame in (101, 103):
         out = tmp_path / f"one{frame}.obj"
@@ -175,7 +176,7 @@ def test_render_and_convert_give_frames_the_same_numbers(hundred, tmp_path):
     ],
 )
 @pytest.mark.parametrize("command", ["info", "render", "convert"])
-def test_nothing_lies_beyond_the_end_of_a_capture(
+def test_times_beyond_the_end_of_a_capture_are_refused(
     hundred, tmp_path, capsys, command, options, message
 ):
     out = {"info": [], "render": ["-o", str(tmp_path / "x.png")], "convert": ["-o", "x.obj"]}
@@ -194,7 +195,7 @@ def test_range_beyond_a_capture_quotes_the_request(hundred, tmp_path, capsys, co
 
 def test_range_beyond_a_clip_quotes_the_request(tmp_path, capsys):
     skel, skin = write_rig(tmp_path)
-    (tmp_path / "move.anim").write_text(clip_text())  # of two seconds
+    (tmp_path / "move.anim").write_text(clip_text())  # the clip has two seconds
     files = [str(path) for path in (skel, skin, tmp_path / "move.anim")]
     for command, name in (("render", "{frame}.png"), ("convert", "w.bvh")):
         assert run([command, *files, "--frames", "61:", "-o", str(tmp_path / name)]) == 2
@@ -204,7 +205,7 @@ def test_range_beyond_a_clip_quotes_the_request(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("text", ["0", "-3", "1e9", "100001", "1e-9"])
-def test_rates_have_limits(tmp_path, capsys, text):
+def test_frame_rates_have_limits(tmp_path, capsys, text):
     files = write_twist(tmp_path)
     assert run(["info", *files, f"--fps={text}"]) == 2
     assert capsys.readouterr().err == (
@@ -219,4 +220,4 @@ def test_highest_rate_is_used(tmp_path, capsys):
     options = ["--fps", "1e5", "--frame", "50000", "--json"]
     assert run(["info", *files, str(tmp_path / "move.anim"), *options]) == 0
     table = json.loads(capsys.readouterr().out)["actors"][0]["skeleton"]["dof_table"]
-    assert_allclose(table[0]["value"], 1.0, atol=1e-9)  # half a second at 2 fps
+    assert_allclose(table[0]["value"], 1.0, atol=1e-9)  # the step is half a second at 2 fps

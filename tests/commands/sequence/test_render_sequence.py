@@ -1,4 +1,4 @@
-"""``viewer render`` of motions: numbered images, videos and contact sheets; never partial files."""
+"""``viewer render`` of motions as numbered images, videos and contact sheets."""
 
 from __future__ import annotations
 
@@ -40,16 +40,16 @@ def test_numbered_images_match_the_frames(draw, walk, tmp_path):
     said = draw(walk, "f_{frame:03}.png", "--frames", "0:31:15", "--no-grid", "--follow", "root")
     assert said.out.startswith(f"{tmp_path / 'f_000.png'} to f_030.png: 3 frames, 0.1 s, 64 x 48")
     assert said.err == "" and names(tmp_path, ".png") == ["f_000.png", "f_015.png", "f_030.png"]
-    # The camera follows the root, so that only the arm and the background seem to move.
+    # The camera follows the root, so only the arm and the background appear to move.
     first, last = picture(tmp_path / "f_000.png"), picture(tmp_path / "f_030.png")
     assert (first != last).any()
     np.testing.assert_allclose(first[40:], last[40:], atol=60)
 
 
-def test_sequence_shows_the_same_as_single_frames(draw, walk, tmp_path):
-    """At a given distance only the target is fitted: that of the middle of all frames."""
+def test_sequence_equals_single_frames(draw, walk, tmp_path):
+    """At a given distance only the target is fitted, to the middle of all frames."""
     options = ("--distance", "30", "--no-grid", "--background", "transparent")
-    axis = ("--front", "+z")  # as for cameras independent of figures
+    axis = ("--front", "+z")  # like a camera that is independent of the figures
     draw(walk, "{frame}.png", "--frames", "0:31", *axis, *options)
     assert len(names(tmp_path, ".png")) == 31
     scene = viewer.load(*walk)
@@ -71,7 +71,7 @@ def test_whole_motion_is_in_frame(draw, walk, tmp_path):
     drawn = sum(picture(tmp_path / f"{frame}.png")[..., 3] for frame in range(31)) > 0
     rows, columns = np.flatnonzero(drawn.any(axis=1)), np.flatnonzero(drawn.any(axis=0))
     room = columns[0], 127 - columns[-1], rows[0], 71 - rows[-1]
-    # Nothing is clipped, and on the tightest side the margin is at most 8 %.
+    # The motion is not clipped, and the smallest margin is at most 8 %.
     assert 1 <= min(room) <= 6
 
 
@@ -88,7 +88,7 @@ def test_whole_motion_is_in_frame(draw, walk, tmp_path):
         (["--turntable", "90deg", "--frames", "4:6"], [4, 5]),
     ],
 )
-def test_frames_are_counted_from_0_at_the_given_fps(draw, walk, tmp_path, options, wanted):
+def test_frames_are_numbered_from_0_at_the_given_fps(draw, walk, tmp_path, options, wanted):
     draw(walk, "{frame}.png", *options, size="16x16")
     assert names(tmp_path, ".png") == sorted(f"{frame}.png" for frame in wanted)
 
@@ -127,7 +127,7 @@ def test_invalid_names_are_refused_before_any_work(draw, tmp_path, name):
 
 
 @pytest.mark.parametrize("text", ["5", "5:2", "5:5", "-1:3", "a:b", "0:5:0", "1:2:3:4", "", "٣:٤"])
-def test_invalid_ranges_are_one_line(draw, walk, text):
+def test_invalid_ranges_are_refused_in_one_line(draw, walk, text):
     said = draw(walk, "{frame}.png", f"--frames={text}", code=2)
     assert said.err == (
         f'viewer: --frames: expected A:B or A:B:STEP with A below B, as in 0:100, found "{text}"\n'
@@ -141,13 +141,13 @@ def test_range_starting_beyond_the_end_reports_the_frame_count(draw, walk):
     )
 
 
-def test_turntables_are_read():
+def test_turntables_are_parsed():
     assert parse_turntable("2.5") == Turntable(360.0, 2.5) == parse_turntable("2.5s")
     assert parse_turntable("-45deg") == Turntable(-45.0, None)
 
 
 @pytest.mark.parametrize("text", ["0", "-3", "0deg", "nan", "fox.skel", "1e9", "99999deg"])
-def test_invalid_turntables_are_one_line(draw, walk, text):
+def test_invalid_turntables_are_refused_in_one_line(draw, walk, text):
     said = draw(walk, "x.mp4", f"--turntable={text}", code=2)
     assert said.err == (
         "viewer: --turntable: expected seconds such as 6, or degrees such as 90deg, "
@@ -165,14 +165,15 @@ def test_options_overridden_by_a_motion_are_reported(draw, walk):
 
 @pytest.fixture
 def pair(tmp_path) -> list[str]:
-    """A model, and two frames of persons 3 and 5, who stand 4 apart."""
+    """A model, and two frames of persons 3 and 5 at a distance of 4."""
     np.savez(tmp_path / "SMPL.npz", **model("smpl", 32))
     people = [body(person, Th=[[2.0 * person, 0.0, 0.0]]) for person in (3, 5)]
     folder = write_frames(tmp_path / "take" / "smpl", {0: people, 1: people})
-    return [str(folder), "--model", str(tmp_path / "SMPL.npz"), "--up", "y"]
+    model_path = str(tmp_path / "SMPL.npz")
+    return [str(folder), "--model", model_path, "--up", "y", "--fps", "30"]
 
 
-def test_follow_reports_whom_if_two_have_the_joint(draw, pair):
+def test_follow_reports_the_chosen_person_if_two_have_the_joint(draw, pair):
     size = "16x16"
     said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
     assert said.err == (
@@ -201,7 +202,7 @@ def test_shapes_overridden_by_a_capture_are_reported(draw, pair):
 
 
 def test_contact_sheet_has_one_scale_and_one_ground_line(draw, walk, tmp_path):
-    """The figure stands in the middle of every cell; the same pixels as in a picture of its own."""
+    """The figure is in the middle of every cell, with the pixels of a separate picture."""
     still = ("--no-grid", "--background", "#ffffff")
     said = draw(walk, "sheet.png", "--contact-sheet", "4", *still, size="240x180")
     size = said.out.split(" frames of ")[1].split(",")[0]
@@ -215,7 +216,7 @@ def test_contact_sheet_has_one_scale_and_one_ground_line(draw, walk, tmp_path):
         top, left = row * (height + 1), column * (width + 1)
         cell = sheet[top : top + height, left : left + width]
         dark = (cell[:, :, :3] < 250).any(axis=2)
-        dark[-20:, :20] = False  # its number
+        dark[-20:, :20] = False  # the number of the cell
         seen = np.flatnonzero(dark.any(axis=1))
         boxes.append((seen[0], seen[-1]))
     lowest = [box[1] for box in boxes]
@@ -230,7 +231,7 @@ def test_onion_shows_all_poses_in_one_picture(draw, walk, tmp_path):
     assert (alpha == 255).any() and ((alpha > 50) & (alpha < 60)).any()  # 22 % of 255
 
 
-def test_contact_sheet_of_few_frames_has_no_more(draw, walk, tmp_path):
+def test_contact_sheet_has_at_most_one_cell_per_frame(draw, walk, tmp_path):
     said = draw(walk, "sheet.png", "--contact-sheet", "9", "--frames", "0:3", size="240x180")
     assert ": 3 frames of " in said.out
     assert said.err == (
@@ -242,7 +243,7 @@ def test_contact_sheet_of_few_frames_has_no_more(draw, walk, tmp_path):
     )
 
 
-def test_contact_sheet_of_a_turntable(draw, tmp_path):
+def test_contact_sheet_of_a_turntable_is_drawn(draw, tmp_path):
     said = draw([], "sheet.png", "--contact-sheet", "8", "--turntable", size="320x160")
     assert ": 8 frames of " in said.out
 
@@ -325,7 +326,7 @@ def test_contact_sheet_of_a_turntable(draw, tmp_path):
         ),
     ],
 )
-def test_contradictory_options_are_one_line(draw, walk, tmp_path, name, options, words):
+def test_contradictory_options_are_refused_in_one_line(draw, walk, tmp_path, name, options, words):
     said = draw(walk[:2], name, *options.split(), code=2)
     assert said.err == f"viewer: {words}\n"
     assert names(tmp_path, ".png", ".mp4", ".gif") == []
@@ -345,7 +346,7 @@ def test_existing_files_are_checked_before_rendering(draw, walk, tmp_path):
 
 def test_inputs_are_never_replaced(draw, tmp_path):
     skel, skin = write_rig(tmp_path)
-    clip = tmp_path / "walk_1.png"  # a clip with an image suffix
+    clip = tmp_path / "walk_1.png"  # this clip has an image suffix
     clip.write_text(anim_text(1.0, 9, {}))
     kept = clip.read_bytes()
     said = draw([str(skel), str(skin), str(clip)], "walk_{frame}.png", "--force", code=5)
@@ -360,7 +361,7 @@ def test_missing_folder_is_reported_before_rendering(draw, walk, tmp_path, name)
     assert said.err == f"viewer: {wanted}: the folder {tmp_path / 'no'} does not exist\n"
 
 
-def test_wasp_walks(draw, shared, tmp_path):
+def test_walking_wasp_is_rendered(draw, shared, tmp_path):
     files = [str(shared / name) for name in ("wasp.skel", "wasp.skin", "wasp_walk.anim")]
     said = draw(files, "walk.mp4", size="160x90")
     assert ": 121 frames, 4.03 s, 160 x 90, 30 frames per second, " in said.out
@@ -381,5 +382,5 @@ def test_cells_that_are_too_large_are_refused_with_the_sheet_size(walk, monkeypa
     arguments = ["-o", "s.png", "--contact-sheet", "4", "--size", "300000x300000"]
     assert run(["render", *map(str, walk), *arguments]) == 2
     error = capsys.readouterr().err
-    # Four cells across, with gutters of 0.6 % of the height.
+    # There are four columns with gutters of 0.6 % of the height.
     assert "300000 x 300000" in error and "found 73650 x 300000" in error

@@ -1,4 +1,4 @@
-"""Figures that come back from a ``.glb`` as they were: parts, colours, textures and materials."""
+"""Round trips of figures through ``.glb``: parts, colours, textures and materials."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PIXELS = np.arange(48, dtype=np.uint8).reshape(3, 4, 4) | 128
 
 
 def jpeg() -> Texture:
-    """Return a texture that was embedded as a JPEG, with every property of a sampler."""
+    """Return an embedded JPEG texture with every property of a sampler."""
     stream = io.BytesIO()
     Image.fromarray(PIXELS[..., :3]).save(stream, "JPEG")
     with Image.open(stream) as picture:
@@ -41,7 +41,7 @@ def jpeg() -> Texture:
 
 
 def two_parts() -> Mesh:
-    """Return a roof whose triangles are of two parts and two materials."""
+    """Return a roof with triangles of two parts and two materials."""
     painted = Material(
         "painted", jpeg(), (1.0, 1.0, 1.0, 1.0), 0.5, 0.25, double_sided=False, is_physical=True
     )
@@ -67,12 +67,12 @@ def corners(mesh: Mesh, name: str) -> np.ndarray:
     return getattr(mesh, name)[mesh.triangles]
 
 
-def test_parts_colours_and_materials_come_back(tmp_path):
+def test_parts_colours_and_materials_round_trip(tmp_path):
     wanted = two_parts()
     export(Actor(Figure("roof", wanted, unit="m")), tmp_path / "roof.glb")
     found = viewer.load(tmp_path / "roof.glb").actors[0].figure.mesh
     assert found.parts == ("hull", "lid")
-    order = [1, 0, 2]  # by part, then by material
+    order = [1, 0, 2]  # sorted by part, then by material
     assert found.part_indices.tolist() == [0, 1, 1]
     for name in ("positions", "colors", "uvs"):
         expected = corners(wanted, name)
@@ -95,7 +95,7 @@ def test_parts_colours_and_materials_come_back(tmp_path):
             assert one == other, field.name
 
 
-def test_parts_are_meshes_and_nodes_of_their_own(tmp_path):
+def test_parts_are_separate_meshes_and_nodes(tmp_path):
     export(Actor(Figure("roof", two_parts(), unit="m")), tmp_path / "roof.glb")
     file = read_nodes(Source.open(tmp_path / "roof.glb"))
     assert [mesh.name for mesh in file.meshes] == ["hull", "lid"]

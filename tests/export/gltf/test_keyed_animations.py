@@ -1,4 +1,4 @@
-"""Animations that go through glTF with their keys, checked by a small evaluator of its own."""
+"""Animations that keep their keys in glTF, checked by a small independent evaluator."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from viewer.rig.skinning import Skinning, deform
 
 FORMATS = {5121: "u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
-CLOSE = 1e-6  # of the size, 2 units: single precision
+CLOSE = 1e-6  # relative to the size of 2 units, for single precision
 
 
 class Plain:
@@ -97,7 +97,7 @@ class Plain:
 
 
 def matrix(node: dict) -> np.ndarray:
-    """Return T R S."""
+    """Return the matrix T R S."""
     x, y, z, w = np.array(node.get("rotation", (0, 0, 0, 1))) / np.linalg.norm(
         node.get("rotation", (0, 0, 0, 1))
     )
@@ -147,17 +147,17 @@ def written(tmp_path_factory) -> Path:
 
 
 @pytest.mark.parametrize(("animation", "times"), [(0, (0.1, 0.6, 1.7)), (1, (0.4, 0.8, 1.5))])
-def test_vertices_agree_with_the_definition(written, animation, times):
+def test_vertices_match_the_definition(written, animation, times):
     figure, file = two_parts(), Plain(written)
     for time in times:
         frames = frames_of(figure, clips()[animation], np.array([time]))
         expected = deform(figure, pose_of(figure, frames, 0), Skinning())[0]
-        # The box is on the node of its joint, which comes before that of the bar.
+        # The box is on the node of its joint, which precedes that of the bar.
         expected = np.concatenate([expected[6:], expected[:6]])
         assert_allclose(file.vertices(animation, time), expected, rtol=0, atol=2 * CLOSE)
 
 
-def test_keys_come_back_as_they_were(written):
+def test_keys_round_trip(written):
     figure = viewer.load(written).actors[0].figure
     assert [animation.name for animation in figure.animations] == ["wave", "jump"]
     for animation, wanted in zip(figure.animations, clips(), strict=True):
@@ -169,7 +169,7 @@ def test_keys_come_back_as_they_were(written):
                 assert_array_equal(one.tangents, other.tangents)
 
 
-def test_names_parts_and_application_data_come_back(written):
+def test_names_parts_and_application_data_round_trip(written):
     figure, root = viewer.load(written).actors[0].figure, Plain(written).root
     assert figure.skeleton.names == ("root", "box")
     assert figure.mesh.parts == ("box", "bar") and set(figure.blend_shapes.names) == {"up", "wide"}
@@ -179,11 +179,11 @@ def test_names_parts_and_application_data_come_back(written):
     meshes = {mesh["name"]: mesh for mesh in root["meshes"]}
     assert meshes["box mesh"]["extras"] == {"kind": "box"} and "targets" not in meshes["box mesh"]
     assert meshes["bar mesh"]["extras"] == {"targetNames": ["up", "wide"]}
-    # A part that follows its joint rigidly is on the joint's own node.
+    # A part that follows its joint rigidly is on the node of the joint.
     assert "skin" not in nodes["box"] and "mesh" in nodes["box"] and "skin" in nodes["bar"]
 
 
-def test_the_largest_difference_is_measured(tmp_path):
+def test_largest_difference_is_measured(tmp_path):
     figure = two_parts()
     crooked = replace(
         figure, skin=replace(figure.skin, weights=figure.skin.weights * np.float64(0.5))
@@ -200,7 +200,7 @@ def test_the_largest_difference_is_measured(tmp_path):
     assert notes["crooked"]["distance"] > 0.5 and notes["crooked"]["causes"]
 
 
-def test_an_edited_animation_replaces_that_of_the_file(tmp_path):
+def test_edited_animation_replaces_that_of_the_file(tmp_path):
     figure, edited = two_parts(), replace(clips()[1], channels=clips()[1].channels[:1])
     actor = Actor(figure, clip=edited, animation=1)
     export_clips(actor, tmp_path / "edited.glb")
@@ -219,7 +219,7 @@ def test_times_below_zero_delay_the_animation(tmp_path):
     assert file.array(sampler["input"])[:, 0].tolist() == [0.0, 1.0]
 
 
-def test_a_mesh_without_skin_is_below_the_figure(tmp_path):
+def test_mesh_without_skin_is_a_child_of_the_figure_node(tmp_path):
     export_clips(Actor(replace(two_parts(), skin=None)), tmp_path / "loose.glb")
     nodes = Plain(tmp_path / "loose.glb").root["nodes"]
     (place,) = (node for node in nodes if node.get("name") == "bender")

@@ -1,4 +1,4 @@
-"""Quantised glTF files: their errors are as printed, and they open as the figure that they were."""
+"""Quantised glTF files: round trips, and their printed errors."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
 
-STEP = 1.0 / 32767.0  # of half the size: bar and box are 2 units long
+STEP = 1.0 / 32767.0  # relative to half the size of 2 units
 
 
 def document(path) -> tuple[dict, bytes]:
@@ -43,7 +43,7 @@ def test_attributes_are_normalised_integers_with_exact_sums(tmp_path):
     assert weights.sum(axis=1).tolist() == [65535] * 6
 
 
-def test_a_quantised_figure_moves_as_before(tmp_path):
+def test_quantised_figure_moves_like_the_original(tmp_path):
     figure = two_parts()
     notes = export_clips(Actor(figure), tmp_path / "small.glb", optimizes=True)
     back = viewer.load(tmp_path / "small.glb").actors[0].figure
@@ -60,7 +60,7 @@ def test_a_quantised_figure_moves_as_before(tmp_path):
 
 
 @pytest.mark.parametrize("unbound", [False, True])
-def test_one_pose_is_quantised_too(tmp_path, unbound):
+def test_single_pose_is_quantised(tmp_path, unbound):
     figure = replace(two_parts(), animations=(), record=None)
     if unbound:
         figure = replace(figure, skin=None, skeleton=None)
@@ -72,7 +72,7 @@ def test_one_pose_is_quantised_too(tmp_path, unbound):
         assert np.linalg.norm(found - point, axis=1).min() < 2.0 * STEP
 
 
-def test_other_formats_refuse(tmp_path):
+def test_optimisation_of_other_formats_is_refused(tmp_path):
     with pytest.raises(viewer.ViewerError, match=r"\.obj: only glTF files can be optimised"):
         export(Actor(two_parts()), tmp_path / "small.obj", optimizes=True)
     assert not (tmp_path / "small.obj").exists()

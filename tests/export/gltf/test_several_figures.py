@@ -20,8 +20,9 @@ from viewer.rig.motion.transform_clip import TransformChannel, TransformClip
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import deform
 
-SINGLE = 2e-6  # of lengths up to 5
-# Rotated by 90 degrees about y and moved; the second figure is in centimetres and z is up.
+SINGLE = 2e-6  # for lengths up to 5
+# A rotation by 90 degrees about y with a translation; the second figure is in centimetres with z
+# up.
 PLACED = np.array([[0.0, 0, 1, 3], [0, 1, 0, 0.5], [-1, 0, 0, 2], [0, 0, 0, 1]])
 UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
@@ -51,7 +52,7 @@ def test_figures_are_placed_as_in_the_scene(tmp_path: Path, optimizes: bool, up:
     assert [note.key for note in notes if note.code == "X001"] == ["X001.gltf-figures"]
     assert not [note for note in notes if note.values.get("distance", 0.0) > 1e-3]
     plain = Evaluator(path)
-    # Both figures move in the same animations.
+    # Both figures are moved by the same animations.
     assert [each["name"] for each in plain.root["animations"]] == ["wave", "jump"]
     for animation, time in ((0, 0.7), (1, 0.6), (1, 1.5)):
         found = np.concatenate(plain.meshes(animation, time))
@@ -66,13 +67,13 @@ def test_written_figures_are_read_as_several_actors(tmp_path: Path) -> None:
     export_figures(actors, path)
     scene = viewer.load(path)
     assert len(scene.actors) == 2
-    expected = [posed(actor, 1, 0.0) for actor in actors]  # in which nothing has moved yet
+    expected = [posed(actor, 1, 0.0) for actor in actors]  # no joint has moved at this time
     found = [deform(actor.figure, actor.pose)[0] for actor in scene.actors]
     for one, two in zip(found, expected, strict=True):
         assert_allclose(np.ptp(one, axis=0), np.ptp(two, axis=0), atol=SINGLE)
 
 
-def test_animations_of_different_length_stay_separate(tmp_path: Path) -> None:
+def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
     longer = [replace(clip, end=clip.end + 1.0) for clip in clips()]
     actors, path = [Actor(two_parts()), Actor(two_parts())], tmp_path / "both.glb"
     export_figures(actors, path, None, [clips(), longer])
@@ -104,10 +105,43 @@ def test_animations_without_effect_are_reported(tmp_path: Path) -> None:
     )
     figure = two_parts()
     idle = TransformClip("blink", (face,), 0.0, 1.0)
-    # No part of the file has the second blend shape.
+    # No part of the file contains the second blend shape.
     none = np.zeros(0, dtype=int)
     record = replace(figure.record, part_shapes=(np.array([0]), none), target_names=(("up",), ()))
     figure = replace(figure, record=record)
     notes = export_clips(Actor(figure), tmp_path / "a.glb", clips=[idle, *clips()])
     lost = {note.key: note.values["names"] for note in notes if note.key.startswith("X003.idle")}
     assert lost == {"X003.idle-animations": ["blink"], "X003.idle-shapes": ["wide"]}
+
+
+def with_extras(name: str, extras: object) -> Actor:
+    figure = two_parts()
+    return Actor(replace(figure, name=name, record=replace(figure.record, extras=extras)))
+
+
+def test_different_application_data_is_listed_by_figure(tmp_path: Path) -> None:
+    actors = [with_extras("a", {"k": 1}), with_extras("b", [2]), with_extras("c", {"k": 1})]
+    plain = with_extras("d", None)
+    export_figures([*actors, plain], tmp_path / "some.glb")
+    expected = {
+        "sources": [
+            {"figures": ["a", "c"], "extras": {"k": 1}},
+            {"figures": ["b"], "extras": [2]},
+        ]
+    }
+    assert Evaluator(tmp_path / "some.glb").root["extras"] == expected
+    # When a file is read back, with or without further figures, only new data is added.
+    back = viewer.load(tmp_path / "some.glb").actors
+    export_figures(back, tmp_path / "same.glb")
+    assert Evaluator(tmp_path / "same.glb").root["extras"] == expected
+    export_figures([*back, with_extras("e", 3)], tmp_path / "more.glb")
+    more = {"figures": ["e"], "extras": 3}
+    assert Evaluator(tmp_path / "more.glb").root["extras"]["sources"] == [
+        *expected["sources"],
+        more,
+    ]
+
+
+def test_equal_application_data_is_unchanged(tmp_path: Path) -> None:
+    export_figures([with_extras("a", {"k": 1}), with_extras("b", {"k": 1})], tmp_path / "a.glb")
+    assert Evaluator(tmp_path / "a.glb").root["extras"] == {"k": 1}

@@ -1,4 +1,4 @@
-"""Sampled motions of several figures in one glTF file, against closed forms."""
+"""Sampled motions of several figures in one glTF file, compared with closed forms."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ UP = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def moving(name: str, present: list[bool], step: float) -> SampledClip:
-    """Return a walk along x by ``step`` per frame, with as many tenths of a radian about z."""
+    """Return a motion that advances by ``step`` along x and 0.1 radians about z per frame."""
     rows = np.arange(sum(present), dtype=float)
     rotations = np.zeros((len(rows), 3, 4))
     rotations[..., 3] = 1.0
@@ -95,7 +95,7 @@ def test_one_animation_moves_all_figures_as_in_the_scene(tmp_path):
     assert not [note for note in notes if note.code == "X002"]
 
 
-def test_a_figure_is_read_back_as_an_actor_with_its_motion(tmp_path):
+def test_figures_are_read_back_as_actors_with_their_motions(tmp_path):
     scene, path = crowd(), tmp_path / "crowd.glb"
     write(scene, path)
     found = viewer.load(path)
@@ -122,7 +122,7 @@ def test_equal_meshes_are_written_once(tmp_path):
     assert len({sampler["input"] for sampler in samplers}) == 1
 
 
-def test_motions_of_different_names_get_the_name_of_the_file(tmp_path):
+def test_motions_with_different_names_get_the_name_of_the_file(tmp_path):
     scene = crowd()
     scene.actors[1].clip = moving("other", [True] * 3, 0.5)
     write(scene, tmp_path / "both.glb")

@@ -47,7 +47,7 @@ def clips() -> tuple[TransformClip, ...]:
 
 
 def two_parts() -> Figure:
-    """Return a bar that bends between two joints, and a box on the second one, with targets."""
+    """Return a bar that bends between two joints, and a box on the second, with morph targets."""
     bar = np.array([[0.0, 0, 0], [1, 0, 0], [2, 0, 0], [0, 0.5, 0], [1, 0.5, 0], [2, 0.5, 0]])
     box = np.array([[1.5, 1, 0], [2, 1, 0], [1.5, 1.5, 0.5]])
     positions = np.concatenate([bar, box])

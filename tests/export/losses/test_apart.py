@@ -1,4 +1,4 @@
-"""The search for the vertex that differs most: valid bounds, and agreement with brute force."""
+"""The search for the vertex with the largest difference, compared with brute force."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def poses(rng, of: Body, far: float = 0.0) -> Poses:
 
 
 def moved(of: Body, by: Poses) -> np.ndarray:
-    """Return the vertices by the formula, with a dense weight matrix: (F, V, 3)."""
+    """Return the vertices by the formula with a dense weight matrix, (F, V, 3)."""
     dense = np.zeros((VERTICES, JOINTS + 1))
     owners = np.repeat(np.arange(VERTICES), np.diff(of.skin.starts))
     np.add.at(dense, (owners, of.skin.joints), of.skin.weights)
@@ -70,7 +70,7 @@ def changed(rng, by: Poses, amount: float) -> Poses:
 
 
 def pairs():
-    """Yield pairs as exporters compare them: different joints, weights, shapes or correctives."""
+    """Yield pairs as in exporters, with different joints, weights, shapes or correctives."""
     rng = np.random.default_rng(3)
     plain = body(rng)
     own = poses(rng, plain)
@@ -99,7 +99,7 @@ CASES = list(pairs())
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case[0])
-def test_bounds_hold_for_every_vertex(case):
+def test_bounds_are_valid_for_every_vertex(case):
     _, first, one, second, other = case
     off = np.linalg.norm(moved(first, one) - moved(second, other), axis=2)
     bounds, estimator = Bounds(first, second), Estimator(first, second)
@@ -107,7 +107,8 @@ def test_bounds_hold_for_every_vertex(case):
     estimate = estimator.of_skinned(one, other)
     assert_array_less(off, estimate + 1e-12)
     reach = np.abs(one.palette[..., :3, 3]).max() + np.abs(one.shifts).max() + 20.0
-    assert (estimate - off).max() < 1e-4 * reach  # tight enough to distinguish vertices
+    # The bounds are tight enough to distinguish vertices.
+    assert (estimate - off).max() < 1e-4 * reach
     by_rest = bounds.stretches(one)[:, None] * estimator.of_rest(one, other)
     assert_array_less(off, by_rest + bounds.by_joints(one, other)[:, None] + 1e-12)
 

@@ -1,4 +1,4 @@
-"""Reported losses between frames of keyed curves: the maximum over all times."""
+"""Reported losses between frames of keyed curves, as the maximum over all times."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.motion.sampled_animation import SampledAnimation, sample_animati
 from viewer.rig.scene import Actor
 from viewer.rig.skin import skin_from_lists
 
-TOLD = 5e-3  # messages give three digits
+TOLD = 5e-3  # messages have three digits
 
 
 def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> list[Diagnostic]:
@@ -27,7 +27,7 @@ def write(animation: SampledAnimation, folder: Path, kind: str, name: str) -> li
 
 
 def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 3, 4)) -> Actor:
-    """Return an arm a metre long that swings about z by 2 radians, one key per second."""
+    """Return an arm of a metre that swings about z by 2 radians, with one key per second."""
     rows = [(0, kind, 0.0) for kind in ("tx", "ty", "tz", "x", "y", "z")]
     rows += [(1, kind, 0.0) for kind in ("x", "y", "z")]
     skeleton = hand_made.skeleton([-1, 0], rows, None, [[0.0] * 3, [1.0, 0, 0]])
@@ -40,7 +40,7 @@ def swinging(extrapolation=("constant", "constant"), end=4.0, times=(0.0, 1, 2, 
 
 
 def densest(actor: Actor, rate: float) -> float:
-    """Return the arm tip's distance from linear interpolation of the angles, sampled at 20 kHz."""
+    """Return the distance of the arm tip from linear interpolation of angles, sampled at 20 kHz."""
     times = np.linspace(0.0, actor.clip.end, int(actor.clip.end * 20000) + 1)
     frames = np.arange(int(np.floor(actor.clip.end * rate + 1e-9)) + 1) / rate
     times = times[times <= frames[-1]]
@@ -65,7 +65,7 @@ def between(notes: list[Diagnostic]) -> float:
 
 @pytest.mark.parametrize(("kind", "name"), [("bvh", "a.bvh"), ("gltf", "a.glb")])
 def test_loss_between_keys_on_frames_is_reported(tmp_path, kind, name):
-    """From 0 to 2 with slopes 2 and 0: 2 u^2 (1 - u) above the line, 8/27 where u is 2/3."""
+    """From 0 to 2 with slopes 2 and 0, the curve is 2 u^2 (1 - u) above the line: 8/27 at 2/3."""
     notes = write(sample_animation(swinging(), 1.0), tmp_path, kind, name)
     assert between(notes) == pytest.approx(2.0 * np.sin(4.0 / 27.0), rel=TOLD)
 
@@ -85,8 +85,8 @@ def test_loss_of_repeating_curves_is_reported(tmp_path, mode):
     assert between(write(sample_animation(actor, 1.0), tmp_path, "bvh", "a.bvh")) == size
 
 
-def test_vertex_loss_between_frames_is_reported_too(tmp_path):
-    """A vertex three metres away from the rotating joint that it follows."""
+def test_vertex_loss_between_frames_is_reported(tmp_path):
+    """The vertex is three metres away from the rotating joint that it follows."""
     actor = swinging()
     mesh = Mesh(np.diag([3.0, 1, 1]), np.eye(3), np.array([[0, 1, 2]]))
     skin = skin_from_lists([[(0, 1.0)]] * 3, np.tile(np.eye(4), (2, 1, 1)))
@@ -101,8 +101,8 @@ def test_vertex_loss_between_frames_is_reported_too(tmp_path):
 
 
 @pytest.mark.slow
-def test_motions_too_long_to_check_say_so(tmp_path):
-    """Two minutes at 20 fps: too many frame intervals to sample them all."""
+def test_motions_too_long_to_check_are_reported(tmp_path):
+    """Two minutes at 20 fps have too many frame intervals to sample all."""
     actor = swinging(end=120.0)
     notes = write(sample_animation(actor, 20.0), tmp_path, "bvh", "a.bvh")
     note = error_between(notes)

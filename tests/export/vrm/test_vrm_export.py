@@ -1,4 +1,4 @@
-"""VRM characters written back: every reference points at the same thing as in the original."""
+"""VRM characters written back with all references to the same objects as in the original."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ME = VrmMeta("", ("Me",), LICENCE)
 
 
 class Written:
-    """JSON and binary chunk of a written file."""
+    """The JSON and binary chunk of a written file."""
 
     def __init__(self, path: Path) -> None:
         data = path.read_bytes()
@@ -48,7 +48,7 @@ class Written:
 
 
 def convert(file: File, folder: Path, **meta: Any) -> tuple[Written, list[str]]:
-    """Write the only figure of a file as VRM; return the file and the keys of the notes."""
+    """Write the only figure of a file as VRM; return the written file and the keys of the notes."""
     path, out = folder / "ada.vrm", folder / "out.vrm"
     path.write_bytes(file.glb())
     actor = load(path).actors[0]
@@ -68,7 +68,7 @@ def old(tmp_path_factory: pytest.TempPathFactory) -> tuple[Written, list[str], P
     return *convert(swinging(0), folder), folder
 
 
-def test_nothing_is_lost(modern: Any, old: Any) -> None:
+def test_export_reports_no_loss(modern: Any, old: Any) -> None:
     for _, keys, _ in (modern, old):
         assert keys == ["X001.gltf", "X001.vrm", "X005.morph-targets", "X003.vrm-motions"]
 
@@ -132,7 +132,7 @@ def test_toon_shading_keeps_its_values_and_textures(modern: Any) -> None:
     assert "KHR_materials_unlit" not in written.root["extensionsUsed"]
 
 
-def test_version_0_stays_version_0(old: Any) -> None:
+def test_version_0_is_written_as_version_0(old: Any) -> None:
     written = old[0]
     vrm = written.root["extensions"]["VRM"]
     bones = {each["bone"]: written.name(each["node"]) for each in vrm["humanoid"]["humanBones"]}
@@ -156,7 +156,7 @@ def test_version_0_stays_version_0(old: Any) -> None:
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_the_viewer_reads_the_same_character_back(modern: Any, old: Any, version: int) -> None:
+def test_character_is_read_back_equally(modern: Any, old: Any, version: int) -> None:
     folder = (old, modern)[version][2]
     before, after = (load(folder / name).actors[0].figure for name in ("ada.vrm", "out.vrm"))
     facts = {key: value for key, value in before.facts if key != "version"}
@@ -176,7 +176,7 @@ def test_the_viewer_reads_the_same_character_back(modern: Any, old: Any, version
     assert before.blend_shapes.names == after.blend_shapes.names
     weights = np.linspace(0.2, 1.0, before.n_shapes)
     shapes = [shaped(each, weights).require_mesh().positions for each in (before, after)]
-    # Vertices may be reordered by material only within a part; there is one material per part.
+    # Vertices may be reordered by material only within a part, and each part has one material.
     assert_allclose(shapes[1], shapes[0], rtol=0, atol=1e-6)
 
 
@@ -205,11 +205,11 @@ def test_lost_references_are_counted(tmp_path: Path) -> None:
     )
 
 
-def test_a_collider_group_without_a_joint_moves_to_a_written_joint(tmp_path: Path) -> None:
+def test_collider_group_without_a_joint_moves_to_a_written_joint(tmp_path: Path) -> None:
     file = swinging(0, turn=False)
     vrm = file.root["extensions"]["VRM"]
     vrm["secondaryAnimation"]["colliderGroups"][0]["node"] = 99
-    # The hips, the first joint of the written file, come last in the original.
+    # The hips, the first joint in the written file, are last in the original.
     file.root["nodes"].append(file.root["nodes"][0])
     file.root["nodes"][0] = {"name": "unused"}
     last = len(file.root["nodes"]) - 1
@@ -221,7 +221,7 @@ def test_a_collider_group_without_a_joint_moves_to_a_written_joint(tmp_path: Pat
     assert (written.name(kept["node"]), kept["colliders"]) == ("hips", [])
 
 
-def test_a_character_without_a_mesh_is_written(tmp_path: Path) -> None:
+def test_character_without_a_mesh_is_written(tmp_path: Path) -> None:
     file = swinging()
     for node in file.root["nodes"]:
         node.pop("mesh", None), node.pop("skin", None)
@@ -245,7 +245,7 @@ def test_a_character_without_a_mesh_is_written(tmp_path: Path) -> None:
         (0, ("VRM", "materialProperties"), {"a": 1}),
     ],
 )
-def test_data_of_another_structure_does_not_prevent_writing(
+def test_data_with_an_unexpected_structure_does_not_prevent_writing(
     tmp_path: Path, version: int, place: tuple[str, ...], value: Any
 ) -> None:
     file = swinging(version)
@@ -265,7 +265,7 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Figure:
     return load(path).actors[0].figure
 
 
-def test_other_humanoids_become_version_1_in_a_t_pose(body: Figure, tmp_path: Path) -> None:
+def test_other_humanoids_are_written_as_version_1_in_a_t_pose(body: Figure, tmp_path: Path) -> None:
     out = tmp_path / "out.vrm"
     notes = export(viewer.Actor(body), out, meta=ME)
     assert "X005.t-pose" in [note.key for note in notes]
@@ -280,7 +280,7 @@ def test_other_humanoids_become_version_1_in_a_t_pose(body: Figure, tmp_path: Pa
     for side, sign in (("left", 1.0), ("right", -1.0)):
         arm = places[f"{side}Hand"] - places[f"{side}UpperArm"]
         leg = places[f"{side}Foot"] - places[f"{side}UpperLeg"]
-        # The file is in single precision.
+        # The file has single precision.
         assert_allclose(arm / np.linalg.norm(arm), [sign, 0, 0], rtol=0, atol=1e-6)
         assert_allclose(leg / np.linalg.norm(leg), [0, -1, 0], rtol=0, atol=1e-6)
     assert_allclose(figure.require_mesh().positions[:, 1].min(), 0.0, rtol=0, atol=1e-6)
@@ -292,7 +292,7 @@ def test_authors_licence_and_bones_are_required(
     out = tmp_path / "out.vrm"
     with pytest.raises(RigError, match="--vrm-author NAME and --vrm-licence"):
         export(viewer.Actor(body), out)
-    assert run(["convert", "-o", str(out)]) == 2  # the fox
+    assert run(["convert", "-o", str(out)]) == 2  # the fox, which has no required human bones
     assert "required human bones not found" in capsys.readouterr().err
     glb = str(tmp_path / "out.glb")
     assert run(["convert", "-o", glb, "--vrm-name", "A"]) == 2

@@ -1,4 +1,4 @@
-"""Motions of humanoids as VRM animations, read back onto a character."""
+"""Motions of humanoids as VRM animations that are read back onto a character."""
 
 from __future__ import annotations
 
@@ -33,18 +33,18 @@ def directions(actor: Actor, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("version", [0, 1])
-def test_a_character_moves_as_before(tmp_path: Path, version: int) -> None:
+def test_character_moves_as_before_the_round_trip(tmp_path: Path, version: int) -> None:
     path, still, out = (tmp_path / name for name in ("ada.vrm", "still.vrm", "out.vrma"))
     path.write_bytes(swinging(version).glb())
     still.write_bytes(swinging(turn=False).glb())
     assert run(["convert", str(path), "-o", str(out)]) == 0
     (plain,), (found,) = load(path).actors, load(out, still).actors
-    # Version 0.x faces -z, version 1.0 +z: the character is rotated by 180 degrees.
+    # Version 0.x faces -z and version 1.0 +z, so the character is rotated by 180 degrees.
     facing = np.diag([1.0, 1.0, 1.0] if version else [-1.0, 1.0, -1.0])
     for time in (0.5, 1.0):
         before, after = joints(plain, time), joints(found, time)
         for bone in ("leftHand", "rightFoot", "head", "hips"):
-            # The file is in single precision.
+            # The file has single precision.
             assert_allclose(after[bone], facing @ before[bone], rtol=0, atol=1e-6)
 
 

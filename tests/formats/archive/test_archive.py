@@ -40,7 +40,7 @@ def opened(data: bytes, name: str = "x.npz") -> Archive:
 
 
 def refused(action: Any, *arguments: Any) -> Fault:
-    """Return the refusal of a call, which must name the file."""
+    """Return the refusal of a call, which must include the file name."""
     with pytest.raises(FormatError) as caught:
         action(*arguments)
     assert str(caught.value).isprintable() and caught.value.path is not None
@@ -59,7 +59,7 @@ def refused(action: Any, *arguments: Any) -> Fault:
         (b"(d.", "pickle", ()),
     ],
 )
-def test_content_takes_precedence_over_the_name(
+def test_content_takes_precedence_over_the_file_name(
     data: bytes, kind: str, keys: tuple[str, ...]
 ) -> None:
     assert is_archive(data[:64])
@@ -122,17 +122,17 @@ def test_unsuitable_files_are_described(data: bytes, found: Fault) -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 1, 2])
-def test_damage_by_text_mode_transfer_is_named(protocol: int) -> None:
+def test_damage_by_text_mode_transfer_is_reported(protocol: int) -> None:
     data = pickle.dumps({"v": np.arange(13.0)}, protocol).replace(b"\n", b"\r\n")
     assert refused(opened, data, "x.pkl") == (("F002.pickle-line-ends", None, {}))
 
 
-def test_text_that_is_not_a_pickle() -> None:
+def test_text_that_is_not_a_pickle_is_refused() -> None:
     line = refused(opened, b"positions 4 {\n", "x.pkl")
     assert line == ("F002.archive", None, {"found": "an unknown format"})
 
 
-def test_single_array(tmp_path: Path) -> None:
+def test_single_array_is_read(tmp_path: Path) -> None:
     path = tmp_path / "x.npy"
     np.save(path, ROWS)
     for source in (Source.open(path), Source("x.npy", path.read_bytes())):
@@ -142,7 +142,7 @@ def test_single_array(tmp_path: Path) -> None:
 
 
 def test_single_array_may_end_like_text(tmp_path: Path) -> None:
-    """Byte 26 ends a text file, but not an array."""
+    """Byte 26 ends a text file, but may be part of an array."""
     path = tmp_path / "x.npy"
     np.save(path, np.array([1, 26], np.uint8))
     source = Source.open(path)
@@ -222,7 +222,7 @@ def test_shape_and_dtype_are_checked(shape: Any, kinds: str, message: Fault | No
         (np.array([{}], object), Phrase("found-unread", what=Phrase("unread-objects"))),
     ],
 )
-def test_non_arrays_are_refused(value: Any, found: Phrase) -> None:
+def test_values_other_than_arrays_are_refused(value: Any, found: Phrase) -> None:
     archive = opened(pickle.dumps({"v": value}))
     for ask, expected in (
         (archive.array, Phrase("wanted-numbers-any")),
@@ -243,14 +243,14 @@ def test_non_arrays_are_refused(value: Any, found: Phrase) -> None:
         ([], "float64"),
     ],
 )
-def test_lists_of_numbers_are_arrays(value: Any, dtype: str) -> None:
+def test_lists_of_numbers_are_read_as_arrays(value: Any, dtype: str) -> None:
     found = opened(pickle.dumps({"v": value})).array("v")
     assert found.dtype == dtype
     assert_array_equal(found.values(), value)
     assert not found.values().flags.writeable
 
 
-def test_missing_keys() -> None:
+def test_missing_keys_are_refused() -> None:
     archive = opened(npz(v=ROWS))
     assert archive.has("v") and not archive.has("w")
     for ask in (archive.get, archive.array, archive.sparse, archive.text):
@@ -277,7 +277,7 @@ def test_matrix_may_be_dense() -> None:
     )
 
 
-def test_sparse_matrix_from_rows_and_columns() -> None:
+def test_sparse_matrix_is_read_from_rows_and_columns() -> None:
     parts = np.array([5, 6]), np.array([1, 0]), np.array([0, 1, 2])
     for layout, pairs in (("csr", [[0, 1], [1, 0]]), ("csc", [[1, 0], [0, 1]])):
         rows, columns, values = Sparse((2, 2), *parts, layout).entries()
@@ -289,7 +289,7 @@ def test_sparse_matrix_from_rows_and_columns() -> None:
     "value",
     ["female", b"female", np.array("female"), np.array([b"female"]), np.array("female", ">U9")],
 )
-def test_strings_of_any_encoding(value: Any) -> None:
+def test_strings_of_any_encoding_are_read(value: Any) -> None:
     assert opened(pickle.dumps({"v": value})).text("v") == "female"
     assert opened(npz(v=np.array(value))).text("v") == "female"
 
@@ -305,7 +305,7 @@ def test_strings_of_any_encoding(value: Any) -> None:
          dtype="float64")})),
     ],
 )  # fmt: skip
-def test_non_strings_are_refused(value: Any, found: Fault) -> None:
+def test_values_other_than_strings_are_refused(value: Any, found: Fault) -> None:
     archive = opened(pickle.dumps({"v": value}))
     assert refused(archive.text, "v") == found
 
@@ -318,8 +318,8 @@ def test_values_are_cached() -> None:
     assert archive.get("o") == Opaque(Phrase("unread-objects"))
 
 
-def test_half_floats_are_widened(tmp_path: Path) -> None:
-    """65504 is the largest half: comparing it with a larger number would overflow."""
+def test_half_floats_are_converted_to_single_precision(tmp_path: Path) -> None:
+    """65504 is the largest half float, so comparing it with a larger number would overflow."""
     np.savez(tmp_path / "a.npz", half=np.array([0.5, 65504], "f2"))
     half = open_archive(Source.open(tmp_path / "a.npz")).array("half").values()
     assert (half.dtype, half.tolist()) == (np.float64, [0.5, 65504.0])

@@ -1,4 +1,4 @@
-"""Archives with false headers or damage: refused in one line, in little memory."""
+"""Archives with false headers or damage, which are refused in one line with little memory."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._source import Source
 
-BOUND = 64 << 20  # bytes of memory that may be allocated before the error
+BOUND = 64 << 20  # limit of allocated memory in bytes
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ BOUND = 64 << 20  # bytes of memory that may be allocated before the error
          "problem": Phrase("npy-header", found=b"")})),
     ],
 )  # fmt: skip
-def test_headers_with_false_sizes(data: bytes, line: Fault) -> None:
+def test_headers_with_false_sizes_are_refused(data: bytes, line: Fault) -> None:
     whole = zipped({"v.npy": data})
     assert refusal(whole) == line
     assert cost(lambda: refusal(whole)) < BOUND
@@ -89,7 +89,7 @@ def test_headers_with_false_sizes(data: bytes, line: Fault) -> None:
     ],
     ids=lambda text: text[:40],
 )
-def test_headers_that_break_the_grammar(text: str) -> None:
+def test_headers_with_syntax_errors_are_refused(text: str) -> None:
     key, _, values = refusal(zipped({"v.npy": npy(text, bytes(8))}))
     assert (key, values["item"], values["problem"].key) == ("F002.archive-value", "v", "npy-header")
     assert len(str(values["problem"])) < 400
@@ -125,7 +125,7 @@ def test_max_size_limits_the_sum_of_all_members() -> None:
     assert found == ("F001.too-large", None, {"most": 100, "size": 128})
 
 
-def test_many_directory_entries_on_one_member() -> None:
+def test_many_directory_entries_for_one_member_are_refused() -> None:
     """Entries that share the same data can unpack to any size (Fifield 2019)."""
     data = npz(packed=True, v=np.zeros(1 << 20))
     start = data.index(b"PK\1\2")
@@ -138,7 +138,7 @@ def test_many_directory_entries_on_one_member() -> None:
     assert str(values["found"]).startswith("218107")
 
 
-def test_oversized_directory() -> None:
+def test_oversized_directory_is_refused() -> None:
     data = zipped({f"{number:0>50}": b"" for number in range(25_000)})
     line = refusal(data)
     assert line == (("F002.npz", None, {"reason": "a directory of 2400000 bytes"}))
@@ -153,7 +153,7 @@ def changed(data: bytes, local: int, central: int, value: int) -> bytes:
     return bytes(buffer)
 
 
-def test_encrypted_member() -> None:
+def test_encrypted_member_is_refused() -> None:
     line = ("F002.npz-encrypted", None, {"item": "v"})
     assert refusal(changed(npz(v=ROWS), 6, 8, 1)) == line
     assert refusal(changed(npz(v=ROWS), 6, 8, 0x41)) == line
@@ -168,12 +168,12 @@ def test_encrypted_member() -> None:
         (99, ("F002.npz-method", None, {"item": "v", "method": 99})),
     ],
 )
-def test_other_compression(method: int, found: Fault) -> None:
+def test_unsupported_compression_is_refused(method: int, found: Fault) -> None:
     assert refusal(changed(npz(v=ROWS), 8, 10, method)) == found
 
 
 @pytest.mark.filterwarnings("ignore:Duplicate name")
-def test_same_name_twice() -> None:
+def test_duplicate_name_is_refused() -> None:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         for _ in "ab":
@@ -188,7 +188,7 @@ def test_same_name_twice() -> None:
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_damaged_values(packed: bool) -> None:
+def test_damaged_values_are_refused(packed: bool) -> None:
     data = bytearray(npz(packed=packed, v=np.arange(1000.0), w=ROWS))
     data[600] ^= 0xFF
     key, _, values = refusal(bytes(data))
@@ -212,21 +212,21 @@ def survive(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
-def test_file_truncated_anywhere(data: bytes) -> None:
+def test_file_truncated_anywhere_is_refused(data: bytes) -> None:
     for length in range(len(data)):
         with pytest.raises(FormatError):
             look(data[:length])
 
 
 @pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
-def test_every_byte_changed(data: bytes) -> None:
+def test_file_with_any_byte_changed_is_read_or_refused(data: bytes) -> None:
     for place in range(len(data)):
         for change in (0x01, 0x20, 0x80, 0xFF):
             survive(data[:place] + bytes([data[place] ^ change]) + data[place + 1 :])
 
 
 @pytest.mark.parametrize("data", [SMALL, PACKED, SINGLE], ids=["stored", "deflated", "npy"])
-def test_random_damage(data: bytes) -> None:
+def test_file_with_random_damage_is_read_or_refused(data: bytes) -> None:
     dice = random.Random(len(data))
     for _ in range(1000):
         damaged = bytearray(data)

@@ -1,4 +1,4 @@
-"""Large pickles, whose bytes are read where they are needed."""
+"""Large pickles, of which only the required bytes are read."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def window(data: bytes, folder: Path) -> FileWindow:
     return FileWindow(StoredFile(Source.open(path)))
 
 
-def test_windows_equal_their_bytes(data: bytes, tmp_path: Path) -> None:
+def test_windows_have_the_bytes_of_the_file(data: bytes, tmp_path: Path) -> None:
     found = window(data, tmp_path)
     assert len(found) == SIZE
     for place in (0, 7, PAGE - 1, PAGE, 2 * PAGE + 3, 5, SIZE - 1):
@@ -45,7 +45,7 @@ def test_windows_equal_their_bytes(data: bytes, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("place", [3, (1 << 20) - 1, (1 << 20) + 9])
-def test_bytes_are_found_across_pieces(place: int, tmp_path: Path) -> None:
+def test_bytes_are_found_across_page_borders(place: int, tmp_path: Path) -> None:
     text = bytearray((1 << 20) + 99)
     text[place : place + 2] = b"ab"
     found = window(bytes(text), tmp_path)
@@ -64,7 +64,7 @@ def test_pickles_are_read_through_a_window(tmp_path: Path) -> None:
     assert (archive.get("t"), archive.get("n")) == ("text", [1.5, 7])
 
 
-def test_unused_arrays_of_large_files_stay_on_the_disk(tmp_path: Path) -> None:
+def test_unused_arrays_of_large_files_are_not_read(tmp_path: Path) -> None:
     path = tmp_path / "a.pkl"
     path.write_bytes(joblib_file({"verts": np.zeros(34 << 20, np.uint8), "v": np.arange(3)}))
 
@@ -74,7 +74,7 @@ def test_unused_arrays_of_large_files_stay_on_the_disk(tmp_path: Path) -> None:
     assert cost(look) < 4 << 20
 
 
-def test_files_that_change_are_refused(tmp_path: Path) -> None:
+def test_files_that_change_while_open_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "a.pkl"
     path.write_bytes(joblib_file({"v": np.zeros(34 << 20, np.uint8)}))
     later = open_archive(Source.open(path)).get("v")

@@ -1,4 +1,4 @@
-"""``.npz`` and ``.npy`` files: read lazily and exactly, and refused if inconsistent."""
+"""Lazy and exact reading of ``.npz`` and ``.npy`` files, and refusal of inconsistent files."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_changed_file_is_not_read(tmp_path: Path) -> None:
     )
 
 
-def test_headers_from_other_writers() -> None:
+def test_headers_from_other_writers_are_read() -> None:
     one = struct.pack("<d", 2.5)
     headers = [
         npy("{'descr':'<f8','fortran_order':False,'shape':(1,)}", one),
@@ -123,7 +123,7 @@ def test_headers_from_other_writers() -> None:
     ],
     ids=["object", "objects", "record", "sub-array", "void", "complex", "date"],
 )
-def test_unsupported_dtypes_are_not_evaluated(given: Any, what: Phrase) -> None:
+def test_unsupported_dtypes_are_refused_without_evaluation(given: Any, what: Phrase) -> None:
     archive = opened(npz(v=given, good=ROWS))
     assert archive.get("v") == Opaque(what)
     assert_array_equal(archive.array("good").values(), ROWS)
@@ -143,7 +143,34 @@ def test_pickles_inside_are_never_opened(tmp_path: Path) -> None:
     assert not marker.exists()
 
 
-def test_names_outside_the_folder_are_only_names() -> None:
+def test_names_with_parent_folders_are_treated_as_plain_names() -> None:
     data = zipped({"../../etc/x.npy": npy(header(), bytes(8)), "a\nb.npy": npy(header(), b"")})
     problem = Phrase("array-bytes", shape=(1,), dtype="float64", found=0)
     assert refusal(data) == ("F002.archive-value", None, {"item": r"a\nb", "problem": problem})
+
+
+@pytest.mark.parametrize("packed", [False, True])
+@pytest.mark.parametrize("count", [1, 4, 100])
+def test_blocks_of_rows_are_those_of_the_whole_array(packed: bool, count: int) -> None:
+    given = GIVEN | {"many": np.arange(66.0).reshape(11, 3, 2)}
+    archive = opened(npz(packed=packed, **given))
+    for key, value in given.items():
+        if value.ndim and value.dtype.kind in "biuf":
+            array = archive.array(key)
+            blocks = [block.copy() for block in array.blocks(count)]
+            assert all(len(block) <= count for block in blocks)
+            joined = np.concatenate(blocks) if blocks else np.zeros((0, *value.shape[1:]))
+            assert_array_equal(joined, value)
+            # Rows in C order and in the machine's byte order are not read as a whole.
+            if key == "many":
+                assert not array.is_loaded
+
+
+def test_damage_is_detected_while_reading_blocks() -> None:
+    values = np.arange(60_000.0).reshape(-1, 3)
+    data = bytearray(npz(v=values))
+    data[len(data) // 2] ^= 1
+    array = opened(bytes(data)).array("v")
+    with pytest.raises(FormatError):
+        for _ in array.blocks(100):
+            pass

@@ -1,4 +1,4 @@
-"""BVH files mutated, truncated or with inserted words: each gives a motion or one line."""
+"""BVH files with mutations, truncation or inserted words, which load or are refused in one line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_many_static_joints_in_many_frames_are_refused_before_allocating() -> No
     assert peak < 100e6
 
 
-def test_a_name_with_control_characters_stays_on_one_line() -> None:
+def test_name_with_control_characters_is_shown_on_one_line() -> None:
     text = GOOD.replace("LeftUpLeg", "a\x07b").replace("OFFSET 0.1", "OFFSET x")
     with pytest.raises(FormatError) as caught:
         read(text)
@@ -42,7 +42,7 @@ def test_a_name_with_control_characters_stays_on_one_line() -> None:
 
 
 def check(data: bytes) -> None:
-    """Read a file; if it loads, playing it must work too."""
+    """Read a file; if it loads, it must also play."""
     source = Source("dir/a.bvh", data)
     try:
         motion = bvh.read(source)
@@ -59,20 +59,20 @@ def check(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("seed", range(10))
-def test_mutated_file_gives_a_motion_or_one_line(seed: int) -> None:
+def test_mutated_file_is_read_or_refused_in_one_line(seed: int) -> None:
     rng = random.Random(seed)
     for _ in range(150):
         check(mutate(GOOD.encode(), rng))
 
 
-def test_truncated_file_gives_a_motion_or_one_line() -> None:
+def test_truncated_file_is_read_or_refused_in_one_line() -> None:
     for cut in range(len(GOOD)):
         check(GOOD[:cut].encode())
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"-1", b"{", b"}", b"x"])
-def test_inserted_word_gives_a_motion_or_one_line(token: bytes) -> None:
+def test_file_with_an_inserted_word_is_read_or_refused_in_one_line(token: bytes) -> None:
     words = re.split(rb"(\s+)", GOOD.encode())
     for at in range(0, len(words), 2):
         check(b"".join([*words[:at], token, *words[at + 1 :]]))
@@ -80,7 +80,7 @@ def test_inserted_word_gives_a_motion_or_one_line(token: bytes) -> None:
 
 
 @pytest.mark.parametrize("end", [b"\n", b"\r\n", b"\r\r\n", b"\r"])
-def test_word_that_should_be_a_number_is_found_on_its_line(end: bytes) -> None:
+def test_invalid_number_is_reported_on_its_line(end: bytes) -> None:
     lines = GOOD.encode().rstrip().split(b"\n")
     for number, line in enumerate(lines, start=1):
         if not re.search(rb"\d$", line):

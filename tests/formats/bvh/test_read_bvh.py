@@ -17,7 +17,7 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 
 
 def about(axis: int, degrees: float) -> np.ndarray:
-    """Rotation about one axis, from the textbook."""
+    """Return the textbook matrix of a rotation about one axis."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     return np.array(
         [
@@ -48,10 +48,11 @@ def test_reads_every_part() -> None:
     assert ("frames", "2 at 30 fps") in motion.figure.facts
 
 
-def test_joints_are_where_the_channels_put_them() -> None:
+def test_joint_positions_follow_the_channels() -> None:
     motion, _ = read(GOOD)
     places = worlds(motion)[..., :3, 3]
-    # Frame 0: the thigh rotates by 90 degrees about z, so the foot, 0.9 below, is 0.9 to the right.
+    # In frame 0, the thigh rotates by 90 degrees about z, so the foot, 0.9 below, is 0.9 to the
+    # right.
     np.testing.assert_allclose(
         places[0], [[0, 1, 0], [0.1, 1, 0], [1, 1, 0], [0, 1.6, 0]], atol=1e-15
     )
@@ -75,7 +76,7 @@ def test_rotation_channels_multiply_from_left_to_right(order: str) -> None:
 
 @pytest.mark.slow
 @given(st.permutations(["Xposition", "Zposition", "Yposition", "Zrotation", "Xrotation"]))
-def test_channels_come_in_any_order(channels: list[str]) -> None:
+def test_channels_may_be_in_any_order(channels: list[str]) -> None:
     values = {"Xposition": 1.0, "Yposition": 2.0, "Zposition": 3.0, "Zrotation": 50, "Xrotation": 7}
     motion, _ = read(one_joint(" ".join(channels), " ".join(str(values[c]) for c in channels)))
     turn = np.eye(3)
@@ -100,7 +101,7 @@ def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() 
     np.testing.assert_allclose(worlds(motion)[0, 3, :3, 3], [0, 1.75, 0])
 
 
-def test_zero_positions_below_the_root_keep_the_offset() -> None:
+def test_zero_position_channels_below_the_root_keep_the_offset() -> None:
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
     body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + "0 " * 24
@@ -109,7 +110,7 @@ def test_zero_positions_below_the_root_keep_the_offset() -> None:
     np.testing.assert_allclose(worlds(motion)[0, 2, :3, 3], [0.1, -0.9, 0])
 
 
-def test_root_offset_is_replaced_too() -> None:
+def test_root_offset_is_replaced_by_position_channels() -> None:
     motion, _ = read(GOOD.replace("OFFSET 0.0 0.0 0.0", "OFFSET 5 6 7", 1))
     np.testing.assert_allclose(worlds(motion)[:, 0, :3, 3], [[0, 1, 0], [1, 2, 3]], atol=1e-15)
 
@@ -142,14 +143,14 @@ def test_quirks_load_without_warnings(text: str) -> None:
     np.testing.assert_array_equal(worlds(motion), expected)
 
 
-def test_names_may_repeat_be_missing_or_contain_blanks() -> None:
+def test_names_may_be_repeated_missing_or_contain_spaces() -> None:
     text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
     motion, warnings = read(text.replace("Hips", "my  hips é"))
     assert motion.figure.skeleton.names == ("my hips é", "arm", "arm", "")
     assert warnings == []
 
 
-def test_several_roots() -> None:
+def test_several_roots_are_read() -> None:
     head, tail = GOOD.split("MOTION")
     second = "ROOT prop { OFFSET 1 0 0 CHANNELS 1 Xrotation }\n"
     lines = tail.strip().split("\n")
@@ -273,15 +274,16 @@ def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
     assert warnings == [Phrase("up-of-longest", up="z")]
 
 
-def test_frames_upright_along_another_axis_are_reported() -> None:
-    # A rest pose along y, rotated by 90 degrees about x in every frame: a z-up world.
+def test_frames_upright_along_a_different_axis_are_reported() -> None:
+    # The rest pose is along y, but rotated by 90 degrees about x in every frame, as in a z-up
+    # world.
     rows = "0 0 1 0 90 0 0 0 0 0 0 0 0 0 0\n" * 2
     motion, warnings = read(GOOD.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
     assert motion.figure.up == "y"
     assert warnings == [Phrase("up-against-frames", up="y", axis="+z")]
 
 
-def test_content_determines_the_format() -> None:
+def test_bvh_is_recognised_by_content() -> None:
     assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
     assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"
 

@@ -1,4 +1,4 @@
-"""Broken frame files: each is reported and becomes a gap, and the others are read."""
+"""Broken frame files, each of which is reported and becomes a gap while the others are read."""
 
 import json
 import os
@@ -45,7 +45,7 @@ def refusal(path, **options):
          {"problem": ("F002.json-twice", None, {"found": "poses"})})),
     ],
 )  # fmt: skip
-def test_broken_file_is_a_gap_for_all(tmp_path, content, message):
+def test_broken_file_is_a_gap_for_all_people(tmp_path, content, message):
     warnings, parts = gap(tmp_path, content)
     assert warnings == [message]
     assert rows_of(parts, 0) == [0, 2]
@@ -69,7 +69,7 @@ def test_large_file_is_a_gap(tmp_path):
     assert found == [("F007.record", None, {"problem": problem})]
 
 
-@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root reads everything")
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may read every file")
 def test_unreadable_file_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)], 1: []})
     (folder / "000001.json").chmod(0)
@@ -79,7 +79,7 @@ def test_unreadable_file_is_a_gap(tmp_path):
     assert found == [("F007.record", None, {"problem": problem})]
 
 
-def test_file_that_vanishes_is_a_gap(tmp_path):
+def test_removed_file_is_a_gap(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)], 1: [body(0)]})
     capture = easymocap.read(Source.open(tmp_path))
     (folder / "000001.json").unlink()
@@ -88,7 +88,7 @@ def test_file_that_vanishes_is_a_gap(tmp_path):
     assert found == [("F007.record", None, {"problem": problem})]
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes are not supported here")
 def test_pipe_among_the_frames_is_ignored(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: [body(0)]})
     os.mkfifo(folder / "000001.json")
@@ -177,12 +177,12 @@ def test_person_without_a_number_is_left_out(tmp_path, person, message):
     assert warnings == [message]
 
 
-def test_whole_numbers_may_be_written_as_fractions(tmp_path):
+def test_whole_numbers_may_be_written_with_a_fraction(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(2.0)]})
     assert list(opened(tmp_path)[1][0].bodies) == [2]
 
 
-def test_non_record_is_left_out(tmp_path):
+def test_value_that_is_not_a_record_is_left_out(tmp_path):
     warnings, parts = gap(tmp_path, [None, 3, body(0)])
     assert warnings == [
         (
@@ -222,7 +222,7 @@ def test_first_of_two_records_with_one_id_is_used(tmp_path):
     assert parts[1].bodies[0].translations[0, 0] == body(0, seed=1.0)["Th"][0][0]
 
 
-def test_untracked_people_are_named_in_messages(tmp_path):
+def test_messages_identify_untracked_people(tmp_path):
     warnings, _ = gap(tmp_path, [body(-1), body(-1, Th=[[float("nan"), 0.0, 0.0]])])
     assert warnings == [
         ("F007.record-untracked", None, {}),
@@ -240,13 +240,13 @@ def test_untracked_people_are_named_in_messages(tmp_path):
     ]
 
 
-def test_two_ids_for_one_person_are_reported(tmp_path):
+def test_conflicting_ids_of_one_person_are_reported(tmp_path):
     warnings, parts = gap(tmp_path, [body(0, personID=4), body(1, personID=1)])
     assert warnings == [("F007.record-ids", None, {})]
     assert rows_of(parts, 1) == [1]
 
 
-def test_many_errors_are_counted(tmp_path):
+def test_errors_beyond_the_first_twenty_are_counted(tmp_path):
     broken = dict.fromkeys(range(1, 31), "[")
     write_frames(tmp_path / "smpl", {0: [body(0)], **broken, 31: [body(0)]})
     _, parts, _ = opened(tmp_path)
@@ -255,10 +255,10 @@ def test_many_errors_are_counted(tmp_path):
     assert warnings[-1] == ("F007.records", None, {"name": tmp_path.name, "n": 10})
 
 
-# Nothing to read
+# Captures without readable frames
 
 
-def test_only_broken_files_are_refused(tmp_path):
+def test_capture_of_broken_files_only_is_refused(tmp_path):
     folder = write_frames(tmp_path / "smpl", {0: "[", 1: "3"})
     with pytest.raises(FormatError) as caught:
         easymocap.read(Source.open(tmp_path))
@@ -275,7 +275,7 @@ def test_vposer_latent_code_is_refused(tmp_path):
     assert refusal(tmp_path / "smpl" / "000000.json") == fault
 
 
-def test_unknown_length_is_refused_with_the_known_ones(tmp_path):
+def test_unknown_pose_length_is_refused_with_the_known_lengths(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0, 90)]})
     lengths = [9, 48, 63, 69, 72, 78, 87, 156, 165]
     problem = Phrase("record-lengths", expected=lengths, found=90)
@@ -302,7 +302,7 @@ def test_two_dimensional_points_are_refused(tmp_path):
 
 
 @pytest.mark.slow
-def test_mutations_are_read_or_refused_in_one_line(tmp_path):
+def test_mutated_records_are_read_or_refused_in_one_line(tmp_path):
     record = body(0, 78) | points(0, 17) | {"expression": [[0.5] * 10]}
     good = json.dumps([record, body(-1, 78)])
     pieces = [

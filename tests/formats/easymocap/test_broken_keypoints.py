@@ -1,4 +1,4 @@
-"""EasyMocap keypoints with errors, and the lines of the errors in records."""
+"""EasyMocap keypoints with errors, and the lines of errors in records."""
 
 import json
 
@@ -10,7 +10,7 @@ from viewer.diagnostics import Phrase
 from viewer.formats._text.json_places import line_at, nearest_place
 
 
-def test_non_finite_keypoints_are_unseen(tmp_path):
+def test_non_finite_keypoints_are_undetected(tmp_path):
     record = points(0)
     rows = record["keypoints3d"]
     rows[1][3], rows[2][0], rows[3][3] = -0.5, float("nan"), float("nan")
@@ -57,7 +57,7 @@ def test_broken_keypoints_are_a_gap(tmp_path, rows, message):
     assert len(parts[1].points[0][1].points) == 1
 
 
-def test_entirely_unseen_keypoints_are_reported_at_the_end(tmp_path):
+def test_keypoints_that_are_never_detected_are_reported_at_the_end(tmp_path):
     unseen = points(3)
     unseen["keypoints3d"] = [[0.0] * 4] * 25
     late = {
@@ -82,11 +82,11 @@ PEOPLE = [body(3, 9), body(4, 9)]
     ("key", "value"),
     [("poses", [1.0]), ("Th", [[1.0, float("nan"), 0.0]]), ("shapes", "x"), ("Rh", None)],
 )
-def test_the_line_of_the_invalid_key_is_named(tmp_path, wrapper, key, value):
+def test_line_of_an_invalid_key_is_reported(tmp_path, wrapper, key, value):
     people = [PEOPLE[0], {**PEOPLE[1], key: value}]
     content = {"note": [{"poses": 1}], wrapper: people} if wrapper else people
     text = json.dumps(content, indent=1)
-    # The second occurrence of the key, as both people have it.
+    # The error is at the second occurrence of the key, because both people have it.
     rows = [number for number, row in enumerate(text.splitlines(), 1) if f'"{key}":' in row]
     write_frames(tmp_path / "smpl", {0: PEOPLE, 1: text})
     _, parts, _ = opened(tmp_path / "smpl")
@@ -94,7 +94,7 @@ def test_the_line_of_the_invalid_key_is_named(tmp_path, wrapper, key, value):
     assert (line, values["problem"][2]["item"]) == (rows[-1], f"person 4: {key}")
 
 
-def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
+def test_line_of_the_record_is_reported_for_a_missing_key(tmp_path):
     people = [PEOPLE[0], {key: value for key, value in PEOPLE[1].items() if key != "Th"}]
     text = json.dumps(people, indent=1)
     begins = [number for number, row in enumerate(text.splitlines(), 1) if row == " {"]
@@ -108,11 +108,11 @@ def test_the_line_of_a_record_is_named_where_a_key_is_missing(tmp_path):
     ("text", "place", "line"),
     [
         ('{"a": 1,\n"b": 2}', ("b",), 2),
-        ('{"a": {"b": 1},\n"b": 2}', ("b",), 2),  # not the one inside
-        ('{"a": "b",\n"b": 2}', ("b",), 2),  # nor a value of that name
+        ('{"a": {"b": 1},\n"b": 2}', ("b",), 2),  # not the key of the inner object
+        ('{"a": "b",\n"b": 2}', ("b",), 2),  # not a value equal to the key
         ("[[1,\n2],\n[3]]", (1, 0), 3),
         ('["}",\n"\\"]",\n3]', (2,), 3),  # brackets and quotes in strings
-        ('[{"a": []},\n{"a": 1}]', (1, "b"), 2),  # its record
+        ('[{"a": []},\n{"a": 1}]', (1, "b"), 2),  # the line of the record
         ("[]", (0,), None),
     ],
 )

@@ -1,4 +1,4 @@
-"""Cameras of EasyMocap: valid and broken files of OpenCV's FileStorage, and their location."""
+"""EasyMocap cameras: valid and broken files of OpenCV's FileStorage, and the search for them."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from viewer.formats import Source
 from viewer.formats._easymocap.cameras import find_cameras, read_storage
 
 HEAD = "%YAML:1.0\n---\n"
-# Wrapped like OpenCV's own long lists.
+# Lists are wrapped like long lists of OpenCV.
 INTRINSIC = (
     HEAD
     + """names:
@@ -45,7 +45,7 @@ def matrix(key, rows, columns, numbers):
     return f"{text}  data: [{data}]\n"
 
 
-# A rotation by 90 degrees about x: y goes to z.
+# A rotation by 90 degrees about x, which maps y to z.
 QUARTER = [1.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0, 0.0]
 EXTRINSIC = HEAD + 'names: [ "01", "b c" ]\n'
 EXTRINSIC += matrix("R_01", 3, 1, [9.0, 9.0, 9.0]) + matrix("Rot_01", 3, 3, QUARTER)
@@ -76,7 +76,7 @@ def test_cameras_are_read(tmp_path):
     assert_array_equal(views[1].distortion, [])
 
 
-def test_line_endings_comments_and_headers_do_not_matter():
+def test_line_endings_comments_and_headers_are_ignored():
     text = "\ufeff" + HEAD + "# one\r\nnames:\r\n- '1'\r\n- \"2\"\r\nH_1: 5\r\n...\r\n"
     assert storage(text) == {"names": ["1", "2"], "H_1": "5"}
 
@@ -101,7 +101,7 @@ def test_invalid_cameras_do_not_affect_bodies(tmp_path):
     )
 
 
-def test_one_file_is_not_enough(tmp_path):
+def test_camera_file_without_its_counterpart_is_reported(tmp_path):
     (tmp_path / "extri.yml").write_text(EXTRINSIC)
     views, (note,) = find_cameras([tmp_path], 1 << 20)
     assert (views, note.path) == ((), tmp_path / "extri.yml")

@@ -1,4 +1,4 @@
-"""EasyMocap folders: person ids, gaps, all pose layouts, keypoints, the timeline."""
+"""EasyMocap folders: person ids, gaps, all pose layouts, keypoints, and the timeline."""
 
 import json
 
@@ -16,7 +16,7 @@ FACE = ("jaw", "left_eye", "right_eye")
 
 
 def only(parts, person=0):
-    """Return the only motion of a person, who is in a single part."""
+    """Return the motion of a person who is in a single part."""
     found = [part.bodies[person] for part in parts if person in part.bodies]
     assert len(found) == 1
     return found[0]
@@ -62,7 +62,7 @@ def test_json_poses_are_not_captures(tmp_path):
     assert (detect(source), source.warnings) == ("pose", [])
 
 
-def test_folder_with_the_most_frames_is_read(tmp_path):
+def test_subfolder_with_the_most_frames_is_read(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)]})
     write_frames(tmp_path / "smpl_full", {0: [body(0, 156)]})
     capture, _, warnings = opened(tmp_path)
@@ -70,7 +70,7 @@ def test_folder_with_the_most_frames_is_read(tmp_path):
     assert warnings == [("F007.capture-beside", None, {"name": "smpl_full", "others": "smpl"})]
 
 
-def test_first_view_of_several_is_read(tmp_path):
+def test_first_of_several_views_is_read(tmp_path):
     for view, person in (("02", 2), ("01", 1), ("03", 3)):
         write_frames(tmp_path / "smpl" / view, {0: [body(person)]})
     for path in (tmp_path, tmp_path / "smpl"):
@@ -103,7 +103,7 @@ def test_gaps_in_frame_numbers_are_kept(tmp_path):
     assert timing.locate(np.array([-1.0, 0.0, 0.02, 9.0]))[0].tolist() == [-1, 0, -1, -1]
 
 
-def test_numbers_sort_as_numbers_and_names_as_names(tmp_path):
+def test_numeric_names_are_sorted_by_number_and_other_names_by_text(tmp_path):
     write_frames(tmp_path / "a", {"9": [body(9)], "10": [body(10)]})
     _, parts, _ = opened(tmp_path / "a")
     assert (rows_of(parts, 9), rows_of(parts, 10)) == ([0], [1])
@@ -138,7 +138,7 @@ def test_bodies_and_keypoints_share_the_timeline(tmp_path):
     assert [list(part.points) for part in parts] == [[0], [0, 5]]
 
 
-def test_part_sizes_grow_and_the_first_part_contains_a_person(tmp_path):
+def test_part_sizes_grow_and_the_first_part_includes_a_person(tmp_path):
     frames = {0: [], 1: [], 2: [body(0)], **{frame: [body(0)] for frame in range(3, 400)}}
     write_frames(tmp_path / "smpl", frames)
     capture, parts, _ = opened(tmp_path)
@@ -146,7 +146,8 @@ def test_part_sizes_grow_and_the_first_part_contains_a_person(tmp_path):
     assert [part.bodies[0].n_rows for part in parts] == [1, 64, 256, 77]
     assert all(part.bodies[0].timing.n_frames == 400 for part in parts)
     assert rows_of(parts, 0) == list(range(2, 400))
-    assert [part.stop for part in capture.parts()] == [3, 67, 323, 400]  # reads the files again
+    # This reads the files again.
+    assert [part.stop for part in capture.parts()] == [3, 67, 323, 400]
 
 
 # People
@@ -203,7 +204,9 @@ def turned(record, start, stop):
         (48, "MANO", FAMILY[16].names, [(3, 48)], {}, True),
     ],
 )
-def test_length_determines_the_layout(tmp_path, count, model, names, parts, hands, is_flat, flat):
+def test_number_of_values_determines_the_pose_layout(
+    tmp_path, count, model, names, parts, hands, is_flat, flat
+):
     record = body(0, count, flat=flat)
     write_frames(tmp_path / "smpl", {0: [record], 1: [record]})
     capture, found, _ = opened(tmp_path)
@@ -219,7 +222,7 @@ def test_length_determines_the_layout(tmp_path, count, model, names, parts, hand
         assert_array_equal(motion.hands[side], [np.ravel(record["poses"])[start:stop]])
 
 
-def test_hands_of_newer_smplh_have_their_own_keys(tmp_path):
+def test_hands_of_newer_smplh_files_have_separate_keys(tmp_path):
     hands = {"handl": [waves(12).tolist()], "handr": [waves(12, seed=1).tolist()]}
     write_frames(tmp_path / "smpl", {0: [body(0, 63, **hands)]})
     motion = only(opened(tmp_path)[1])
@@ -237,7 +240,7 @@ def test_hand_keys_next_to_full_poses_are_ignored(tmp_path):
 
 
 def test_root_rotation_in_poses_is_applied_after_rh(tmp_path):
-    poses = waves(72)  # the first three are not 0
+    poses = waves(72)  # the first three values are not 0
     write_frames(tmp_path / "smpl", {0: [body(0, poses=[poses.tolist()])]})
     motion = only(opened(tmp_path)[1])
     assert not motion.about_origin
@@ -245,14 +248,14 @@ def test_root_rotation_in_poses_is_applied_after_rh(tmp_path):
     assert_array_equal(motion.vectors, [poses.reshape(-1, 3)])
 
 
-def test_shape_is_per_frame_only_if_it_varies(tmp_path):
+def test_shape_is_stored_per_frame_only_if_it_varies(tmp_path):
     same = {frame: [body(0), body(1, shapes=[[frame] * 10])] for frame in range(3)}
     write_frames(tmp_path / "smpl", {**same, 3: [body(0), body(1)]})
     part = opened(tmp_path)[1][1]
     assert (part.bodies[0].shape.shape, part.bodies[1].shape.shape) == ((1, 10), (3, 10))
 
 
-def test_expression_is_read_and_may_drive_shapes(tmp_path):
+def test_expression_is_read_and_drives_shapes(tmp_path):
     expression = {"expression": [waves(10, seed=5).tolist()]}
     write_frames(tmp_path / "smpl", {0: [body(0, 87, **expression)]})
     motion = only(opened(tmp_path)[1])
@@ -270,7 +273,7 @@ def test_vertices_are_ignored_with_one_note(tmp_path):
     assert noticed(parts[:1], folder / "000000.json") == said and noticed(parts[1:]) == []
 
 
-def test_up_axis_is_passed_on(tmp_path):
+def test_requested_up_axis_is_used(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)]})
     assert (opened(tmp_path)[0].up, opened(tmp_path, up="-y")[0].up) == ("", "-y")
 
@@ -278,7 +281,7 @@ def test_up_axis_is_passed_on(tmp_path):
 # Keypoints
 
 
-def test_keypoints_keep_their_confidence(tmp_path):
+def test_keypoints_have_their_confidence(tmp_path):
     record = points(0)
     record["keypoints3d"][4] = [0, 0, 0, 0]
     write_frames(tmp_path / "keypoints3d", {0: [record]})
@@ -288,7 +291,7 @@ def test_keypoints_keep_their_confidence(tmp_path):
     assert_array_equal(clip.points, [record["keypoints3d"]])
 
 
-def test_rows_without_confidence_count_as_visible(tmp_path):
+def test_points_without_confidence_are_visible(tmp_path):
     write_frames(tmp_path / "keypoints3d", {0: [points(0, columns=3)]})
     clip = opened(tmp_path)[1][0].points[0][1]
     assert_array_equal(clip.points[0, :, :3], waves(25, 3))
@@ -301,7 +304,7 @@ def test_layout_of_17_keypoints_can_be_chosen(tmp_path):
     assert opened(tmp_path, layout="h36m")[1][0].points[0][0].title == "h36m"
 
 
-def test_hands_and_face_next_to_the_body_are_points_too(tmp_path):
+def test_hands_and_face_next_to_the_body_are_read_as_points(tmp_path):
     rows = {key: waves(count, 4, seed=count) for key, count in
             (("handl3d", 21), ("handr3d", 21), ("face3d", 70))}  # fmt: skip
     for values in rows.values():
@@ -313,7 +316,7 @@ def test_hands_and_face_next_to_the_body_are_points_too(tmp_path):
     assert_array_equal(clip.points[0], np.concatenate([record["keypoints3d"], *rows.values()]))
 
 
-def test_one_hand_with_a_coco_body(tmp_path):
+def test_single_hand_is_joined_to_a_coco_body(tmp_path):
     record = points(0, 17, handr3d=points(0, 21)["keypoints3d"])
     write_frames(tmp_path / "keypoints3d", {0: [record]})
     layout, clip = opened(tmp_path)[1][0].points[0]
@@ -323,7 +326,7 @@ def test_one_hand_with_a_coco_body(tmp_path):
         (1, 38, 4),
     )
     assert layout.names[17:19] == ("right_hand_wrist", "right_thumb1")
-    # The hand attaches to the body's right wrist, COCO keypoint 10.
+    # The hand is attached to the right wrist of the body, COCO keypoint 10.
     assert [10, 18] in layout.limbs.tolist()
 
 
@@ -345,7 +348,7 @@ def test_keypoints_in_body_records_are_read(tmp_path):
 # The synthetic recording
 
 
-def test_synthetic_recording(shared_data):
+def test_synthetic_recording_has_the_published_people(shared_data):
     folder = shared_data / "smpl_synthetic" / "easymocap"
     if not folder.is_dir():
         pytest.skip("no synthetic recording")

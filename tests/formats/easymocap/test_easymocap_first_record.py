@@ -1,4 +1,4 @@
-"""An invalid first record: it becomes a gap, and does not define the layout of the others."""
+"""An invalid first record, which becomes a gap and does not define the layout of later records."""
 
 import json
 
@@ -12,7 +12,7 @@ INFINITE = json.loads("1e400")
 
 
 def fault_in(parts, path):
-    """Return the line and the text of the only error."""
+    """Return the line and text of the only error."""
     ((key, line, values),) = noticed(parts, path)
     assert key == "F007.record"
     return line, values["problem"]
@@ -43,7 +43,7 @@ def fault_in(parts, path):
          "problem": Phrase("record-count", expected=3, found=1)})),
     ],
 )  # fmt: skip
-def test_width_comes_from_usable_records(tmp_path, changes, message):
+def test_number_of_values_is_that_of_valid_records(tmp_path, changes, message):
     others = {"expression": [[0.5] * 10]} if "expression" in changes else {}
     good = [body(0, **others), body(1, **others)]
     first = json.dumps([{**good[0], **changes}, good[1]], indent=1)
@@ -56,7 +56,7 @@ def test_width_comes_from_usable_records(tmp_path, changes, message):
 
 
 @pytest.mark.parametrize("key", ["handl", "handr"])
-def test_width_of_hands_comes_from_usable_records(tmp_path, key):
+def test_number_of_hand_values_is_that_of_valid_records(tmp_path, key):
     good = body(0, 63, handl=[[0.5] * 6], handr=[[0.5] * 6])
     folder = write_frames(tmp_path / "smpl", {0: [{**good, key: [[None]]}], 1: [good]})
     _, parts, _ = opened(tmp_path)
@@ -66,7 +66,7 @@ def test_width_of_hands_comes_from_usable_records(tmp_path, key):
     assert (line, values) == (1, {"item": f"person 0: {key}", "problem": problem})
 
 
-def test_late_invalid_coefficients_do_not_set_the_width_either(tmp_path):
+def test_later_invalid_coefficients_do_not_determine_their_number(tmp_path):
     bare, bad, good = body(0, shapes=None), body(0, shapes=[[None]]), body(0)
     folder = write_frames(tmp_path / "smpl", {0: [bare], 1: [bad], 2: [good], 3: [good]})
     _, parts, _ = opened(tmp_path)
@@ -79,7 +79,7 @@ def test_late_invalid_coefficients_do_not_set_the_width_either(tmp_path):
 @pytest.mark.parametrize(
     "rows", [[[]], [[None] * 4], [[INFINITE, 0.0, 0.0, 1.0]], [[1.0, 2.0]], [["a", 1, 2]], [[[]]]]
 )
-def test_number_of_keypoints_comes_from_usable_records(tmp_path, rows):
+def test_number_of_keypoints_is_that_of_valid_records(tmp_path, rows):
     good, bad = [points(0), points(1)], points(0) | {"keypoints3d": rows}
     folder = write_frames(tmp_path / "keypoints3d", {0: [bad, good[1]], 1: good})
     _, parts, _ = opened(tmp_path)
@@ -92,7 +92,7 @@ def test_number_of_keypoints_comes_from_usable_records(tmp_path, rows):
     assert values["problem"].key in ("record-rows", "record-other-rows", "record-no-rows")
 
 
-def test_unseen_keypoints_determine_the_count(tmp_path):
+def test_undetected_keypoints_determine_the_number_of_keypoints(tmp_path):
     unseen = {"keypoints3d": [[0.0] * 4] * 25}
     write_frames(tmp_path / "keypoints3d", {0: [points(0) | unseen], 1: [points(0)]})
     _, parts, _ = opened(tmp_path)
@@ -108,7 +108,7 @@ def test_accepted_pose_lengths_are_listed(tmp_path):
     assert values == {"item": "person 0: poses", "problem": problem}
 
 
-def test_empty_record_has_no_keys(tmp_path):
+def test_empty_record_is_reported_without_keys(tmp_path):
     write_frames(tmp_path / "smpl", {0: [{}], 1: [body(0)]})
     _, parts, _ = opened(tmp_path)
     problem = Phrase("record-no-keys", expected=("poses", "keypoints3d"))

@@ -1,4 +1,4 @@
-"""Coefficients missing from records, which are repeated from earlier records."""
+"""Coefficients missing in records, which are repeated from earlier records."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ ROWS = np.array([[9.0, 9.0], [1.0, 2.0], [9.0, 9.0], [np.nan, 3.0], [9.0, 9.0]])
 GIVEN = np.array([False, True, False, True, False])
 
 
-def test_missing_rows_repeat_the_last_valid_one():
+def test_missing_rows_repeat_the_last_valid_row():
     expected = [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0], [np.nan, 3.0], [1.0, 2.0]]
     assert_array_equal(hold(ROWS, GIVEN, None), expected)
 
@@ -32,7 +32,7 @@ def test_last_valid_row_is_remembered():
     assert last_given(np.zeros((0, 2)), np.zeros(0, dtype=bool)) is None
 
 
-# In recordings
+# Recordings with missing coefficients
 
 
 def shapes_of(parts, person):
@@ -42,7 +42,7 @@ def shapes_of(parts, person):
     return np.concatenate(rows)[:, 0].tolist()
 
 
-def test_shapes_of_the_first_record_apply_to_all(tmp_path):
+def test_shapes_of_the_first_record_apply_to_all_records(tmp_path):
     bare = [body(0, shapes=None), body(1, shapes=None)]
     first = [body(0, shapes=[[2.0] * 10]), body(1, shapes=[[3.0] * 10])]
     folder = write_frames(tmp_path / "smpl", {0: first, **dict.fromkeys(range(1, 100), bare)})
@@ -55,7 +55,7 @@ def test_shapes_of_the_first_record_apply_to_all(tmp_path):
     ]
 
 
-def test_last_valid_shapes_are_kept(tmp_path):
+def test_last_valid_shapes_are_repeated(tmp_path):
     def record(value):
         return [body(0, shapes=None if value is None else [[value] * 10])]
 
@@ -66,7 +66,7 @@ def test_last_valid_shapes_are_kept(tmp_path):
     assert rows_of(parts, 0) == [0, 1, 2, 3, 5, 6, 7]
     found = [0.0, 1.0, 1.0, 2.0, 2.0, 2.0, 4.0]
     rows = [part.bodies[0] for part in parts]
-    assert rows[0].shape is None  # no record had a shape before
+    assert rows[0].shape is None  # no earlier record has a shape
     assert shapes_of(parts[1:], 0) == found[1:]
     names = [found.path.name for part in parts for found in part.warnings]
     assert names == ["000001.json", "000004.json", "000002.json"]
@@ -104,7 +104,7 @@ def test_untracked_people_do_not_inherit_shapes(tmp_path):
     assert shapes_of(parts, -1) == [5.0, 0.0, waves(10, seed=2)[0]]
 
 
-def test_expression_is_held_too(tmp_path):
+def test_expression_is_repeated(tmp_path):
     said = {"expression": [[0.5] * 10]}
     frames = {0: [body(0, 87)], 1: [body(0, 87, **said)], 2: [body(0, 87)]}
     write_frames(tmp_path / "smpl", frames)
@@ -114,7 +114,7 @@ def test_expression_is_held_too(tmp_path):
     assert parts[1].bodies[0].n_rows == 2
 
 
-def test_expression_appearing_within_a_part(tmp_path):
+def test_expression_may_start_within_a_part(tmp_path):
     frames = {frame: [body(0, 87), body(1, 87)] for frame in range(5)}
     frames[3] = [body(0, 87), body(1, 87, expression=[[0.5] * 10])]
     write_frames(tmp_path / "smpl", frames)
@@ -123,7 +123,7 @@ def test_expression_appearing_within_a_part(tmp_path):
     assert parts[1].bodies[1].expression[:, 0].tolist() == [0.0, 0.0, 0.5, 0.5]
 
 
-def test_record_without_poses_stays_a_gap(tmp_path):
+def test_record_without_poses_is_a_gap(tmp_path):
     write_frames(tmp_path / "smpl", {0: [body(0)], 1: [body(0, poses=None)], 2: [body(0)]})
     _, parts, _ = opened(tmp_path)
     assert rows_of(parts, 0) == [0, 2]
@@ -139,7 +139,7 @@ def test_invalid_record_without_shapes_does_not_affect_others(tmp_path):
 
 @pytest.mark.parametrize("key", ["shapes", "expression"])
 @pytest.mark.parametrize("empty", [[], [[]]], ids=["list", "matrix"])
-def test_empty_coefficients_count_as_missing(tmp_path, key, empty):
+def test_empty_coefficients_are_treated_as_missing(tmp_path, key, empty):
     missing = write_frames(tmp_path / "a", {0: [body(0, **{key: None})], 1: [body(0)]})
     written = write_frames(tmp_path / "b", {0: [body(0, **{key: empty})], 1: [body(0)]})
     expected, found = (opened(folder)[1] for folder in (missing, written))
@@ -152,7 +152,7 @@ def test_empty_coefficients_count_as_missing(tmp_path, key, empty):
             assert_array_equal(motion.shape, wanted.shape)
 
 
-def test_empty_shapes_hold_the_last_value(tmp_path):
+def test_empty_shapes_repeat_the_last_value(tmp_path):
     frames = {0: [body(0, shapes=[[2.0] * 10])], 1: [body(0, shapes=[])], 2: [body(0, shapes=[[]])]}
     write_frames(tmp_path / "smpl", frames)
     _, parts, _ = opened(tmp_path)

@@ -1,4 +1,4 @@
-"""Motions beyond the range of single precision, refused at the line of the value."""
+"""Motions beyond the range of single precision, which are refused at the line of the value."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ def tolerant(read, path):
     return read(source), source.diagnostics.errors
 
 
-def test_excess_is_detected_row_by_row():
+def test_positions_out_of_range_are_detected_row_by_row():
     rows = np.array([[[1e9, 0.0]], [[0.0, -1.0000001e9]], [[np.nan, 0.0]]])
     assert is_beyond(rows).tolist() == [False, True, False]
 
@@ -46,7 +46,7 @@ def test_far_translation_is_refused_with_its_key(tmp_path, far, key):
     assert (error.path, fault_of(error.diagnostic)) == (path, ("F003.motion-reach", None, values))
 
 
-def test_translation_is_measured_as_scaled(tmp_path):
+def test_translation_is_checked_after_scaling(tmp_path):
     path = motion_file(tmp_path / "a.npz", 5e10, smpl_scaling=np.array([100.0]))
     assert amass.read(Source.open(path)).translations[1, 2] == 5e8
 

@@ -1,4 +1,4 @@
-"""Reading of ``.fbx``: contents, units and axes, and failures of the child process."""
+"""The ``.fbx`` reader: contents, units and axes, and failures of the child process."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_nodes_keep_names_and_parents(strip: NodeFile) -> None:
 
 
 @needs_ufbx
-def test_materials_split_a_mesh_and_quads_become_triangles(strip: NodeFile) -> None:
+def test_mesh_is_split_by_material_and_quads_are_triangulated(strip: NodeFile) -> None:
     (mesh,) = strip.meshes
     assert [primitive.material for primitive in mesh.primitives] == [0, 1]
     assert [len(primitive.triangles) for primitive in mesh.primitives] == [2, 2]
@@ -47,7 +47,7 @@ def test_materials_split_a_mesh_and_quads_become_triangles(strip: NodeFile) -> N
 
 
 @needs_ufbx
-def test_influences_agree_with_the_clusters(strip: NodeFile) -> None:
+def test_influences_match_the_clusters(strip: NodeFile) -> None:
     (skin,), low = strip.skins, strip.meshes[0].primitives[0]
     assert skin.joints.tolist() == [2, 3] and skin.method == "lbs"
     assert_allclose(skin.inverse_bind[1][:3, 3], [0.0, -1.0, 0.0])
@@ -77,13 +77,13 @@ def test_keys_are_baked_at_the_frame_rate_of_the_file(strip: NodeFile) -> None:
     assert_allclose(turned.times, np.arange(25) / 24, atol=1e-12)
     half = np.radians(90.0 * turned.times) / 2
     expected = np.stack([0 * half, 0 * half, np.sin(half), np.cos(half)], axis=1)
-    assert_allclose(turned.values, expected, atol=1e-7)  # keys are float32
+    assert_allclose(turned.values, expected, atol=1e-7)  # keys are in single precision
     weights = channels[1, "weights"]
     assert_allclose(weights.values[[0, -1], 0], [0.0, 1.0])
 
 
 @needs_ufbx
-def test_up_axis_and_unit_of_the_file_are_kept(tmp_path: Path) -> None:
+def test_up_axis_and_unit_of_the_file_are_unchanged(tmp_path: Path) -> None:
     source = Source.open(write_strip(tmp_path, up="z", unit=100.0))
     content = node_file(source)
     assert (content.up, content.unit) == ("z", "m")
@@ -120,7 +120,7 @@ def test_invalid_contents_are_refused(tmp_path: Path) -> None:
         ("import os\nos._exit(0)\n", "exit code 0"),
     ],
 )
-def test_a_failed_child_process_is_reported_on_one_line(
+def test_failed_child_process_is_reported_on_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str, ending: str
 ) -> None:
     (tmp_path / "ufbx.py").write_text(library)
@@ -133,7 +133,9 @@ def test_a_failed_child_process_is_reported_on_one_line(
     assert ending in str(caught.value)
 
 
-def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_library_is_reported_by_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("viewer.formats._fbx.child.find_spec", lambda name: None)
     with pytest.raises(FormatError) as caught:
         node_file(Source.open(write_strip(tmp_path)))
@@ -141,7 +143,7 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert caught.value.diagnostic.key == "F001.fbx-extra"
 
 
-def test_a_truncated_message_is_detected() -> None:
+def test_truncated_message_of_the_child_is_detected() -> None:
     data = packed({"a": np.arange(3)}, {"b": 1})
     arrays, told = unpacked(data) or ({}, {})
     assert arrays["a"].tolist() == [0, 1, 2] and told == {"b": 1}
@@ -153,7 +155,7 @@ def test_a_truncated_message_is_detected() -> None:
     ("stack", "time", "reference"),
     [(0, 0.0, "base_0"), (1, 15 / 24, "spin_15"), (2, 20 / 24, "wiggle_20")],
 )
-def test_a_blender_file_agrees_with_its_exported_frames(
+def test_blender_file_matches_its_exported_frames(
     shared_data: Path, stack: int, time: float, reference: str
 ) -> None:
     folder = shared_data / "fbx"
@@ -168,12 +170,12 @@ def test_a_blender_file_agrees_with_its_exported_frames(
     lines = (folder / f"blender_279_sausage_{reference}.obj").read_text().splitlines()
     expected = np.array([line.split()[1:4] for line in lines if line.startswith("v ")], float)
     distances = np.linalg.norm(vertices[:, None] - expected, axis=-1)
-    assert distances.min(axis=0).max() < 1e-5  # metres, of a figure 4 m long; the file is float32
+    assert distances.min(axis=0).max() < 1e-5  # metres, for a figure 4 m long in single precision
     assert distances.min(axis=1).max() < 1e-5
 
 
 def _posed(content: NodeFile, keys: dict[tuple[int, str], np.ndarray]) -> np.ndarray:
-    """Return all vertices in world space, by the definition of a skin."""
+    """Return all vertices in world space by the definition of a skin."""
     tree = content.tree
     world: list[np.ndarray] = []
     for node in range(tree.n_nodes):

@@ -1,4 +1,4 @@
-"""The child process that reads ``.fbx``: lifetime of the library's objects."""
+"""The child process that reads ``.fbx`` keeps the library's objects until it exits."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ VALUES: tuple[Any, ...] = (
     *("", "x", "../x", "VEC3", "data:;base64,AAAA", "http://x/y", None, True, False),
     *([], [0], [[]], [None], ["x"], [1e38] * 4, [0] * 16, {}, {"extensions": {}}, {"a": [{}]}),
 )
-"""Replacement values, and a marker for removal: see ``changed``."""
+"""Replacement values, and a marker for removal; see ``changed``."""
 
 
 def complete() -> File:
@@ -57,7 +57,7 @@ def changed(seed: int, count: int) -> Iterator[bytes]:
 
 
 def _change(root: dict[str, Any], rng: random.Random) -> None:
-    """Replace or remove a random value below the root."""
+    """Replace or remove a random value inside the root object."""
     value: Any = root
     while True:
         keys = list(value) if isinstance(value, dict) else list(range(len(value)))

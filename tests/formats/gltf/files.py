@@ -1,4 +1,4 @@
-"""Small glTF files, built array by array."""
+"""Small glTF files that are built array by array."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ class File:
 
     @property
     def primitive(self) -> dict[str, Any]:
-        """First primitive of the first mesh."""
+        """The first primitive of the first mesh."""
         return self.root["meshes"][0]["primitives"][0]
 
     def json(self, uri: str | None = None) -> bytes:
@@ -85,7 +85,7 @@ class File:
 
 
 def glb(chunks: list[tuple[bytes, bytes]]) -> bytes:
-    """Return a binary file made of chunks."""
+    """Return a binary file that consists of the given chunks."""
     body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
@@ -115,7 +115,7 @@ def skinned(**attributes: Any) -> File:
 def animated(
     path: str = "translation", values: Any = ((0, 0, 0), (1, 0, 0)), **sampler: Any
 ) -> File:
-    """Return a node with an animation whose keys are at 0 and 1 seconds."""
+    """Return a node with an animation that has keys at 0 and 1 seconds."""
     file = File(nodes=[{}])
     samplers = [{"input": file.times([0.0, 1.0]), "output": file.accessor(values), **sampler}]
     channels = [{"sampler": 0, "target": {"node": 0, "path": path}}]

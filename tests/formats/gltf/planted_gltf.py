@@ -1,4 +1,4 @@
-"""Documents with one error each, by the code under which lint reports the error."""
+"""Documents with one error each, keyed by the code under which lint reports it."""
 
 from __future__ import annotations
 

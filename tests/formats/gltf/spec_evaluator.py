@@ -1,6 +1,5 @@
-"""Vertices of a glTF file, computed from its bytes as the specification defines them.
-
-Shares no code with the viewer. All computations are in the precision that is asked for.
+"""Vertices of a glTF file, computed from its bytes as the specification defines them. It shares no
+code with the viewer and computes in the requested precision.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ SIZES = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
 class Evaluator:
-    """One file of triangles, whose images and extensions are ignored."""
+    """A file of triangles; images and extensions are ignored."""
 
     def __init__(self, path: Path, precision: type = np.float64) -> None:
         self.precision, self.path = precision, path
@@ -36,7 +35,7 @@ class Evaluator:
     # Arrays
 
     def bytes_of(self, view: int) -> tuple[bytes, int]:
-        """Return the bytes from the start of a buffer view on, and its stride."""
+        """Return the bytes of a buffer view up to the end of its buffer, and its stride."""
         item = self.root["bufferViews"][view]
         uri = self.root["buffers"][item["buffer"]].get("uri")
         if uri is None:
@@ -48,7 +47,7 @@ class Evaluator:
         return whole[item.get("byteOffset", 0) :], item.get("byteStride", 0)
 
     def array(self, index: int) -> np.ndarray:
-        """Return an accessor: (N, C); normalised integers are fractions (3.6.2.2)."""
+        """Return the values of an accessor, (N, C); normalised integers are fractions (3.6.2.2)."""
         item = self.root["accessors"][index]
         kind, width = np.dtype(FORMATS[item["componentType"]]), SIZES[item["type"]]
         rows = np.zeros((item["count"], width), kind)
@@ -76,12 +75,12 @@ class Evaluator:
     # Posing
 
     def key_times(self, animation: int) -> np.ndarray:
-        """Return the times of all keys of an animation, ascending."""
+        """Return the times of all keys of an animation in ascending order."""
         samplers = self.root["animations"][animation]["samplers"]
         return np.unique(np.concatenate([self.array(each["input"])[:, 0] for each in samplers]))
 
     def posed(self, animation: int | None, time: float) -> list[dict[str, Any]]:
-        """Return the nodes with animated members replaced."""
+        """Return the nodes with their animated members replaced."""
         nodes = [dict(node) for node in self.nodes]
         if animation is None:
             return nodes
@@ -117,7 +116,7 @@ class Evaluator:
         return value / np.linalg.norm(value) if turns else value
 
     def slerp(self, a: np.ndarray, b: np.ndarray, t: Any) -> np.ndarray:
-        """Return a rotation on the shorter arc, from the unit quaternion at right angles to a."""
+        """Return a rotation on the shorter arc, using the unit quaternion orthogonal to a."""
         b = b if a @ b >= 0 else -b
         aside = b - (a @ b) * a
         length = np.linalg.norm(aside)
@@ -127,7 +126,7 @@ class Evaluator:
         return np.cos(angle) * a + np.sin(angle) * aside / length
 
     def local(self, node: dict[str, Any]) -> np.ndarray:
-        """Return the local matrix of a node: as given, or T R S."""
+        """Return the local matrix of a node, as given or as T R S."""
         if "matrix" in node:
             return np.array(node["matrix"], self.precision).reshape(4, 4).T
         quaternion = np.array(node.get("rotation", (0, 0, 0, 1)), self.precision)

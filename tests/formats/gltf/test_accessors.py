@@ -22,7 +22,9 @@ def accessors(file: File) -> Accessors:
         ("H", [0, 65535, 13107, 0], [0.0, 1.0, 0.2, 0.0]),
     ],
 )
-def test_normalised_integers(kind: str, values: list[int], fractions: list[float]) -> None:
+def test_normalised_integers_are_read_as_fractions(
+    kind: str, values: list[int], fractions: list[float]
+) -> None:
     file = File()
     file.accessor([values], kind, normalized=True)
     file.accessor([values], kind)
@@ -32,7 +34,7 @@ def test_normalised_integers(kind: str, values: list[int], fractions: list[float
     assert found.integers(1, ("VEC4",), "")[0].tolist() == values
 
 
-def test_large_integers_are_kept() -> None:
+def test_large_integers_are_exact() -> None:
     file = File()
     file.accessor([0, 2**32 - 1], "I")
     assert accessors(file).integers(0, ("SCALAR",), "")[:, 0].tolist() == [0, 2**32 - 1]
@@ -59,7 +61,7 @@ def test_columns_of_small_matrices_are_aligned_to_4_bytes() -> None:
         "accessors",
         {"bufferView": file.view(data), "componentType": 5121, "count": 1, "type": "MAT2"},
     )
-    data = bytes([1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9])  # without padding at the end
+    data = bytes([1, 2, 3, 0, 4, 5, 6, 0, 7, 8, 9])  # the last row has no padding
     file.add(
         "accessors",
         {"bufferView": file.view(data), "componentType": 5121, "count": 1, "type": "MAT3"},
@@ -69,7 +71,7 @@ def test_columns_of_small_matrices_are_aligned_to_4_bytes() -> None:
     assert found.floats(1, ("MAT3",), "").tolist() == [[1, 2, 3, 4, 5, 6, 7, 8, 9]]
 
 
-def test_matrices_are_stored_by_column() -> None:
+def test_matrices_are_read_column_by_column() -> None:
     file = File()
     file.accessor([[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 5, 6, 7, 1]])
     [matrix] = accessors(file).matrices(0, "")
@@ -77,7 +79,7 @@ def test_matrices_are_stored_by_column() -> None:
 
 
 def sparse(file: File, indices: list[int], values: list[float], **members: object) -> None:
-    """Append an accessor of four numbers, some of which are replaced."""
+    """Append a sparse accessor of four numbers, some of which are replaced."""
     replaced = {
         "count": len(indices),
         "indices": {
@@ -133,9 +135,9 @@ def test_invalid_accessors_are_refused(members: dict[str, object], key: str, poi
     assert (found.key, found.pointer) == (key, f"/accessors/0{pointer}")
 
 
-def test_components_that_are_not_kept_do_not_count_as_decoded() -> None:
+def test_components_that_are_not_cached_do_not_count_towards_the_decoding_limit() -> None:
     file = File()
-    # 36 MB per reading, of 256 MB that every file may decode.
+    # Each reading decodes 36 MB; the limit of a file is 256 MB.
     accessor = {"componentType": 5121, "count": 4_000_000, "type": "SCALAR"}
     indices = {"bufferView": file.view(bytes([3])), "componentType": 5121}
     values = {"bufferView": file.view(bytes([7]))}
@@ -147,7 +149,7 @@ def test_components_that_are_not_kept_do_not_count_as_decoded() -> None:
     assert read.floats(0, ("SCALAR",), "")[3, 0] == 7.0
 
 
-def test_accessor_without_data_cannot_exhaust_memory() -> None:
+def test_large_accessor_without_data_is_refused() -> None:
     file = File()
     file.add("accessors", {"componentType": 5126, "count": 2**31, "type": "MAT4"})
     with pytest.raises(FormatError) as caught:

@@ -1,4 +1,4 @@
-"""Hundreds of broken documents, each read or refused with one line that names the file."""
+"""Hundreds of broken documents, each of which is read or refused in one line with the file name."""
 
 from collections.abc import Iterable
 
@@ -13,12 +13,12 @@ from viewer.formats._gltf.node_file import read_nodes
 
 
 def refusals(files: Iterable[bytes]) -> list[str]:
-    """Read files, with and without keeping errors, and return the messages of those refused."""
+    """Read files with and without collecting errors; return the messages of the refused files."""
     found = []
     for data in files:
         kept = Source("a.gltf", data, diagnostics=Collector(keeps_errors=True))
         try:
-            # A kept error does not prevent others from being found.
+            # A collected error does not prevent further errors from being found.
             read_nodes(kept)
         except FormatError as problem:
             kept.diagnostics.add(problem.diagnostic)
@@ -32,7 +32,7 @@ def refusals(files: Iterable[bytes]) -> list[str]:
     return found
 
 
-def test_the_unbroken_document_is_valid() -> None:
+def test_unchanged_document_is_valid() -> None:
     assert warned(complete()) == []
     assert len(read(source_of(complete())).figures) == 2
 
@@ -51,7 +51,7 @@ def test_truncated_files_are_read_or_refused() -> None:
         assert line.startswith("a.gltf") and "\n" not in line
 
 
-def test_changed_documents_give_figures_or_are_refused() -> None:
+def test_changed_documents_are_read_as_figures_or_refused() -> None:
     for data in changed(9, 60):
         for keeps_errors in (False, True):
             source = Source("a.gltf", data, diagnostics=Collector(keeps_errors=keeps_errors))

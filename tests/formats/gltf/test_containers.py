@@ -1,4 +1,4 @@
-"""Containers of glTF: chunks and lengths of GLB, JSON, and embedded and external buffers."""
+"""Containers of glTF: GLB chunks and lengths, JSON, and embedded and external buffers."""
 
 import json
 import struct
@@ -27,12 +27,12 @@ def test_text_and_binary_files_have_the_same_contents() -> None:
         assert warned(data) == []
 
 
-def test_a_binary_file_may_end_with_a_control_z() -> None:
+def test_binary_file_may_end_with_a_control_z() -> None:
     data = glb([(b"JSON", TEXT + b" "), (b"odd\x1a", b"\x1a" * 4)])
     assert source_of(data).data == data and warned(data) == []
 
 
-def test_unknown_chunks_are_skipped_and_repeated_ones_reported() -> None:
+def test_unknown_chunks_are_skipped_and_repeated_chunks_reported() -> None:
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     chunks = [(b"JSON", text), (b"NOTE", b"?"), (b"BIN\0", file.binary), (b"BIN\0", b"more")]
@@ -45,7 +45,7 @@ def test_json_chunk_may_be_padded_with_white_space_or_zeros(padding: bytes) -> N
     assert read(glb([(b"JSON", TEXT + padding)])).tree.names == ("a",)
 
 
-def test_chunks_after_uncounted_padding_are_found() -> None:
+def test_chunks_after_padding_outside_the_chunk_length_are_found() -> None:
     file = triangle()
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     text += b" " * ((1 - len(text)) % 4)  # one more than a multiple of 4
@@ -55,7 +55,7 @@ def test_chunks_after_uncounted_padding_are_found() -> None:
     assert len(read(data).meshes) == 1 and warned(data) == []
 
 
-def test_wrong_lengths_are_warnings_if_no_data_are_lost() -> None:
+def test_wrong_lengths_are_warnings_if_no_data_are_missing() -> None:
     data = triangle().glb()
     longer = data[:8] + struct.pack("<I", len(data) + 8) + data[12:]
     shorter = data[:8] + struct.pack("<I", 0) + data[12:]
@@ -99,6 +99,8 @@ def test_binary_chunk_may_be_longer_than_its_buffer() -> None:
         ('{"asset": {}}'.encode("utf-16"), "F002.gltf-utf-16"),
         (b"[1]", "F002.gltf-type"),
         (b'{"asset": {"version": "1.0"}}', "F002.gltf-version"),
+        (b'{"asset": {"version": 1}}', "F002.gltf-version"),
+        (b'{"asset": {"version": true}}', "F002.gltf-type"),
         (b'{"asset": {"version": "1.0"}, "buffers": {}, "accessors": {}}', "F002.gltf-version"),
         (b'{"asset": {"version": "2.0", "minVersion": "2.1"}}', "F002.gltf-version"),
         (b'{"asset": {"version": 2.0}}', "F002.gltf-type"),
@@ -114,13 +116,13 @@ def test_syntax_errors_have_a_line_number() -> None:
     assert str(caught.value).startswith("a.gltf:3: expected JSON, found a syntax error")
 
 
-def test_texts_above_half_a_gigabyte_are_refused(monkeypatch) -> None:
+def test_json_above_half_a_gigabyte_is_refused(monkeypatch) -> None:
     monkeypatch.setattr("viewer.formats._gltf.json_text._MOST_BYTES", 50)
     assert refused(TEXT) == ("F001.gltf-text", "")
     assert len(read(b'{"asset": {"version": "2.0"}}').meshes) == 0
 
 
-def test_deviations_from_json_are_warnings() -> None:
+def test_deviations_from_json_are_reported_as_warnings() -> None:
     head = b'{"asset": {"version": "2.0"}, '
     assert warned(head + b'"extras": NaN, "nodes": [], "nodes": [{}]}') == [
         ("G001.constants", ""),
@@ -188,7 +190,7 @@ def test_external_files_are_read(tmp_path: Path, name: str, uri: str) -> None:
     assert source.also_read == [tmp_path / name]
 
 
-def test_missing_file_is_named_in_the_error(tmp_path: Path) -> None:
+def test_missing_external_file_is_named_in_the_error(tmp_path: Path) -> None:
     with pytest.raises(FormatError, match=r"a\.gltf#/buffers/0/uri: .*gone\.bin: cannot be read"):
         read(triangle().json("gone.bin"), tmp_path / "a.gltf")
 

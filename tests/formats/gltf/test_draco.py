@@ -33,7 +33,7 @@ def test_positions_and_triangles_are_decoded() -> None:
     assert primitive.triangles.tolist() == [[0, 1, 2], [1, 3, 2]]
 
 
-def test_counts_are_taken_from_the_compressed_data() -> None:
+def test_vertex_count_is_that_of_the_compressed_data() -> None:
     pytest.importorskip("DracoPy")
     file = compressed()
     file.root["accessors"][0]["count"] = 2**40
@@ -58,7 +58,7 @@ def test_invalid_data_are_refused(file: File, key: str, pointer: str) -> None:
     assert refused(file) == (key, pointer)
 
 
-def test_an_uncompressed_form_is_required_without_the_library(monkeypatch) -> None:
+def test_uncompressed_data_are_required_without_the_library(monkeypatch) -> None:
     monkeypatch.setitem(sys.modules, "DracoPy", None)
     assert refused(compressed()) == ("F002.gltf-draco", POINTER)
     file = compressed()

@@ -91,14 +91,14 @@ def test_pointers_to_nodes_and_weights_are_channels() -> None:
 
 
 @pytest.mark.parametrize("pointer", ["/materials/0/emissiveFactor", "/nodes/7/scale", ""])
-def test_pointers_to_anything_else_are_not_used(pointer: str) -> None:
+def test_pointers_to_other_properties_are_ignored(pointer: str) -> None:
     file = animated()
     pointing(file, pointer)
     assert read(file).animations[0].read() == ()
     assert warned(file) == [("F007.gltf-channels", "/animations/0/channels/0")]
 
 
-def test_channels_without_node_or_with_unknown_path_are_not_used() -> None:
+def test_channels_without_node_or_with_unknown_path_are_ignored() -> None:
     file = animated()
     sampler = {"sampler": 0}
     file.root["animations"][0]["channels"] += [
@@ -142,7 +142,7 @@ def test_undeclared_range_is_read_from_the_keys(members: dict[str, object]) -> N
 
 
 def with_two(file: File) -> File:
-    """Return the file with a second, valid animation, which shares the samplers of the first."""
+    """Return the file with a second, valid animation that shares the samplers of the first."""
     file.root["nodes"].append({})
     samplers = [{"input": file.times([0.0, 2.0]), "output": file.accessor([[0, 0, 0]] * 2)}]
     channels = [{"sampler": 0, "target": {"node": 1, "path": "translation"}}]
@@ -174,7 +174,7 @@ def test_animation_with_invalid_keys_is_omitted(times: object, values: object, k
     assert [found.key for found in source.diagnostics.errors] == [key]
 
 
-def test_last_of_several_keys_at_one_time_is_used() -> None:
+def test_last_of_several_keys_at_the_same_time_is_used() -> None:
     file = animated()
     times, values = file.times([0.0, 1.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0], [2, 0, 0]])
     file.root["animations"][0]["samplers"] = [{"input": times, "output": values}]
@@ -182,7 +182,7 @@ def test_last_of_several_keys_at_one_time_is_used() -> None:
     assert warned(file) == [("G005.equal-times", "/animations/0/samplers")]
 
 
-def test_declared_range_is_compared_with_the_keys() -> None:
+def test_declared_range_that_differs_from_the_keys_is_reported() -> None:
     file = animated()
     file.root["accessors"][0]["max"] = [9]
     assert read(file).animations[0].end == 9.0
@@ -194,7 +194,7 @@ def test_rotation_key_of_zeros_is_refused() -> None:
     assert warned(file) == [("G005.animation", "/animations/0/samplers/0/output")]
 
 
-def test_keys_of_later_animations_are_read_on_playback() -> None:
+def test_keys_of_later_animations_are_read_when_played() -> None:
     file = with_two(animated())
     sampler = file.root["animations"][1]["samplers"][0]
     sampler["output"] = file.accessor([[0, 0, 0], [np.nan, 0, 0]])

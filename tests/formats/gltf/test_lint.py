@@ -1,4 +1,4 @@
-"""Findings of lint in glTF files: every code of the reader, at its JSON pointer."""
+"""Findings of lint in glTF files, with every code of the reader at its JSON pointer."""
 
 from pathlib import Path
 
@@ -13,7 +13,7 @@ from viewer.rig.motion.animation_choice import play_animation
 
 
 @pytest.mark.parametrize("code", PLANTED)
-def test_a_planted_error_is_found(tmp_path: Path, code: str) -> None:
+def test_planted_error_is_found(tmp_path: Path, code: str) -> None:
     made, pointer = PLANTED[code]
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
@@ -21,7 +21,7 @@ def test_a_planted_error_is_found(tmp_path: Path, code: str) -> None:
     assert ("warning", path, pointer) in {(one.severity, one.file, one.pointer) for one in found}
 
 
-def test_a_valid_file_has_none_of_these_codes(tmp_path: Path) -> None:
+def test_valid_file_has_none_of_these_codes(tmp_path: Path) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(skinned().json())
     assert {finding.code for finding in lint_files([path])[1]}.isdisjoint(PLANTED)
@@ -41,7 +41,7 @@ def test_several_errors_are_found(tmp_path: Path) -> None:
 def test_findings_of_checks_have_a_json_pointer(tmp_path: Path) -> None:
     file = skinned()
     file.root["nodes"][2]["name"] = "hip"
-    # The first joint of the skin, node 1, has no name; the second is not where it was bound.
+    # The first joint of the skin, node 1, has no name; the second is not at its bind position.
     file.root["nodes"][2]["translation"] = [0, 2, 0]
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
@@ -51,7 +51,7 @@ def test_findings_of_checks_have_a_json_pointer(tmp_path: Path) -> None:
     assert found["M005"].place(is_short=True) == "a.gltf#/meshes/0/primitives/0/attributes/POSITION"
 
 
-def test_findings_about_motion_name_the_animation(tmp_path: Path) -> None:
+def test_findings_about_motion_refer_to_the_animation(tmp_path: Path) -> None:
     # The node jumps by 1000 times the size of its mesh within a second.
     file = animated("translation", [[0, 0, 0], [1000, 0, 0]])
     file.mesh()
@@ -60,19 +60,19 @@ def test_findings_about_motion_name_the_animation(tmp_path: Path) -> None:
     path.write_bytes(file.json())
     (found,) = [finding for finding in lint_files([path])[1] if finding.code == "C003"]
     assert found.place() == f"{path}#/animations/0"
-    # At 15 sizes per second; the size is the diagonal of the triangle's box, the root of 2.
+    # The node moves at 15 sizes per second; the size is the diagonal of the triangle's box, sqrt 2.
     assert found.diagnostic.values["limit"] == "21.2 m/s"
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_errors_of_the_validator_are_found(tmp_path: Path, fault: str) -> None:
+def test_errors_reported_by_the_validator_are_found(tmp_path: Path, fault: str) -> None:
     made, code, pointer = FAULTS[fault]
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
     assert (code, pointer) in {(one.code, one.pointer) for one in lint_files([path])[1]}
 
 
-def test_a_file_that_follows_the_specification_has_no_errors(tmp_path: Path) -> None:
+def test_valid_file_has_no_errors(tmp_path: Path) -> None:
     file = skinned()
     path = tmp_path / "a.gltf"
     path.write_bytes(file.json())
@@ -83,7 +83,7 @@ def test_a_file_that_follows_the_specification_has_no_errors(tmp_path: Path) -> 
     ("path", "end", "code"),
     [("translation", [1000, 0, 0], "C003"), ("rotation", [1, 0, 0, 0], "C004")],
 )
-def test_steps_between_keys_are_no_jumps(
+def test_steps_between_keys_are_not_reported_as_jumps(
     tmp_path: Path, path: str, end: list[float], code: str
 ) -> None:
     rest = [0, 0, 0, 1] if path == "rotation" else [0, 0, 0]
@@ -100,7 +100,7 @@ def test_steps_between_keys_are_no_jumps(
 
 
 def with_two_animations(folder: Path) -> Path:
-    """Write a node with a mesh that jumps in its second animation."""
+    """Write a file with a mesh that jumps in the second animation."""
     file = animated("translation", [[0, 0, 0], [0.1, 0, 0]])
     file.mesh()
     file.root["nodes"][0]["mesh"] = 0
@@ -121,7 +121,9 @@ def test_all_animations_are_checked(tmp_path: Path, playing: str) -> None:
     assert (found.place(), found.motion, found.animation) == (f"{path}#/animations/1", "leap", 1)
 
 
-def test_animations_of_an_open_scene_have_the_places_of_the_file(tmp_path: Path) -> None:
+def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(
+    tmp_path: Path,
+) -> None:
     path = with_two_animations(tmp_path)
     scene = load(path)
     (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]

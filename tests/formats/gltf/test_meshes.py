@@ -22,7 +22,7 @@ def only(file: File) -> Primitive:
         (6, [[1, 2, 0], [2, 3, 0]]),
     ],
 )
-def test_modes_without_indices_give_triangles(mode: int, triangles: list[list[int]]) -> None:
+def test_modes_without_indices_are_read_as_triangles(mode: int, triangles: list[list[int]]) -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive["mode"] = mode
@@ -33,7 +33,7 @@ def test_degenerate_triangles_of_strips_are_omitted() -> None:
     file = File()
     file.mesh(SQUARE)
     file.primitive.update(mode=5, indices=file.accessor([0, 1, 2, 2, 1, 1, 3], "B"))
-    # After 0 1 2, the triangles 2 2 1, 2 1 1, 1 1 3 and 1 2 2 have no area.
+    # The triangles 2 2 1, 2 1 1, 1 1 3 and 1 2 2, which follow 0 1 2, have no area.
     assert only(file).triangles.tolist() == [[0, 1, 2]]
 
 
@@ -55,7 +55,7 @@ def test_points_and_lines_are_reported_once() -> None:
     assert warned(file) == [("F007.gltf-undrawn", "/meshes/0/primitives/0")]
 
 
-def test_primitives_that_share_vertices_keep_the_used_ones() -> None:
+def test_primitives_that_share_vertices_keep_only_the_used_vertices() -> None:
     file = File()
     file.mesh(SQUARE, TEXCOORD_0=file.accessor([[0, 0], [1, 0], [0, 1], [1, 1]]))
     first = file.primitive
@@ -81,10 +81,10 @@ def test_v_is_0_at_the_bottom_of_images() -> None:
     file.mesh(TEXCOORD_1=uvs)
     first, second = only(file).uvs
     assert second == pytest.approx(np.array([[0, 1], [1, 1], [0, 0.8]]), abs=1e-15)
-    assert first.shape == (3, 2)  # materials refer to sets by their numbers
+    assert first.shape == (3, 2)  # materials refer to sets by number
 
 
-def test_colours_are_linear_with_opacity() -> None:
+def test_colours_are_read_as_linear_with_opacity() -> None:
     file = File()
     file.mesh(COLOR_0=file.accessor([[0.5, 0.25, 2], [0, 0, 0], [1, 1, 1]]))
     assert only(file).colors.tolist() == [[0.5, 0.25, 2, 1], [0, 0, 0, 1], [1, 1, 1, 1]]
@@ -94,7 +94,7 @@ def test_colours_are_linear_with_opacity() -> None:
     assert warned(file) == [("G002.normalized", "/accessors/0")]
 
 
-def test_quantised_attributes() -> None:
+def test_quantised_attributes_are_read() -> None:
     file = File(extensionsRequired=["KHR_mesh_quantization"])
     positions = file.accessor([[0, 0, 0, 0], [2, 0, 0, 0], [0, -3, 0, 0]], "h")
     file.root["accessors"][positions]["type"] = "VEC3"
@@ -152,7 +152,7 @@ def targets(file: File, **members: object) -> None:
     file.root["meshes"][0] |= members
 
 
-def test_morph_targets() -> None:
+def test_morph_targets_are_read_with_names_and_weights() -> None:
     file = File(nodes=[{"mesh": 0, "weights": [0.5, 2]}])
     file.mesh()
     targets(file, weights=[0, 0.25], extras={"targetNames": ["up", "aside"]})
@@ -166,7 +166,7 @@ def test_morph_targets() -> None:
     assert primitive.normal_targets.dense().tolist() == [[[1, 0, 0]] * 3, [[0, 0, 0]] * 3]
 
 
-def test_names_of_morph_targets_may_be_in_several_places() -> None:
+def test_morph_target_names_are_read_from_several_places() -> None:
     file = File()
     file.mesh()
     targets(file)

@@ -1,4 +1,4 @@
-"""Compressed buffer views: streams written by meshoptimizer 1.0, and a hand-made group."""
+"""Compressed buffer views: streams written by meshoptimizer 1.0, and a group encoded by hand."""
 
 import json
 from typing import Any
@@ -35,7 +35,7 @@ INDEX_STREAM = "d10004040002080204040c020202020812081c00000000"
 
 
 def rotated(corners: np.ndarray) -> list[list[int]]:
-    """Return triangles that begin at their smallest corner, as the encoder rotates them."""
+    """Return triangles that start with the smallest index, because the encoder rotates them."""
     rows = corners.reshape(-1, 3).tolist()
     return [row[row.index(min(row)) :] + row[: row.index(min(row))] for row in rows]
 
@@ -54,9 +54,9 @@ def test_attributes_are_decoded(text: str, expected: np.ndarray) -> None:
     assert found is not None and found.tobytes() == expected.tobytes()
 
 
-def test_deltas_agree_with_the_example_in_the_specification() -> None:
+def test_deltas_match_the_example_in_the_specification() -> None:
     group = "175ff0bc77a9210034b5"
-    # One group of 4 bits, three of zeros, and an element of zeros at the end.
+    # One group of 4 bits is followed by three groups of zeros and an element of zeros.
     data = stream("a0" + "02" + group + "000000" + "00" * 32)
     found = decoded_attributes(data, 16, 4)
     deltas = [-1, -4, -3, 26, -91, 0, -6, 6, -4, -4, 5, -5, 1, -1, 0, 0]
@@ -93,7 +93,7 @@ def test_triangles_and_indices_are_decoded(stride: int) -> None:
                 np.array([[0, 0, 1, 1], [0, 0, -1, -1], [0.6, 0, -0.8, 1], [-0.48, 0.6, 0.64, 1]])
                 * 32767
             ),
-            10,  # 12 bits were stored
+            10,  # 12 bits are stored
         ),
         (
             (
@@ -122,7 +122,7 @@ def test_triangles_and_indices_are_decoded(stride: int) -> None:
     ],
     ids=["octahedral", "octahedral 16", "quaternion", "exponential", "color"],
 )
-def test_filters_agree_with_the_encoder(
+def test_filters_match_the_values_given_to_the_encoder(
     text: str, count: int, stride: int, name: str, dtype: str, expected: Any, step: int
 ) -> None:
     decoded = decoded_attributes(stream(text), count, stride)
@@ -179,7 +179,7 @@ def text_of(file: File) -> bytes:
 
 
 @pytest.mark.parametrize("extension", ["EXT_meshopt_compression", "KHR_meshopt_compression"])
-def test_file_without_uncompressed_data_is_read(extension: str) -> None:
+def test_file_with_only_compressed_data_is_read(extension: str) -> None:
     [primitive] = read(text_of(compressed(extension))).meshes[0].primitives
     assert primitive.positions.tolist() == SHORTS[:, :3].tolist()
     assert rotated(primitive.triangles) == rotated(np.array(TRIANGLES))

@@ -1,4 +1,4 @@
-"""Nodes: tree, transforms, scenes and cameras."""
+"""Nodes of glTF files: tree, transforms, scenes and cameras."""
 
 import math
 
@@ -16,7 +16,7 @@ HALF = math.sqrt(0.5)
 
 
 def local(tree: NodeTree, node: int) -> np.ndarray:
-    """Return the local matrix of a node, from its definition."""
+    """Return the local matrix of a node by its definition."""
     if node in tree.matrices:
         return tree.matrices[node]
     matrix = np.eye(4)
@@ -30,7 +30,7 @@ def with_matrix(matrix: np.ndarray) -> NodeTree:
     return read(File(nodes=[{"matrix": columns}])).tree
 
 
-def test_tree_names_and_extras() -> None:
+def test_tree_names_and_extras_are_read() -> None:
     nodes = [
         {"name": "a", "children": [2]},
         {"children": [0], "extras": {"kind": 1}},
@@ -86,8 +86,8 @@ def test_sheared_matrices_are_kept_exactly() -> None:
     assert tree.translations.tolist() == [[0, 0, 0]] and tree.scales.tolist() == [[1, 1, 1]]
 
 
-def test_rounding_is_not_shear() -> None:
-    # A rotation by 30 degrees, rounded to six digits as text exporters do.
+def test_rounding_is_not_treated_as_shear() -> None:
+    # A rotation by 30 degrees, rounded to six digits as by exporters to text.
     matrix = np.eye(4)
     matrix[:2, :2] = [[0.866025, -0.5], [0.5, 0.866025]]
     assert not with_matrix(matrix).matrices
@@ -118,7 +118,7 @@ def test_invalid_nodes_are_refused(nodes: list[object], key: str, pointer: str) 
     assert refused(File(nodes=nodes)) == (key, pointer)
 
 
-def test_all_errors_are_reported_if_errors_are_kept() -> None:
+def test_all_errors_are_reported_if_errors_are_collected() -> None:
     nodes = [{"children": [1, 1]}, {"children": [0]}, {"children": [1]}]
     source = Source("a.gltf", File(nodes=nodes).json(), diagnostics=Collector(keeps_errors=True))
     tree = read_nodes(source).tree
@@ -129,7 +129,7 @@ def test_all_errors_are_reported_if_errors_are_kept() -> None:
     assert tree.parents.tolist() == [-1, 0, -1]
 
 
-def test_deep_trees_need_no_recursion() -> None:
+def test_deep_trees_are_read_without_recursion() -> None:
     count = 20_000
     nodes = [{"children": [index + 1]} for index in range(count - 1)] + [{}]
     tree = read(File(nodes=nodes)).tree
@@ -175,7 +175,7 @@ def test_cameras_are_read() -> None:
     assert warned(file) == [("G003.camera", "/cameras/2/perspective/yfov")]
 
 
-def test_application_data_are_kept() -> None:
+def test_application_data_are_preserved() -> None:
     file = File(nodes=[{}], extras=[1], extensions={"VRMC_vrm": {"specVersion": "1.0"}})
     file.root["asset"]["generator"] = "by hand"
     content = read_nodes(source_of(file, "folder/hero.gltf"))

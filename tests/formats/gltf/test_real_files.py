@@ -17,7 +17,7 @@ def opened(folder: Path, name: str) -> NodeFile:
     return content
 
 
-def test_fox(shared_data: Path) -> None:
+def test_fox_has_the_published_counts(shared_data: Path) -> None:
     content = opened(shared_data, "Fox.glb")
     assert [animation.name for animation in content.animations] == ["Survey", "Walk", "Run"]
     assert len(content.skins[0].joints) == 24
@@ -27,7 +27,7 @@ def test_fox(shared_data: Path) -> None:
     assert 150 < np.ptp(primitive.positions, axis=0)[2] < 160
 
 
-def test_animations_with_constant_keys_that_start_late(shared_data: Path) -> None:
+def test_animations_with_late_constant_keys_are_read(shared_data: Path) -> None:
     content = opened(shared_data, "fox-animations.glb")
     assert len(content.animations) == 14
     channels = [channel for animation in content.animations for channel in animation.read()]
@@ -35,15 +35,15 @@ def test_animations_with_constant_keys_that_start_late(shared_data: Path) -> Non
     assert min(animation.start for animation in content.animations) > 0.0
 
 
-def test_cesium_man(shared_data: Path) -> None:
+def test_cesium_man_has_the_published_counts(shared_data: Path) -> None:
     content = opened(shared_data, "cesium_man.gltf")
     weights = content.meshes[0].primitives[0].weights
     assert weights is not None
     assert (np.abs(weights.sum(axis=1) - 1.0) > 1e-3).sum() == 210
-    assert not content.tree.matrices  # rotations with rounding
+    assert not content.tree.matrices  # rotations include rounding
 
 
-def test_ten_influences(shared_data: Path) -> None:
+def test_vertices_may_have_ten_influences(shared_data: Path) -> None:
     [primitive] = (
         read_nodes(Source.open(shared_data / "gltf" / "quad_skin.glb")).meshes[0].primitives
     )
@@ -58,14 +58,16 @@ def test_ten_influences(shared_data: Path) -> None:
         ("01_morphed_cube_no_uv.gltf", "weights", ("Top",)),
     ],
 )
-def test_splines(shared_data: Path, name: str, path: str, names: tuple[str, ...]) -> None:
+def test_spline_animations_are_read(
+    shared_data: Path, name: str, path: str, names: tuple[str, ...]
+) -> None:
     content = opened(shared_data, name)
     [channel] = content.animations[0].read()
     assert (channel.path, channel.interpolation) == (path, "cubic")
     assert content.meshes[0].target_names == names
 
 
-def test_skeleton_without_mesh(shared_data: Path) -> None:
+def test_skeleton_without_mesh_is_read(shared_data: Path) -> None:
     content = opened(shared_data, "rig-fox.glb")
     assert content.meshes == () and len(content.skins[0].joints) == 49
 
@@ -78,5 +80,5 @@ def test_skeleton_without_mesh(shared_data: Path) -> None:
         ("vrm1_shared_mesh.vrm", "VRMC_vrm"),
     ],
 )
-def test_characters(shared_data: Path, name: str, extension: str) -> None:
+def test_characters_are_read(shared_data: Path, name: str, extension: str) -> None:
     assert extension in opened(shared_data, name).extensions

@@ -13,13 +13,13 @@ def bound(matrices: list[list[float]]) -> File:
     return file
 
 
-def test_joints_and_matrices() -> None:
+def test_joints_and_matrices_are_read() -> None:
     [skin] = read(bound([MOVED, MOVED])).skins
     assert skin.joints.tolist() == [1, 2]
     assert skin.inverse_bind[1, :3, 3].tolist() == [1, 2, 3]
 
 
-def test_missing_matrices_are_identities() -> None:
+def test_missing_matrices_are_the_identity() -> None:
     [skin] = read(skinned()).skins
     assert skin.inverse_bind.tolist() == [np.eye(4).tolist()] * 2
 
@@ -59,7 +59,7 @@ def test_invalid_skins_are_refused(skin: dict[str, object], key: str, pointer: s
     assert refused(file) == (key, f"/skins/0{pointer}")
 
 
-def test_skin_without_joints_is_not_used() -> None:
+def test_skin_without_joints_is_ignored() -> None:
     file = skinned()
     file.root["skins"][0]["joints"] = []
     file.root["skins"].append({"joints": [2]})

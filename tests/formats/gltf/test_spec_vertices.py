@@ -1,4 +1,4 @@
-"""Vertices of real files against an evaluator of the specification, in double precision.
+"""Vertices of real files, compared with an evaluator of the specification in double precision.
 
 Blender 5.0 agrees with both within 6e-7 of the size, except for ``fox-animations.glb`` (1.2e-5): it
 keeps the rest matrices of bones as head, tail and roll in single precision, so they are orthonormal
@@ -18,7 +18,7 @@ from viewer.rig.figure_group import FigureGroup
 from viewer.rig.motion.evaluation import frames_of, pose_of
 from viewer.rig.skinning import deform
 
-ROUNDING = 1e-12  # of the size; double precision
+ROUNDING = 1e-12  # relative to the size, in double precision
 
 
 def corners(figure: Figure, animation: int | None, time: float) -> np.ndarray:
@@ -46,7 +46,7 @@ def corners(figure: Figure, animation: int | None, time: float) -> np.ndarray:
         "vrm1_shared_mesh.vrm",
     ],
 )
-def test_vertices_are_those_of_the_specification(shared_data: Path, name: str) -> None:
+def test_vertices_match_the_specification(shared_data: Path, name: str) -> None:
     path = shared_data / "gltf" / name
     plain, group = Evaluator(path), read(Source.open(path))
     assert isinstance(group, FigureGroup)

@@ -1,8 +1,6 @@
-"""Tiny files with one error each that Khronos' validator reports, by its code.
-
-Each has the code that lint reports, and the JSON pointer to the error. Not among them are codes
-about unused objects, materials and cameras, and skinned meshes below other nodes: most files
-have these.
+"""Tiny files with one error each that Khronos' validator reports, keyed by its code. Each is listed
+with the code that lint reports and the JSON pointer to the error. Codes about unused objects,
+materials, cameras, and skinned meshes below other nodes are omitted, because most files have them.
 """
 
 from __future__ import annotations
@@ -192,4 +190,4 @@ FAULTS: dict[str, tuple[Callable[[], File], str, str]] = {
     "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS": (
         lambda: _moved(_target(path="weights")), "F007", "/animations/0/channels/0"),
 }  # fmt: skip
-"""A function that makes the file, the code that lint reports, and the JSON pointer."""
+"""A function that creates the file, the code that lint reports, and the JSON pointer."""

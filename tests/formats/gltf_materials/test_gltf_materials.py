@@ -33,7 +33,7 @@ def data_uri(data: bytes, kind: str = "image/png") -> str:
 
 
 def read(folder, **root):
-    """Return the materials of a document with these members, and the document's source."""
+    """Return the materials of a document with these members, and its source."""
     path = folder / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, **root}))
     source = Source.open(path)
@@ -41,7 +41,7 @@ def read(folder, **root):
 
 
 def read_one(folder, material, **root):
-    """Return the only material of a document with one image, and the document's source."""
+    """Return the only material of a document with one image, and its source."""
     root = {"textures": [{"source": 0}], "images": [{"uri": data_uri(file_of("PNG"))}], **root}
     (found,), source = read(folder, materials=[material], **root)
     return found, source
@@ -176,7 +176,7 @@ def test_unreadable_images_do_not_invalidate_the_material(tmp_path, image, key):
     assert places(source) == [(key, "/images/0")]
 
 
-def test_images_are_decoded_up_to_a_common_limit(tmp_path, monkeypatch):
+def test_images_share_one_limit_of_decoded_pixels(tmp_path, monkeypatch):
     monkeypatch.setattr("viewer.media.image._MAX_PIXELS", 10)
     images = [{"uri": data_uri(file_of("PNG"))} for _ in range(3)]
     materials, source = read(
@@ -190,11 +190,11 @@ def test_images_are_decoded_up_to_a_common_limit(tmp_path, monkeypatch):
     assert places(source) == [("F005.gltf-image", "/images/2")]
 
 
-def test_images_that_no_texture_uses_are_not_read(tmp_path):
+def test_unused_images_are_not_read(tmp_path):
     assert read_one(tmp_path, {}, images=[{"uri": "none.png"}])[1].warnings == []
 
 
-def test_webp_is_preferred_to_its_fallback_and_basis_is_not(tmp_path):
+def test_webp_is_preferred_to_its_fallback_but_basis_is_not(tmp_path):
     images = [
         {"uri": data_uri(file_of("PNG"))},
         {"uri": data_uri(file_of("WEBP", PIXELS[::-1], lossless=True))},
@@ -217,7 +217,7 @@ def test_webp_is_preferred_to_its_fallback_and_basis_is_not(tmp_path):
 # Samplers and transforms
 
 
-def test_samplers_give_wrap_modes_and_filters(tmp_path):
+def test_samplers_set_wrap_modes_and_filters(tmp_path):
     sampler = {"wrapS": 33071, "wrapT": 33648, "magFilter": 9728, "minFilter": 9985}
     texture = {"source": 0, "sampler": 0}
     material = {"normalTexture": {"index": 0}}
@@ -256,7 +256,7 @@ def test_texture_transforms_rotate_counter_clockwise_on_the_image(tmp_path):
     assert_allclose(moved(0.0, 1.0), (3.25, 0.5), atol=1e-12)
 
 
-def test_a_transform_without_members_changes_nothing():
+def test_transform_without_members_has_no_effect():
     plain = transform_matrix(np.zeros(2), 0.0, np.ones(2))
     assert_array_equal(plain, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
@@ -297,14 +297,16 @@ def test_extensions_without_effect_are_not_reported(tmp_path):
         ),
     ],
 )
-def test_invalid_members_are_ignored_and_reported_by_pointer(tmp_path, material, key, pointer):
+def test_invalid_members_are_ignored_and_reported_with_their_pointer(
+    tmp_path, material, key, pointer
+):
     found, source = read_one(tmp_path, material)
     assert places(source) == [(key, f"/materials/0{pointer}")]
     assert (found.base_color, found.metallic) == ((1.0, 1.0, 1.0, 1.0), 1.0)
     assert (found.alpha_mode, found.textures) == ("opaque", {})
 
 
-def test_materials_that_are_not_objects_keep_their_index(tmp_path):
+def test_entries_that_are_not_objects_keep_the_indices_of_materials(tmp_path):
     materials, source = read(tmp_path, materials=[7, {"name": "second"}])
     assert [material.name for material in materials] == ["", "second"]
     assert places(source) == [("F006.gltf-material", "/materials/0")]
@@ -319,7 +321,7 @@ def glossy(diffuse, specular, glossiness=0.75, **slots):
 
 
 def test_specular_glossiness_dielectrics_and_metals_keep_their_colours():
-    """In the limits, the roots are simple: m = 0 for specular 0.04, m = 1 for no diffuse."""
+    """At the limits the roots are simple: m = 0 for specular 0.04, and m = 1 without diffuse."""
     plastic = from_glossiness(glossy((0.5, 0.25, 0.125), (0.04, 0.04, 0.04)), {})
     assert_allclose(plastic["base_color"], (0.5, 0.25, 0.125, 1.0), atol=1e-6)
     assert (plastic["metallic"], plastic["roughness"]) == (0.0, 0.25)
@@ -329,13 +331,13 @@ def test_specular_glossiness_dielectrics_and_metals_keep_their_colours():
 
 
 def test_glossiness_maps_are_converted_texel_by_texel():
-    """One texel of plastic and one of chrome; their glossiness is in alpha."""
+    """One texel is plastic and one chrome; the glossiness is in alpha."""
     painted = np.array([[[255, 0, 0, 255], [0, 0, 0, 128]]], np.uint8)
     mirrored = np.array([[[56, 56, 56, 51], [255, 255, 255, 255]]], np.uint8)
     images = {0: DecodedImage("d", painted), 1: DecodedImage("s", mirrored)}
     slots = {"diffuse_slot": Slot(0, {}), "specular_slot": Slot(1, {})}
     found = from_glossiness(glossy((1, 1, 1), (1, 1, 1), 1.0, **slots), images)
-    # sRGB 56 is 0.0395: just below the reflectance of dielectrics.
+    # sRGB 56 is 0.0395, just below the reflectance of dielectrics.
     base, packed = found["base_texture"].image, found["metallic_texture"].image
     assert_allclose(base[0], [[255, 0, 0, 255], [255, 255, 255, 128]], atol=1)
     assert packed[0, :, 1].tolist() == [204, 0]

@@ -26,7 +26,7 @@ SHADERS = ["VRM/MToon", "VRM/UnlitTexture", "VRM_USE_GLTFSHADER", 5]
         ({"extensions": {"VRM": {"materialProperties": {}}}}, [False, True, False]),
     ],
 )
-def test_toon_materials_ignore_the_studio_with_a_note(
+def test_toon_materials_ignore_the_studio_light_with_a_note(
     tmp_path: Path, members: dict[str, Any], unlit: list[bool]
 ) -> None:
     color = {"baseColorFactor": [0.5, 0.25, 0.125, 1.0]}
@@ -61,7 +61,7 @@ def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) ->
     assert plain.shade_range == pytest.approx((-0.1, 0.1), abs=1e-12)
 
 
-def test_old_toon_materials_have_srgb_colours_and_other_thresholds(tmp_path: Path) -> None:
+def test_old_toon_materials_have_srgb_colours_and_different_thresholds(tmp_path: Path) -> None:
     told = {
         "shader": "VRM/MToon",
         "vectorProperties": {"_ShadeColor": [1.0, 0.5, 0.0, 1.0]},
@@ -70,12 +70,91 @@ def test_old_toon_materials_have_srgb_colours_and_other_thresholds(tmp_path: Pat
     material = _read(tmp_path, extensions={"VRM": {"materialProperties": [told]}})
     # 0.5 in sRGB: ((0.5 + 0.055) / 1.055) ^ 2.4.
     assert material.shade_color == pytest.approx((1.0, 0.2140411, 0.0), abs=1e-7)
-    # toony = lerp(0.5, 1, 0.5) = 0.75, shift = -0 - 0.25: lit from 0 to 0.5.
+    # toony = lerp(0.5, 1, 0.5) = 0.75, shift = -0 - 0.25, so the lit side is from 0 to 0.5.
     assert material.shade_range == pytest.approx((0.0, 0.5), abs=1e-12)
 
 
-def test_invalid_toon_values_are_those_without_shade(tmp_path: Path) -> None:
+def test_invalid_toon_values_disable_the_shade(tmp_path: Path) -> None:
     toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
     assert material.unlit and material.shade_color == (1.0, 1.0, 1.0)
     assert material.shade_range == (0.0, 0.0)
+
+
+def _warned(tmp_path: Path, **members: Any) -> tuple[Any, Any]:
+    """Return the first material, and the note about toon materials."""
+    path = tmp_path / "hero.gltf"
+    path.write_text(json.dumps({"asset": {"version": "2.0"}, "materials": [{}], **members}))
+    source = Source.open(path)
+    found = read_materials(open_document(source))[0]
+    (note,) = [each for each in source.diagnostics if each.key == "F007.gltf-toon"]
+    return found, note
+
+
+def test_rim_light_and_outline_are_read(tmp_path: Path) -> None:
+    toon = {
+        "parametricRimColorFactor": [0.5, 0.25, 0.0],
+        "parametricRimFresnelPowerFactor": 3.0,
+        "parametricRimLiftFactor": 0.125,
+        "rimLightingMixFactor": 0.5,
+        "matcapFactor": [1.0, 0.5, 0.0],
+        "outlineWidthMode": "screenCoordinates",
+        "outlineWidthFactor": 0.01,
+        "outlineColorFactor": [0.25, 0.0, 0.0],
+        "outlineLightingMixFactor": 0.75,
+    }
+    found, note = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
+    rim, outline = found.rim, found.outline
+    assert (rim.color, rim.power, rim.lift, rim.mix) == ((0.5, 0.25, 0.0), 3.0, 0.125, 0.5)
+    assert rim.matcap_factor == (1.0, 0.5, 0.0)
+    assert (outline.mode, outline.width) == ("screen", 0.01)
+    assert (outline.color, outline.mix) == ((0.25, 0.0, 0.0), 0.75)
+    assert note.values["names"] == []
+
+
+def test_defaults_are_those_of_the_extension(tmp_path: Path) -> None:
+    found, _ = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": {}}}])
+    assert found.outline is None and not found.rim.has_effect
+    assert (found.rim.power, found.rim.lift, found.rim.mix) == (5.0, 0.0, 1.0)
+
+
+def test_members_that_are_not_drawn_are_listed(tmp_path: Path) -> None:
+    toon = {
+        "uvAnimationScrollXSpeedFactor": 0.5,
+        "uvAnimationScrollYSpeedFactor": 0.0,
+        "shadingShiftTexture": {"index": 0},
+    }
+    _, note = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
+    assert note.values["names"] == ["uvAnimationScrollXSpeedFactor", "shadingShiftTexture"]
+
+
+def test_old_outlines_are_centimetres_or_hundredths_of_half_the_height(tmp_path: Path) -> None:
+    for mode, width in ((1, 0.004), (2, 0.002)):
+        numbers = {"_OutlineWidthMode": mode, "_OutlineWidth": 0.4, "_ShadingGradeRate": 0.5}
+        told = {
+            "name": "skin",
+            "shader": "VRM/MToon",
+            "floatProperties": numbers,
+            "vectorProperties": {"_OutlineColor": [1.0, 0.5, 0.0, 1.0]},
+        }
+        found, note = _warned(tmp_path, extensions={"VRM": {"materialProperties": [told]}})
+        assert found.outline.width == pytest.approx(width, abs=1e-12)
+        assert found.outline.mode == ("world", "screen")[mode - 1]
+        assert found.outline.color == pytest.approx((1.0, 0.2140411, 0.0), abs=1e-7)
+        assert found.outline.mix == 0.0  # a fixed colour
+        assert note.values["names"] == ["skin _ShadingGradeRate"]
+
+
+@pytest.mark.parametrize(
+    "toon",
+    [
+        {"outlineWidthMode": 5, "outlineWidthFactor": 1.0},
+        {"outlineWidthMode": "worldCoordinates", "outlineWidthFactor": "a"},
+        {"outlineWidthMode": "worldCoordinates", "outlineWidthFactor": -1.0},
+        {"parametricRimColorFactor": [1.0], "parametricRimFresnelPowerFactor": -5.0},
+        {"matcapTexture": 3, "rimMultiplyTexture": {"index": "x"}},
+    ],
+)
+def test_invalid_rim_lights_and_outlines_are_ignored(tmp_path: Path, toon: dict[str, Any]) -> None:
+    found, _ = _warned(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])
+    assert found.outline is None and not found.rim.has_effect

@@ -17,7 +17,7 @@ def wrapper(
     alignment: bytes = whole(16),
     kind: bytes = named("numpy", "ndarray"),
 ) -> bytes:
-    """The description of an array, without its bytes."""
+    """Return the description of an array, without its bytes."""
     pairs = {
         "subclass": kind,
         "shape": shape(*sides),
@@ -31,7 +31,7 @@ def wrapper(
 
 
 def aligned_array(values: NDArray[Any]) -> bytes:
-    """An array as joblib writes it since 1.1, with three bytes of padding."""
+    """Return an array as written by joblib since 1.1, with three bytes of padding."""
     is_fortran = values.flags.f_contiguous and not values.flags.c_contiguous
     order, code = "F" if is_fortran else "C", values.dtype.str
     size = values.itemsize if code[1] in "SU" else -1
@@ -41,7 +41,7 @@ def aligned_array(values: NDArray[Any]) -> bytes:
 
 
 def old_array(values: NDArray[Any]) -> bytes:
-    """An array as joblib wrote it before 1.1, without padding."""
+    """Return an array as written by joblib before 1.1, without padding."""
     dtype = element_type(values.dtype.str[1:], values.dtype.str[0])
     state = wrapper(values.shape, dtype, alignment=b"N")
     key = unicode("numpy_array_alignment_bytes") + b"N"
@@ -49,6 +49,6 @@ def old_array(values: NDArray[Any]) -> bytes:
 
 
 def joblib_file(given: Any, aligned: bool = True) -> bytes:
-    """A file with a value whose arrays follow their descriptions."""
+    """Return a file with a value in which arrays follow their descriptions."""
     write = aligned_array if aligned else old_array
     return finished(value(given, lambda values: write(np.asarray(values))))

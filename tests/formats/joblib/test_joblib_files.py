@@ -1,4 +1,4 @@
-"""Joblib files: arrays that follow their descriptions, uncompressed and compressed."""
+"""Uncompressed and compressed joblib files, in which arrays follow their descriptions."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def values(archive: Archive | None, key: str) -> Any:
 
 
 @pytest.mark.parametrize("pack", PACK.values(), ids=PACK.keys())
-def test_compressed_and_plain_files(pack: Callable[[bytes], bytes]) -> None:
+def test_compressed_and_plain_files_are_read(pack: Callable[[bytes], bytes]) -> None:
     assert_array_equal(values(opened(pack(joblib_file({"v": ROWS}))), "v"), ROWS)
 
 
@@ -64,34 +64,34 @@ def test_compressed_and_plain_files(pack: Callable[[bytes], bytes]) -> None:
     ],
     ids=lambda given: f"{given.dtype.str}-{given.shape}",
 )
-def test_arrays_behind_their_descriptions(given: Any) -> None:
+def test_arrays_after_their_descriptions_are_read(given: Any) -> None:
     archive = opened(joblib_file({"v": given, "after": 7}))
     assert_array_equal(values(archive, "v"), given)
     assert archive.get("after") == 7
 
 
-def test_arrays_without_padding() -> None:
+def test_arrays_without_padding_are_read() -> None:
     assert_array_equal(values(opened(joblib_file({"v": ROWS}, aligned=False)), "v"), ROWS)
 
 
-def test_people_are_named_by_their_numbers() -> None:
+def test_people_are_keyed_by_their_numbers() -> None:
     archive = opened(joblib_file({3: {"v": ROWS}, -1: {"v": ROWS[:1]}}))
     assert archive.keys == ("3", "-1")
     assert_array_equal(values(archive.inside("-1"), "v"), ROWS[:1])
 
 
-def test_lists_of_dicts_are_named_by_their_places() -> None:
+def test_dicts_in_lists_are_keyed_by_their_indices() -> None:
     archive = opened(joblib_file([{"v": ROWS}, {"v": ROWS[:2]}]))
     assert_array_equal(values(archive.inside("1"), "v"), ROWS[:2])
 
 
-def test_dicts_with_a_default() -> None:
+def test_dicts_with_a_default_are_read() -> None:
     made = named("collections", "defaultdict") + several(named("builtins", "dict")) + b"R"
     archive = opened(finished(made + unicode("v") + whole(1) + b"s"))
     assert archive.get("v") == 1
 
 
-def test_errors_say_where_the_value_is() -> None:
+def test_errors_state_the_path_of_the_value() -> None:
     person = opened(joblib_file({3: {"cam": {"v": ROWS}}})).inside("3")
     assert person is not None
     inner = person.inside("cam")
@@ -99,14 +99,14 @@ def test_errors_say_where_the_value_is() -> None:
     assert str(inner.fault("F002.no-key", item="w")) == "x.pkl: 3.cam.w: key not found"
 
 
-def test_compressed_files_that_are_not_of_joblib() -> None:
+def test_compressed_files_of_other_writers_are_read() -> None:
     data = zlib.compress(torch_legacy({"v": ROWS}))
     assert_array_equal(values(opened(data), "v"), ROWS)
 
 
 @pytest.mark.parametrize("method", ["plain", "zlib", "gzip", "bz2", "xz", "lzma"])
-def test_files_of_joblib_itself(method: str) -> None:
-    """See ``make_torch_files.py`` for what they contain."""
+def test_files_written_by_joblib_are_read(method: str) -> None:
+    """``make_torch_files.py`` describes their contents."""
     person = open_archive(Source.open(DATA / f"joblib_{method}.pkl")).inside("3")
     rows = np.arange(6.0).reshape(2, 3)
     for key in ("rows", "columns", "tensor"):

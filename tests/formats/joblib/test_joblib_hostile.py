@@ -1,4 +1,4 @@
-"""Hostile joblib files: false sizes, bombs and damage give a one-line error without much memory."""
+"""Hostile joblib files: false sizes, bombs and damage, refused in one line with little memory."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ from viewer.formats._source import Source
 
 ROWS = np.arange(12.0).reshape(4, 3)
 F8 = element_type()
-BOUND = 8 << 20  # bytes of memory that may be allocated before the error
+BOUND = 8 << 20  # limit of allocated memory in bytes
 
 
 def problem_of(data: bytes) -> str:
@@ -61,30 +61,30 @@ def problem_of(data: bytes) -> str:
     ],
     ids=str,
 )  # fmt: skip
-def test_descriptions_that_do_not_fit_the_file(described: bytes, key: str) -> None:
+def test_descriptions_that_contradict_the_file_are_refused(described: bytes, key: str) -> None:
     data = saved(v=described + b"\x00" + bytes(24))
     assert problem_of(data) == key
     assert cost(lambda: refusal(data)) < BOUND
 
 
-def test_padding_beyond_the_end() -> None:
+def test_padding_beyond_the_end_is_refused() -> None:
     assert problem_of(saved(v=wrapper((0,), F8) + b"\xff")) == "pickle-cut"
 
 
 @pytest.mark.parametrize("module", ["joblib.numpy_pickle", "joblib.numpy_pickle_compat"])
 @pytest.mark.parametrize("name", ["NDArrayWrapper", "ZNDArrayWrapper"])
-def test_arrays_in_other_files(module: str, name: str) -> None:
+def test_arrays_in_other_files_are_refused(module: str, name: str) -> None:
     assert problem_of(saved(v=named(module, name))) == "joblib-old"
 
 
-def test_objects_that_run_code() -> None:
+def test_objects_that_run_code_are_refused() -> None:
     inner = finished(named("os", "system") + several(text("true")) + b"R")
     assert problem_of(saved(v=wrapper((1,), element_type("O8", "|")) + inner)) == "pickle-global"
     other = finished(whole(1))
     assert problem_of(saved(v=wrapper((1,), element_type("O8", "|")) + other)) == "joblib-objects"
 
 
-def test_objects_nested_without_end() -> None:
+def test_endlessly_nested_objects_are_refused() -> None:
     described = wrapper((1,), element_type("O8", "|"))
     data = finished(described)
     for _ in range(9):
@@ -106,23 +106,23 @@ PACKED = {
 
 
 @pytest.mark.parametrize("data", PACKED.values(), ids=PACKED.keys())
-def test_data_beyond_the_limit_of_the_file(data: bytes) -> None:
+def test_decompressed_data_above_the_size_limit_are_refused(data: bytes) -> None:
     def look() -> None:
         with pytest.raises(FormatError) as caught:
             open_archive(Source("x.pkl", data, max_size=1 << 20))
         assert fault_of(caught.value.diagnostic)[0] == "F002.packed-size"
 
-    assert cost(look) < 3 * BOUND  # xz itself needs 8 MiB
+    assert cost(look) < 3 * BOUND  # the xz decoder needs 8 MiB
 
 
 @pytest.mark.slow
-def test_bombs() -> None:
+def test_decompression_bombs_are_refused() -> None:
     data = zlib.compress(bomb(70 << 20), 9)
     assert refusal(data)[0] == "F002.packed-size"
 
 
 @pytest.mark.parametrize("method", ["zlib", "gzip", "bz2", "xz", "lzma"])
-def test_other_data_is_not_unpacked(method: str) -> None:
+def test_compressed_data_of_other_formats_is_not_unpacked(method: str) -> None:
     plain = b"balljoint a { }" * 1000
     data = {
         "zlib": zlib.compress(plain),
@@ -135,19 +135,19 @@ def test_other_data_is_not_unpacked(method: str) -> None:
 
 
 @pytest.mark.parametrize("head", [b"\x04\x22\x4d\x18", b"ZF0x0001"])
-def test_methods_that_are_not_supported(head: bytes) -> None:
+def test_unsupported_methods_are_refused(head: bytes) -> None:
     assert refusal(head + bytes(90))[0] == "F002.packed-method"
 
 
 @pytest.mark.parametrize("pack", [zlib.compress, bz2.compress, lzma.compress])
-def test_truncated_data(pack: Any) -> None:
+def test_truncated_data_is_refused(pack: Any) -> None:
     data = pack(joblib_file({"v": np.random.default_rng(0).random(999)}))
     for length in (len(data) // 2, len(data) - 1):
         assert refusal(data[:length])[0] == "F002.packed"
 
 
 @pytest.mark.slow
-def test_damaged_files() -> None:
+def test_damaged_files_are_read_or_refused() -> None:
     data = joblib_file({"v": ROWS[:1], 3: {"w": np.array(["a"]), "t": unicode("x")}})
     dice = random.Random(len(data))
     for whole_file in (data, zlib.compress(data)):

@@ -1,7 +1,6 @@
-"""A tiny MHR with the keys of its portable files, and its forward model with states.
-
+"""A tiny MHR model with the keys of its portable files, and its forward model computed with states.
 A state is a translation, a quaternion (x, y, z, w) and a scale, as in Momentum: states are
-multiplied, and map points to t + q (s p). Nothing here uses matrices.
+multiplied, and map points to t + q (s p). No matrices are used.
 """
 
 import numpy as np
@@ -61,11 +60,11 @@ def rig(**changes):
 
 
 def lod(level=1, **changes):
-    """Return the arrays of ``lodN.npz``; the level changes the shape."""
+    """Return the arrays of ``lodN.npz``, in which the level determines the shape."""
     generator = np.random.default_rng(level)
     weights = generator.random((N_VERTICES, 4)).astype(np.float32)
     offsets = generator.normal(size=(N_OUTPUTS, N_VERTICES, 3))
-    weights[:, 3] = 5e-6  # left out by the published skinning
+    weights[:, 3] = 5e-6  # ignored by the published skinning
     arrays = {
         "schema_version": np.array(1, np.int64),
         "lod": np.array(level, np.int64),
@@ -82,7 +81,7 @@ def lod(level=1, **changes):
 
 
 def write(folder, levels=(1,), rig_changes=None, lod_changes=None):
-    """Write the files; changes that are None leave an array out."""
+    """Write the files; arrays set to None are left out."""
     folder.mkdir(parents=True, exist_ok=True)
     contents = {"rig": rig(**(rig_changes or {}))}
     contents |= {f"lod{level}": lod(level, **(lod_changes or {})) for level in levels}
@@ -143,7 +142,7 @@ def forward(identity, parameters, expression, level=1):
 
 
 def outputs(own, joints):
-    """Return the outputs of the network: the first two columns of each rotation are its input."""
+    """Return the outputs of the network; its inputs are two columns of each rotation."""
     columns = []
     for rx, ry, rz in joints[2:, 3:6]:
         turn = multiplied(about(2, rz), multiplied(about(1, ry), about(0, rx)))

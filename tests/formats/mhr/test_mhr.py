@@ -1,4 +1,4 @@
-"""MHR against the published equations, evaluated with states instead of matrices."""
+"""MHR, compared with the published equations, evaluated with states instead of matrices."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import deform, deform_frames, joint_matrices
 
-ROUNDING = 1e-10  # centimetres; the numbers are stored in single precision, computed in double
+ROUNDING = 1e-10  # centimetres; the numbers are stored in single precision and computed in double
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +53,7 @@ def posed(figure, identity, parameters, expression):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_vertices_and_joints_agree_with_the_published_equations(figure, seed):
+def test_vertices_and_joints_match_the_published_equations(figure, seed):
     inputs = random_inputs(seed)
     vertices, states = forward(*inputs)
     pose = posed(figure, *inputs)
@@ -85,14 +85,14 @@ def test_shapes_are_identity_and_expressions(figure):
     assert figure.mesh.uv_triangles.tolist() == lod()["texcoord_faces"].tolist()
 
 
-def test_correctives_vanish_at_rest_and_stay_in_single_precision(figure):
+def test_correctives_are_zero_at_rest_and_in_single_precision(figure):
     pose = figure_pose(figure)
     without = deform(figure, pose, viewer.Skinning(correctives=False))[0]
     assert_allclose(deform(figure, pose)[0], without, atol=0.0)
     assert figure.correctives.values().dtype == np.float32
 
 
-def test_model_parameters_are_the_models_own_pose_vector(figure):
+def test_model_parameters_are_the_pose_vector_of_the_model(figure):
     _, parameters, _ = random_inputs(7)
     pose = figure_pose(figure)
     assert apply_record(PoseRecord(vector=parameters), figure, pose) == []
@@ -103,7 +103,7 @@ def test_model_parameters_are_the_models_own_pose_vector(figure):
         figure.parameters.apply(figure.skeleton, pose, parameters[1:])
 
 
-def test_level_of_detail_is_the_usual_one_or_as_named(folder):
+def test_level_of_detail_is_the_default_or_the_named_one(folder):
     bases = {level: lod(level)["base_shape"] for level in (0, 1, 4)}
 
     def base(path, wanted=""):
@@ -116,14 +116,14 @@ def test_level_of_detail_is_the_usual_one_or_as_named(folder):
     assert_allclose(base(folder, "4"), bases[4])
 
 
-def test_coarse_levels_are_used_where_the_usual_one_is_missing(tmp_path):
+def test_coarser_level_is_used_if_the_default_is_missing(tmp_path):
     found = read(Source.open(write(tmp_path / "coarse", levels=(0, 5))))
     assert_allclose(found.mesh.positions, lod(5)["base_shape"])
     found = read(Source.open(write(tmp_path / "fine", levels=(0,))))
     assert_allclose(found.mesh.positions, lod(0)["base_shape"])
 
 
-def test_files_without_correctives_are_skinned_plainly(tmp_path):
+def test_files_without_correctives_are_read_with_a_note(tmp_path):
     source = Source.open(write(tmp_path, lod_changes={"corrective_blendshapes": None}))
     assert read(source).correctives is None
     assert [found.key for found in source.diagnostics.warnings] == ["F007.mhr-correctives"]
@@ -167,7 +167,7 @@ def test_invalid_meshes_are_refused(tmp_path, changes, code):
     assert refused.value.diagnostic.code == code
 
 
-def test_missing_files_are_named(tmp_path, folder):
+def test_missing_files_are_reported_by_name(tmp_path, folder):
     source = Source.open(folder)
     source.options = {"lod": "6"}
     with pytest.raises(FormatError) as refused:
@@ -184,7 +184,7 @@ def test_missing_files_are_named(tmp_path, folder):
     assert refused.value.diagnostic.key == "F002.mhr-no-lod"
 
 
-def test_a_folder_that_cannot_be_listed_is_an_error_of_one_line(folder, monkeypatch):
+def test_folder_that_cannot_be_listed_is_refused_in_one_line(folder, monkeypatch):
     def refuse(path):
         raise PermissionError(13, "Permission denied")
 
@@ -195,7 +195,7 @@ def test_a_folder_that_cannot_be_listed_is_an_error_of_one_line(folder, monkeypa
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
-def test_correctives_that_are_not_finite_are_refused_on_first_use(tmp_path, value):
+def test_non_finite_correctives_are_refused_on_first_use(tmp_path, value):
     offsets = lod()["corrective_blendshapes"]
     offsets[2, 3, 1] = value
     changes = {"corrective_blendshapes": offsets}

@@ -1,4 +1,4 @@
-"""Hand-made contents of files of nodes, and an evaluator that follows the glTF definition."""
+"""Hand-made contents of node files, and an evaluator that follows the glTF definition."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -94,7 +94,7 @@ def rotation(quaternion: np.ndarray) -> np.ndarray:
 
 
 def local(tree: NodeTree, node: int, turn: np.ndarray | None = None) -> np.ndarray:
-    """Return a node's local matrix, T R S, with an additional rotation before S."""
+    """Return the local matrix T R S of a node, with an additional rotation before S."""
     if node in tree.matrices:
         return tree.matrices[node]
     matrix = np.eye(4)
@@ -105,7 +105,7 @@ def local(tree: NodeTree, node: int, turn: np.ndarray | None = None) -> np.ndarr
 
 
 def world(tree: NodeTree, node: int, moved: Local) -> np.ndarray:
-    """Return the product of the local matrices from the root down; ``moved`` replaces some."""
+    """Return the products of local matrices from the root down; ``moved`` replaces some of them."""
     own = moved[node] if node in moved else local(tree, node)
     parent = int(tree.parents[node])
     return own if parent < 0 else world(tree, parent, moved) @ own

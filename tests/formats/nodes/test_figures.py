@@ -1,4 +1,4 @@
-"""Figures of files of nodes, posed as glTF defines."""
+"""Figures of node files, posed as glTF defines."""
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tests.formats.nodes.node_files import (
     vertices,
 )
 from viewer.errors import FormatError
-from viewer.formats._nodes.content import NodeFile, NodeSkin
+from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin
 from viewer.formats._nodes.figures import figure_group
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
@@ -31,7 +31,7 @@ def figures_of(file: NodeFile) -> tuple[Figure, ...]:
 
 
 def posed(file: NodeFile, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices of a figure and by the definition, with all joints rotated at random."""
+    """Return the vertices of a randomly posed figure, and those by the definition."""
     pose = figure_pose(figure)
     pose.dofs[:] = np.random.default_rng(5).uniform(-2.0, 2.0, len(pose.dofs))
     moved = {}
@@ -46,7 +46,7 @@ def posed(file: NodeFile, figure: Figure) -> tuple[np.ndarray, np.ndarray]:
 
 
 def check(file: NodeFile) -> Figure:
-    """Compare the only figure of a file with the definition, at rest and posed; return it."""
+    """Compare a file's only figure with the definition, at rest and posed; return the figure."""
     (figure,) = figures_of(file)
     for found, wanted in ((deform(figure)[0], vertices(file)), posed(file, figure)):
         assert_allclose(found, wanted, atol=1e-12 * np.abs(wanted).max())
@@ -54,7 +54,7 @@ def check(file: NodeFile) -> Figure:
 
 
 def arm(**more):
-    """Return a root, two joints with scales that shear, and a mesh node that is ignored."""
+    """Return a root, two joints with scales that shear, and a mesh node with unused transform."""
     return tree_of(
         {"name": "root", "rotation": TURNED, "translation": [1, 2, 3], "scale": [1, -2, 0.5]},
         {"name": "hip", "parent": 0, "rotation": [0.1, 0.7, 0, 0.5], "scale": [-1, 3, 1]},
@@ -90,7 +90,7 @@ def test_rigid_mesh_on_a_joint_needs_no_auxiliary_joint():
     assert_array_equal(figure.mesh.triangle_parts, [0, 1, 2, 3])
 
 
-def test_sheared_matrix_becomes_two_joints():
+def test_sheared_matrix_is_represented_by_two_joints():
     sheared = affine(8)
     sheared[:3, 0] *= -1.0
     node = {"name": "bent", "parent": 1, "matrix": sheared, "mesh": 1}
@@ -110,8 +110,8 @@ def test_sheared_matrix_becomes_two_joints():
 
 
 @pytest.mark.parametrize("agrees", [True, False])
-def test_two_skins_share_joints(agrees):
-    # If two joints disagree, one of them determines the vertices' transform.
+def test_skins_may_share_joints(agrees):
+    # If two joints disagree, one of them determines the transform of the vertices.
     first = skin([1, 2], 3)
     other = first.inverse_bind @ affine(9) if agrees else skin([1, 2], 7).inverse_bind
     second = NodeSkin("second", np.array([2, 1], dtype=np.int32), other[::-1])
@@ -122,7 +122,7 @@ def test_two_skins_share_joints(agrees):
     assert figure.mesh.parts == ("shirt", "body")
 
 
-def test_skin_that_disagrees_in_one_joint_gets_one_auxiliary_joint():
+def test_skin_with_one_different_bind_matrix_gets_one_auxiliary_joint():
     first = skin([0, 1, 2], 3)
     other = first.inverse_bind @ affine(9)
     other[2] = affine(20)
@@ -153,7 +153,7 @@ def test_singular_inverse_bind_matrix_is_applied():
     check(file_of(tree, meshes=meshes, skins=(NodeSkin("", bound.joints, matrices),)))
 
 
-def test_a_mesh_can_be_used_with_and_without_a_skin():
+def test_mesh_can_be_used_with_and_without_a_skin():
     tree = arm(nodes=({"name": "statue", "parent": 2, "mesh": 0, "translation": [5, 0, 0]},))
     check(file_of(tree, meshes=(mesh(triangle(1, 2)),), skins=(skin([1, 2], 3),)))
 
@@ -174,7 +174,7 @@ def test_weights_are_divided_by_their_sum_and_the_deviation_is_reported():
     assert_array_equal(figure.skin.joints[-1], 2)
 
 
-def test_another_skinning_method_is_recommended():
+def test_skinning_method_stated_by_the_file_is_recommended():
     bound = skin([1, 2], 3)
     dual = NodeSkin("body", bound.joints, bound.inverse_bind, "dqs")
     notes = source()
@@ -186,7 +186,7 @@ def test_another_skinning_method_is_recommended():
     )
 
 
-def test_empty_file_is_refused_and_a_skeleton_opens():
+def test_empty_file_is_refused_and_a_skeleton_is_read():
     with pytest.raises(FormatError) as caught:
         figures_of(file_of(tree_of({"name": "lonely"})))
     assert caught.value.diagnostic.key == "F002.no-figure"
@@ -194,3 +194,12 @@ def test_empty_file_is_refused_and_a_skeleton_opens():
     (figure,) = figures_of(file_of(chain))
     assert figure.mesh is None
     assert figure.skeleton.names == ("hip", "knee")
+
+
+def test_files_with_only_points_or_lines_are_refused_as_such():
+    with pytest.raises(FormatError) as caught:
+        figures_of(file_of(tree_of({"name": "cloud", "mesh": 0}), meshes=(NodeMesh("", ()),)))
+    assert caught.value.diagnostic.key == "F002.no-triangles"
+    with pytest.raises(FormatError) as caught:
+        figures_of(file_of(tree_of({"name": "a"}), meshes=(mesh(triangle(0)),)))
+    assert caught.value.diagnostic.key == "F002.no-figure"

@@ -1,4 +1,4 @@
-"""Division of files of nodes into figures, and the names of figures and parts."""
+"""Division of node files into figures, and the names of figures and parts."""
 
 import time
 from pathlib import Path
@@ -42,7 +42,7 @@ def two_characters(cameras=EYE, **more) -> NodeFile:
     return file_of(tree, meshes=meshes, skins=(skin([2], 3), skin([5], 4)), cameras=cameras, **more)
 
 
-def test_independent_characters_and_the_rest_are_separate_figures():
+def test_independent_characters_and_remaining_meshes_are_separate_figures():
     hero, villain, rest = group_of(two_characters()).figures
     assert [figure.name for figure in (hero, villain, rest)] == ["hero", "villain", "chair"]
     assert hero.skeleton.names == ("hip",)
@@ -91,14 +91,14 @@ def test_meshes_without_skins_are_one_figure():
     assert [animation.name for animation in figure.animations] == ["wave"]
 
 
-def test_animations_belong_to_the_figures_that_they_move():
+def test_animations_are_assigned_to_the_figures_that_they_move():
     file = two_characters(animations=(moved(5), moved(0), moved(2)))
     hero, villain, rest = group_of(file).figures
     assert len(hero.animations) == len(villain.animations) == 2
     assert len(rest.animations) == 1
 
 
-def test_actors_of_a_file_keep_their_relative_positions_and_cameras_follow():
+def test_actors_and_cameras_of_a_file_keep_their_relative_positions():
     first, second = (group_of(two_characters()) for _ in range(2))
     assert first.views[0].name == "eye"
     contents = Contents()
@@ -115,7 +115,7 @@ def test_actors_of_a_file_keep_their_relative_positions_and_cameras_follow():
     assert_allclose(placements[3:], np.tile(placements[3], (3, 1, 1)))
     shift = placements[3][:3, 3]
     assert shift[0] > 0.0
-    # In its file, the camera is at (0, 0, 4) and looks along -z.
+    # In the file, the camera is at (0, 0, 4) and looks along -z.
     for view, eye in zip(scene.views, ([0, 0, 4], np.add([0, 0, 4], shift)), strict=True):
         assert_allclose(-view.rotation.T @ view.translation, eye, atol=1e-12)
         assert_allclose(view.rotation.T @ [0, 0, 1], [0, 0, -1], atol=1e-12)

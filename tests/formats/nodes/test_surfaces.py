@@ -1,4 +1,4 @@
-"""Normals, colours, materials, blend shapes and animations of figures made from nodes."""
+"""Normals, colours, materials, blend shapes and animations of figures created from nodes."""
 
 import numpy as np
 import pytest
@@ -39,13 +39,13 @@ def test_missing_normals_are_flat_and_coplanar_triangles_share_vertices():
     assert figure.mesh.n_vertices == 24
     corners = figure.mesh.positions[figure.mesh.triangles]
     faces = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    # Unit sides: the cross product is the unit normal.
+    # The sides have unit length, so their cross product is the unit normal.
     assert_allclose(figure.mesh.normals[figure.mesh.triangles], np.repeat(faces[:, None], 3, 1))
     (note,) = notes.diagnostics.warnings
     assert (note.key, note.values["vertices"]) == ("F007.flat-normals", 16)
 
 
-def test_normals_stay_perpendicular_under_a_second_skin_that_shears():
+def test_normals_are_perpendicular_under_a_second_skin_that_shears():
     first = skin([0], 3)
     second = type(first)("", first.joints, first.inverse_bind @ affine(9))
     primitive = triangle(1, 1)
@@ -60,7 +60,7 @@ def test_normals_stay_perpendicular_under_a_second_skin_that_shears():
         assert_allclose(normals[rows] @ np.stack([b - a, c - a]).T, 0.0, atol=1e-12)
 
 
-def test_colours_and_materials_of_only_some_primitives_are_completed():
+def test_missing_colours_and_materials_of_some_primitives_get_defaults():
     colors = np.full((3, 4), 0.5)
     primitives = triangle(1, colors=colors, material=2), triangle(2), triangle(3, material=0)
     materials = tuple(Material(name) for name in "abc")
@@ -73,7 +73,7 @@ def test_colours_and_materials_of_only_some_primitives_are_completed():
 
 
 def faces_with_targets():
-    """Return nodes, meshes and skins of a face and its teeth, both with targets smile and blink."""
+    """Return nodes, meshes and skins of a face and its teeth, with the targets smile and blink."""
     random = np.random.default_rng(4)
     face = triangle(1, 1, targets=MorphTargets(3, random.normal(size=(2, 3, 3))))
     teeth = triangle(2, 1, targets=MorphTargets(3, random.normal(size=(2, 3, 3))))
@@ -142,13 +142,13 @@ def test_equally_animated_targets_share_sliders():
 
 
 @pytest.mark.parametrize("key", ["generator", "copyright"])
-def test_facts_contain_the_asset(key):
+def test_facts_contain_the_asset_metadata(key):
     file = file_of(tree_of({"mesh": 0}), meshes=(mesh(triangle(1)),), asset={key: "somebody"})
     assert (key, "somebody") in figure_of(file).facts
 
 
-def test_binding_space_is_the_scene():
-    """A triangle bound at rest by two joints, whose matrices undo a quantisation."""
+def test_vertices_are_stored_in_scene_space():
+    """A triangle is bound at rest by two joints with matrices that undo a quantisation."""
     tree = tree_of(
         {"name": "hip", "translation": [0, 1, 0]},
         {"name": "knee", "parent": 0, "translation": [0, 2, 0]},

@@ -1,4 +1,4 @@
-"""Material libraries as other programs write them: names, defaults, and images in odd places."""
+"""Material libraries of other programs: names, defaults, and images in unexpected folders."""
 
 from __future__ import annotations
 
@@ -74,13 +74,13 @@ MOVED = ["F005.mtl-moved"]
     ],
 )
 def test_images_are_found_under_the_names_that_programs_write(read, written, used, said):
-    """Maya and 3ds Max write the path of their computer, Windows backslashes and any case."""
+    """Maya and 3ds Max write absolute paths; Windows programs write backslashes and any case."""
     material, keys = read(f"newmtl a\nmap_Kd {written}\n")
     assert material.image is not None and keys == said
     assert material.texture.replace("\\", "/") == used.replace("\\", "/")
 
 
-def test_images_that_are_nowhere_keep_their_warning(read):
+def test_missing_images_are_reported(read):
     assert read("newmtl a\nmap_Kd C:\\maps\\gone.png\n")[1] == ["F005.texture-refused"]
     assert read("newmtl a\nmap_Kd gone.png\n")[1] == ["F005.texture"]
 
@@ -113,19 +113,19 @@ def test_libraries_are_found_under_the_names_that_programs_write(read, library, 
         b"newmtl a\nKd 1 0 0\nKd 0 1 0\nmap_Kd\nmap_Kd \n\nnewmtl a\nKd 0 0 1\n",
     ],
 )
-def test_text_is_read_as_programs_and_editors_leave_it(read, text):
+def test_encodings_and_line_endings_of_programs_and_editors_are_read(read, text):
     material, keys = read(text)
     assert material.base_color == (1.0, 0.0, 0.0, 1.0) and keys == []
 
 
-def test_names_of_materials_may_contain_blanks(read):
+def test_names_of_materials_may_contain_spaces(read):
     material, keys = read("newmtl old skin (2)\nKd 1 0 0\n", uses="old skin (2)")
     assert material.base_color == (1.0, 0.0, 0.0, 1.0) and keys == []
 
 
 @pytest.mark.parametrize("head", ["# Blender 4.2.0 MTL File: 'a.blend'", "# 3ds Max Wavefront OBJ"])
 def test_maps_of_blender_and_3ds_max_replace_values(read, head):
-    """They write the default of an input as well as the image that is connected to it."""
+    """These programs write the default of an input in addition to the image connected to it."""
     text = "newmtl a\nKd 0.8 0.8 0.8\nmap_Kd skin.png\nPr 0.5\nmap_Pr skin.png\nKs 0 0 0\n"
     replaced, _ = read(f"{head}\n{text}")
     assert (replaced.base_color, replaced.roughness) == (None, 1.0)
@@ -135,12 +135,12 @@ def test_maps_of_blender_and_3ds_max_replace_values(read, head):
     assert (plain.base_color, plain.roughness) == ((0.8, 0.8, 0.8, 1.0), 0.5)
 
 
-def test_a_metallic_map_beside_pm_0_counts(read):
+def test_metallic_map_is_used_in_spite_of_pm_0(read):
     material, _ = read("newmtl a\nPm 0\nmap_Pm skin.png\nPr 0\nmap_Pr skin.png\n")
     assert (material.metallic, material.roughness) == (1.0, 0.0)
 
 
-def test_bump_maps_are_drawn_if_they_hold_normals(read):
+def test_bump_maps_are_drawn_if_they_contain_normals(read):
     material, keys = read("newmtl a\nmap_Bump -bm 0.5 normal.png\n")
     assert keys == [] and material.normal_scale == 0.5
     assert material.normal_texture.name == "normal.png"
@@ -163,19 +163,28 @@ def test_bump_maps_are_drawn_if_they_hold_normals(read):
         ("map_Kd skin.png\nd 1.0\nTr 1.0", "opaque", [255, 255]),
     ],
 )
-def test_opacity_of_images_is_a_mask_where_it_is_nearly_all_or_nothing(read, lines, mode, alpha):
+def test_opacity_of_images_is_a_mask_if_nearly_all_values_are_0_or_1(read, lines, mode, alpha):
     material, keys = read(f"newmtl a\n{lines}\n")
     assert (keys, material.alpha_mode) == ([], mode)
     assert_array_equal(material.image[0, :, 3], alpha)
 
 
-def test_ambient_maps_stand_in_for_missing_diffuse_ones(read):
+def test_ambient_maps_replace_missing_diffuse_maps(read):
     alone, keys = read("newmtl a\nmap_Ka skin.png\n")
     assert (alone.texture, keys) == ("skin.png", [])
     both, _ = read("newmtl a\nmap_Ka my skin.png\nmap_Kd skin.png\n")
     assert both.texture == "skin.png"
 
 
-def test_statements_that_are_not_drawn_are_named(read):
+def test_statements_that_are_not_drawn_are_reported(read):
     text = "newmtl a\nmap_Tr cut.png\nrefl -type sphere sky.png\nPs 0.1\naniso 0.5\nmap_Ns a.png\n"
     assert read(text)[1] == ["F007.mtl-statements"]
+
+
+def test_missing_library_with_spaces_in_its_name_is_reported_once(tmp_path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text(f"mtllib Part Studio 1.mtl\nusemtl a\n{FACE}f 1 2 3\n")
+    source = Source.open(path)
+    obj.read(source)
+    (warning,) = [found for found in source.diagnostics.warnings if found.key == "F005.library"]
+    assert "Part Studio 1.mtl" in warning.message

@@ -6,7 +6,7 @@ from viewer.formats import Source, obj
 
 
 def test_normals_of_many_vertices_are_averaged_without_overflow() -> None:
-    # 50,000 vertices by 50,000 normals are more pairs than 32 bits can number.
+    # The number of pairs of 50,000 vertices and 50,000 normals does not fit into 32 bits.
     count = 50_000
     text = "v 0 0 0\n" * (count - 3) + "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
     text += "vn 1 0 0\n" * (count - 2) + "vn 0 1 0\nvn 0 0 1\n"

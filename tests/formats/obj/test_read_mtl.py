@@ -15,7 +15,7 @@ FACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\n"
 
 @pytest.fixture
 def materials(tmp_path):
-    """Return a function that reads a library's materials and its diagnostics."""
+    """Return a function that reads the materials of a library and its diagnostics."""
     rows = {"grey": (128, 64, 32, 255), "white": (255, 255, 255, 255)}
     for name, color in rows.items():
         (tmp_path / f"{name}.png").write_bytes(encode_png(np.full((2, 4, 4), color, np.uint8)))
@@ -52,7 +52,7 @@ def test_the_pbr_extension_is_read(materials):
     assert textures["base_texture"].image is textures["roughness_texture"].image
 
 
-def test_maps_without_factors_count_in_full(materials):
+def test_maps_without_factors_have_a_factor_of_1(materials):
     (made,), _ = materials("newmtl a\nmap_Pr grey.png\nmap_Ke grey.png\n")
     assert (made.roughness, made.metallic, made.emissive) == (1.0, 0.0, (1.0, 1.0, 1.0))
 
@@ -78,13 +78,13 @@ def test_older_materials_keep_blinn_phong(materials):
         ("Tr 1", None),
     ],
 )
-def test_opacity_is_d_or_one_minus_tr(materials, lines, opacity):
+def test_opacity_is_read_from_d_or_one_minus_tr(materials, lines, opacity):
     (made,), _ = materials(f"newmtl a\n{lines}\n")
     assert made.alpha_mode == ("opaque" if opacity is None else "blend")
     assert made.base_color == (None if opacity is None else (1.0, 1.0, 1.0, opacity))
 
 
-def test_maps_of_opacity_become_alpha(materials):
+def test_opacity_maps_are_stored_as_alpha(materials):
     (made, alone), _ = materials(
         "newmtl a\nmap_Kd white.png\nmap_d grey.png\nnewmtl b\nmap_d grey.png\n"
     )
@@ -104,7 +104,7 @@ def test_pictures_are_placed_by_their_options(materials):
     )
 
 
-def test_what_is_wrong_or_not_drawn_is_said_by_line(materials):
+def test_errors_and_ignored_statements_are_reported_by_line(materials):
     (made,), said = materials(
         "newmtl a\nKd 1 0\nPr rough\nPm 1.5\nmap_Bump b.png\nmap_Ks s.png\nKe -1 0 0\nd\n"
     )

@@ -1,4 +1,4 @@
-"""``.obj`` files: contents, warnings, and refusals."""
+"""The ``.obj`` reader: contents, warnings, and refusals."""
 
 import time
 
@@ -43,7 +43,7 @@ def test_missing_normals_are_computed_and_listed_in_the_facts() -> None:
     assert figure.facts == (("normals", "none in the file: computed from the triangles"),)
 
 
-def test_corners_name_texture_coordinates_and_normals() -> None:
+def test_corners_refer_to_texture_coordinates_and_normals() -> None:
     text = SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\nvt .5 .25 0\nvn 0 1 0\nvn 1 0 0\n"
     figure = silent(text + "f 1/1/1 2/2/2 3/3/1\nf 3/4/1 4/1/1 1/2/1\n")
     mesh = figure.mesh
@@ -59,7 +59,7 @@ def test_normals_without_texture_coordinates() -> None:
     assert mesh.normals.tolist() == [[0, 1, 0]] * 4
 
 
-def test_faces_of_different_kinds_are_mixed() -> None:
+def test_faces_with_different_corner_formats_may_be_mixed() -> None:
     figure, warnings = read(
         SQUARE + "vt 1 1\nvn 1 0 0\nf 1//1 2//1 3//1\nf 1/1/1 3/1/1 4/1/1\nf 1 2 4"
     )
@@ -69,13 +69,13 @@ def test_faces_of_different_kinds_are_mixed() -> None:
     assert warnings == ["a.obj: 6 triangle corners without vt: 0 0 used"]
 
 
-def test_negative_indices_count_back_from_the_line() -> None:
+def test_negative_indices_count_back_from_their_line() -> None:
     text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -1 -3 -2\nf 1 -1 2\n"
     assert silent(text).mesh.triangles.tolist() == [[0, 1, 2], [3, 1, 2], [0, 3, 1]]
 
 
-def test_negative_indices_reach_back_over_chunks() -> None:
-    # 40,000 quads with four vertices each span several pieces of the file.
+def test_negative_indices_may_refer_to_earlier_chunks() -> None:
+    # 40,000 quads with four vertices each span several chunks of the file.
     block = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf -4 -3 -2 -1\n"
     mesh = silent(block * 40_000).mesh
     expected = np.arange(160_000).reshape(-1, 4)
@@ -96,20 +96,22 @@ def test_polygons_are_triangulated_and_counted() -> None:
     assert ("polygons", text) in figure.facts
 
 
-def test_a_concave_quad_is_split_at_its_reflex_corner() -> None:
-    # The fourth corner lies inside the triangle of the others: only its diagonal stays inside.
+def test_concave_quad_is_split_at_its_reflex_corner() -> None:
+    # The fourth corner is inside the triangle of the others, so only its diagonal is inside the
+    # quad.
     text = "v 0 0 0\nv 4 0 0\nv 0 4 0\nv 1 1 0\nf 1 2 4 3\nf 4 3 1 2\nf 2 4 3 1\nf 3 1 2 4\n"
     mesh = silent(text).mesh
     areas = triangle_areas(mesh.positions, mesh.triangles).reshape(4, 2)
-    assert areas.sum(axis=1) == pytest.approx([4.0] * 4)  # two of 1 * 4 / 2
+    assert areas.sum(axis=1) == pytest.approx([4.0] * 4)  # two triangles of 1 * 4 / 2
     a, b, c = (mesh.positions[mesh.triangles[:, k], :2] for k in range(3))
     crosses = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
     assert (crosses > 0).all()
 
 
 @pytest.mark.parametrize("turn", range(0, 12, 3))
-def test_a_concave_polygon_is_covered_exactly(turn: int) -> None:
-    # A comb with three teeth: 12 corners, area by the shoelace formula, in a slanted plane.
+def test_concave_polygon_is_covered_exactly(turn: int) -> None:
+    # A comb with three teeth has 12 corners in a slanted plane; the shoelace formula gives the
+    # area.
     flat = [(0, 0), (5, 0), (5, 3), (4, 3), (4, 1), (3, 1), (3, 3), (2, 3), (2, 1), (1, 1), (1, 3),
             (0, 3)]  # fmt: skip
     flat = flat[turn:] + flat[:turn]
@@ -123,9 +125,9 @@ def test_a_concave_polygon_is_covered_exactly(turn: int) -> None:
     assert crosses.sum() == pytest.approx(shoelace)
 
 
-def test_a_polygon_with_very_many_corners_is_fast() -> None:
+def test_polygon_with_very_many_corners_is_triangulated_quickly() -> None:
     angles = np.linspace(0, 2 * np.pi, 60_000, endpoint=False)
-    radii = 1.0 + 0.1 * np.cos(9 * angles)  # not convex: nine dents
+    radii = 1.0 + 0.1 * np.cos(9 * angles)  # nine dents make it concave
     points = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
     text = "".join(f"v {x} {y} 0\n" for x, y in points.tolist())
     start = time.process_time()
@@ -141,15 +143,15 @@ def test_triangles_of_a_closed_box_of_quads_enclose_its_volume() -> None:
     assert volume(mesh.positions, mesh.triangles) == pytest.approx(30.0)
 
 
-def test_weights_are_ignored_with_a_note() -> None:
+def test_weights_of_vertices_are_ignored_with_a_note() -> None:
     figure, warnings = read("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1 2\nv 0 0 1 1\nf 1 2 3\n")
     assert figure.mesh.positions.tolist()[:3] == [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
     assert warnings == ["a.obj:4: w of 1 vertex ignored"]
 
 
 @pytest.mark.parametrize(("half", "most"), [("0.5", "1"), ("127.5", "255")])
-def test_colours_of_vertices_become_linear(half: str, most: str) -> None:
-    """sRGB 0.5 is 0.2140 of the light; vertices without a colour are white."""
+def test_vertex_colours_are_converted_to_linear(half: str, most: str) -> None:
+    """sRGB 0.5 is 0.2140 in linear light; vertices without a colour are white."""
     mesh = silent(
         f"v 0 0 0 {most} 0 {half}\nv 1 0 0\nv 0 1 0 0 {half} 0 0.25\nf 1 2 3\nf 3 2 1\n"
     ).mesh
@@ -158,13 +160,13 @@ def test_colours_of_vertices_become_linear(half: str, most: str) -> None:
     assert silent("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n").mesh.colors is None
 
 
-def test_continued_lines_comments_and_blanks() -> None:
+def test_continued_lines_comments_and_white_space_are_read() -> None:
     text = "# a comment \\\nstill one\r\n\n  v 0 \\\n  0 0\n\tv 1 0 0 \nv 0 1\\\r\n 0\nf 1 \\\n2 3"
     assert silent(text).mesh.triangles.tolist() == [[0, 1, 2]]
 
 
 @pytest.mark.parametrize("end", ["\r\n", "\r", "\r\r\n"])
-def test_line_endings(end: str) -> None:
+def test_line_endings_may_vary(end: str) -> None:
     mesh = silent((SQUARE + "f 1 2 3\n").replace("\n", end)).mesh
     assert mesh.positions.shape == (4, 3) and mesh.triangles.tolist() == [[0, 1, 2]]
 
@@ -174,10 +176,10 @@ def test_unused_vertices_are_kept() -> None:
     assert mesh.n_vertices == 5 and mesh.triangles.tolist() == [[1, 2, 3]]
 
 
-def test_a_vertex_with_several_normals_gets_their_mean() -> None:
+def test_vertex_with_several_normals_gets_their_mean() -> None:
     text = SQUARE + "vn 0 0 1\nvn 0 1 0\nf 1//1 2//1 3//1\nf 1//2 3//1 4//1\nf 1//2 4//1 2//1\n"
     figure, warnings = read(text)
-    # Two faces share the second normal, which counts once: (0, 1, 1) / sqrt(2).
+    # Two faces share the second normal, which is averaged once: (0, 1, 1) / sqrt(2).
     half = 0.5**0.5
     np.testing.assert_allclose(figure.mesh.normals[0], [0, half, half], atol=1e-15)
     assert figure.mesh.normals[1:].tolist() == [[0, 0, 1]] * 3
@@ -197,7 +199,7 @@ def test_normals_of_length_0_are_computed() -> None:
     ]
 
 
-def test_materials_are_kept_as_runs() -> None:
+def test_materials_apply_to_runs_of_triangles() -> None:
     figure = silent(
         SQUARE + "f 1 2 3\nusemtl red\nf 1 2 3\nf 1 2 4\nusemtl a b\nf 1 2 3\nusemtl red\nf 2 3 4"
     )
@@ -205,19 +207,19 @@ def test_materials_are_kept_as_runs() -> None:
     assert figure.mesh.material_indices.tolist() == [-1, 0, 0, 1, 0]
 
 
-def test_groups_become_materials_where_there_are_none() -> None:
+def test_groups_are_used_as_materials_if_there_are_none() -> None:
     figure = silent(SQUARE + "o body\nf 1 2 3\ng shoe\nf 1 2 3 4\no body\nf 2 3 4")
     assert [material.name for material in figure.mesh.materials] == ["body", "shoe"]
     assert figure.mesh.material_indices.tolist() == [0, 1, 1, 0]
     assert ("parts", "2 groups and objects") in figure.facts
 
 
-def test_one_object_is_not_a_material() -> None:
+def test_single_object_is_not_used_as_a_material() -> None:
     figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
     assert figure.mesh.materials == ()
 
 
-def test_textures_come_from_the_library(tmp_path) -> None:
+def test_textures_are_read_from_the_library(tmp_path) -> None:
     pixels = np.full((2, 2, 4), 255, np.uint8)
     (tmp_path / "two words.png").write_bytes(encode_png(pixels))
     (tmp_path / "m.mtl").write_text(
@@ -266,7 +268,7 @@ def test_unsupported_elements_are_reported() -> None:
     ]
 
 
-def test_points_alone_are_a_warning() -> None:
+def test_file_with_only_points_is_read_with_a_warning() -> None:
     figure, warnings = read(SQUARE)
     assert figure.mesh.n_triangles == 0
     assert warnings == ["a.obj: no faces: 4 points, not drawn"]
@@ -293,7 +295,7 @@ def test_points_alone_are_a_warning() -> None:
          'found': 2})),
         (SQUARE + "vt\n", ('F002.width', 5, {'item': Phrase('obj-vt', index=0), 'expected': 1,
          'found': 0})),
-        (SQUARE + "f 1 2\n", ('F002.obj-face', 5, {'least': 3, 'found': 2})),
+        (SQUARE + "f\n", ('F002.obj-face', 5, {'least': 3, 'found': 0})),
         (SQUARE + "f 1 2 0\n", ('F002.obj-zero', 5, {})),
         (SQUARE + "vt 0 0\n\nf 1/1 2/0 3/1\n", ('F002.obj-zero', 7, {})),
         (SQUARE + "f 1 2 3\nf 1 2 5\n", ('F002.obj-v-range', 6, {'limit': 4, 'found': 5})),
@@ -344,7 +346,7 @@ def test_invalid_files_are_reported_with_location_and_reason(text: str, fault: F
     assert refusal_of(lambda: read(text)) == fault
 
 
-def test_format_is_detected_by_content_and_by_suffix() -> None:
+def test_format_is_detected_by_content_and_suffix() -> None:
     assert detect(Source("a.obj", b"# made by hand\n" + SQUARE.encode())) == "obj"
     assert detect(Source("a.txt", SQUARE.encode())) == "obj"
     assert detect(Source("a.obj", b"g nothing\n")) == "obj"
@@ -357,7 +359,7 @@ def test_exported_files_round_trip(tmp_path) -> None:
     written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
     assert scene.warnings == ()
     posed, normals = viewer.deform(actor.figure, actor.pose)
-    # Nine digits, for lengths up to 10.
+    # The file has nine digits, for lengths up to 10.
     np.testing.assert_allclose(mesh.positions, posed, atol=1e-8)
     np.testing.assert_allclose(mesh.normals, normals, atol=1e-8)
     assert np.array_equal(mesh.triangles, written.triangles)

@@ -13,7 +13,7 @@ from viewer.rig.arrays import Deferred
 
 
 def self_contained(data: bytes) -> None:
-    """Open bytes and access all values; refusals are ignored."""
+    """Open bytes and access all values; ignore refusals."""
     try:
         archive = opened(data)
     except FormatError as problem:

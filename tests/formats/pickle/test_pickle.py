@@ -1,4 +1,4 @@
-"""Pickles by all common writers: arrays are read as views of the file."""
+"""Pickles by all common writers, from which arrays are read as views of the file."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def values(data: bytes, key: str = "v") -> Any:
     return loaded
 
 
-def test_protocol_0_of_python_2() -> None:
+def test_protocol_0_of_python_2_is_read() -> None:
     assert_array_equal(values(PYTHON_2_TEXT), [[1.5, -2.0]])
 
 
@@ -96,11 +96,11 @@ def test_protocol_0_escapes_quotes_and_backslashes() -> None:
     assert opened(data).get("v") == "it's \\ A\n\t'"
 
 
-def test_protocol_1_of_python_2() -> None:
+def test_protocol_1_of_python_2_is_read() -> None:
     assert_array_equal(values(b"}q\x01U\x01vq\x02" + array(ROWS) + b"s."), ROWS)
 
 
-def test_protocol_2_of_python_2() -> None:
+def test_protocol_2_of_python_2_is_read() -> None:
     assert_array_equal(values(saved(v=array(ROWS))), ROWS)
 
 
@@ -124,14 +124,14 @@ def test_protocol_2_of_python_2() -> None:
     ],
     ids=lambda given: f"{given.dtype.str}-{given.shape}",
 )
-def test_every_protocol_of_python_3(given: Any, protocol: int) -> None:
+def test_every_protocol_of_python_3_is_read(given: Any, protocol: int) -> None:
     found = values(pickle.dumps({"v": given}, protocol))
     assert_array_equal(found, given)
     assert found.dtype == given.dtype.newbyteorder("=")
 
 
 @pytest.mark.parametrize("protocol", [2, 4, 5])
-def test_module_names_of_numpy_1(protocol: int) -> None:
+def test_module_names_of_numpy_1_are_read(protocol: int) -> None:
     data = pickle.dumps({"v": ROWS, "s": np.float32(0.5)}, protocol)
     if protocol > 2:
         data = unframed(data)
@@ -144,7 +144,7 @@ def test_module_names_of_numpy_1(protocol: int) -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 5])
-def test_plain_data(protocol: int) -> None:
+def test_plain_data_are_read(protocol: int) -> None:
     given = {
         "text": "grün €",
         "bytes": b"\x00\xff",
@@ -160,7 +160,7 @@ def test_plain_data(protocol: int) -> None:
         assert archive.get(key) == value, key
 
 
-def test_numpy_scalars_become_python_numbers() -> None:
+def test_numpy_scalars_are_read_as_python_numbers() -> None:
     given = {"f": np.float64(1.5), "i": np.int32(-7), "b": np.True_, "s": np.str_("x"), "e": ""}
     for protocol in (0, 2, 5):
         archive = opened(pickle.dumps(given, protocol))
@@ -168,7 +168,7 @@ def test_numpy_scalars_become_python_numbers() -> None:
         assert type(archive.get("f")) is float
 
 
-def test_sets_and_ordered_dicts_of_python_2() -> None:
+def test_sets_and_ordered_dicts_of_python_2_are_read() -> None:
     items = b"](" + text("b") + text("a") + b"e"
     pairs = b"](](" + text("k") + whole(1) + b"ee"
     data = saved(
@@ -180,12 +180,12 @@ def test_sets_and_ordered_dicts_of_python_2() -> None:
     assert archive.get("d") == {"k": 1}
 
 
-def test_sets_of_protocol_4_are_lists() -> None:
+def test_sets_of_protocol_4_are_read_as_lists() -> None:
     archive = opened(pickle.dumps({"s": {1}, "f": frozenset({2})}, 4))
     assert (archive.get("s"), archive.get("f")) == ([1], [2])
 
 
-def test_python_2_strings_are_latin_1() -> None:
+def test_python_2_strings_are_read_as_latin_1() -> None:
     assert opened(finished(b"}" + text("gr\xfcn") + text("\xe9") + b"s")).get("grün") == "é"
 
 
@@ -194,7 +194,7 @@ def test_protocol_0_text_may_have_any_character() -> None:
     assert opened(data).get("€") == "grün"
 
 
-def test_names_may_be_bytes() -> None:
+def test_names_may_be_byte_strings() -> None:
     assert opened(pickle.dumps({b"v": 1})).get("v") == 1
 
 
@@ -225,7 +225,7 @@ def test_pickled_values_are_read_once() -> None:
     ],
 )
 @pytest.mark.parametrize("shape_key", ["_shape", "shape"])
-def test_sparse_columns(module: str, name: str, shape_key: str) -> None:
+def test_sparse_columns_are_read(module: str, name: str, shape_key: str) -> None:
     found = opened(saved(v=matrix(module=module, name=name, shape_key=shape_key))).get("v")
     assert isinstance(found, Sparse)
     assert (found.shape, found.layout) == ((2, 3), "csc")
@@ -233,7 +233,7 @@ def test_sparse_columns(module: str, name: str, shape_key: str) -> None:
 
 
 @pytest.mark.parametrize("module", ["scipy.sparse.csr", "scipy.sparse._csr"])
-def test_sparse_rows(module: str) -> None:
+def test_sparse_rows_are_read(module: str) -> None:
     built = matrix(sides=(3, 2), module=module, name="csr_matrix")
     found = opened(saved(v=built)).sparse("v", ("J", "V"))
     assert (found.shape, found.layout) == ((3, 2), "csr")
@@ -241,7 +241,7 @@ def test_sparse_rows(module: str) -> None:
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 4])
-def test_objects_pickled_by_python(monkeypatch: pytest.MonkeyPatch, protocol: int) -> None:
+def test_objects_pickled_by_python_are_read(monkeypatch: pytest.MonkeyPatch, protocol: int) -> None:
     sparse = fake_class(monkeypatch, "scipy.sparse.csc", "csc_matrix")()
     sparse.__dict__ = {"_shape": (1, 1), "data": np.ones(1), "indices": np.zeros(1, "i4")}
     sparse.indptr = np.array([0, 1], "i4")
@@ -263,17 +263,17 @@ def ch(inner: bytes) -> bytes:
     return created("chumpy.ch", "Ch", mapping(x=inner, _dirty_vars=whole(0)))
 
 
-def test_chumpy_selection_of_an_array() -> None:
+def test_chumpy_selection_of_an_array_is_read() -> None:
     found = values(saved(v=select(ch(array(ROWS)), [0, 3, 11, 0], 2, 2)))
     assert found.tolist() == [[0, 0.375], [1.375, 0]]
 
 
-def test_chumpy_selection_of_a_selection() -> None:
+def test_chumpy_selection_of_a_selection_is_read() -> None:
     inner = select(array(ROWS), [5, 6, 7], 3)
     assert values(saved(v=ch(select(inner, [2, 0], 2)))).tolist() == [0.875, 0.625]
 
 
-def test_chumpy_handle() -> None:
+def test_chumpy_handle_is_read() -> None:
     data = saved(v=created("chumpy.ch", "ChHandle", mapping(x=ch(array(ROWS)))))
     assert_array_equal(values(data), ROWS)
 
@@ -322,7 +322,7 @@ def test_arrays_of_other_types_are_opaque(given: Any, what: Phrase) -> None:
     assert opened(pickle.dumps({"v": given}, 2)).get("v") == Opaque(what)
 
 
-def test_lists_of_arrays_stay_lists() -> None:
+def test_lists_of_arrays_are_read_as_lists() -> None:
     found = opened(saved(v=b"](" + array(ROWS) * 2 + b"e")).get("v")
     assert isinstance(found, list)
     assert [part.shape for part in found] == [(4, 3), (4, 3)]
@@ -341,28 +341,28 @@ def test_invalid_code_points_are_refused() -> None:
     )
 
 
-def test_old_dtype_without_state() -> None:
+def test_old_dtype_without_state_is_read() -> None:
     plain = named("numpy", "dtype") + several(text("f8"), b"\x89", b"\x88") + b"R"
     built = array(ROWS).replace(element_type(), plain)
     assert plain in built
     assert_array_equal(values(saved(v=built)), ROWS)
 
 
-def test_array_bytes_stored_as_unicode() -> None:
+def test_array_bytes_stored_as_unicode_are_read() -> None:
     built = array(ROWS).replace(payload(ROWS.tobytes()), unicode(ROWS.tobytes().decode("latin-1")))
     assert_array_equal(values(saved(v=built)), ROWS)
 
 
-def test_bytes_after_the_end_are_a_warning() -> None:
+def test_bytes_after_the_end_are_reported_in_a_warning() -> None:
     source = Source("model.pkl", saved(v=whole(1)) + b"more")
     assert open_archive(source).get("v") == 1
     assert warnings_of(source.diagnostics) == [("F006.pickle-rest", None, {"n": 4})]
 
 
-def test_synthetic_model_equals_its_npz() -> None:
+def test_synthetic_pickle_equals_its_npz() -> None:
     folder = DATA / "smpl_synthetic"
     if not folder.is_dir():
-        pytest.skip("no synthetic model beside the checkout")
+        pytest.skip("no synthetic model next to the checkout")
     archive = open_archive(Source.open(folder / "SMPL_NEUTRAL.pkl"))
     dense = open_archive(Source.open(folder / "SMPL_NEUTRAL.npz"))
     assert set(archive.keys) == set(dense.keys)
@@ -374,10 +374,10 @@ def test_synthetic_model_equals_its_npz() -> None:
     assert_array_equal(weights, dense.array("J_regressor").values()[rows, columns])
 
 
-def test_pig_has_its_shapes() -> None:
+def test_pig_pickle_has_the_published_shapes() -> None:
     path = DATA / "pig" / "PIG_core.pkl"
     if not path.is_file():
-        pytest.skip("no pig beside the checkout")
+        pytest.skip("no PIG model next to the checkout")
     archive = open_archive(Source.open(path))
     archive.array("vertices", (11239, 3), "f")
     archive.array("faces_vert", (22446, 3), "iu")

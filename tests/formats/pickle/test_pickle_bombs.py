@@ -1,4 +1,4 @@
-"""Pickles with false sizes, repeated or circular values, or random damage."""
+"""Pickles with false sizes, or with repeated or circular values."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ from viewer.errors import FormatError
 from viewer.formats._archive.values import Opaque
 
 pytestmark = pytest.mark.slow
-BOUND = 64 << 20  # bytes of memory that may be allocated before the error
-PATIENCE = 5.0  # seconds; far more than needed, even on a busy machine
+BOUND = 64 << 20  # limit of allocated memory in bytes
+PATIENCE = 5.0  # in seconds; far more than needed, even on a busy machine
 
 
 def is_too_long(fault: Fault) -> bool:
@@ -51,7 +51,7 @@ ENDLESS = Opaque(Phrase("unread-endless"))
 
 
 def cost(action: Callable[[], Any]) -> int:
-    """Return the peak memory of an action in bytes."""
+    """Return the peak memory of a call in bytes."""
     started = time.process_time()
     tracemalloc.start()
     try:
@@ -59,7 +59,7 @@ def cost(action: Callable[[], Any]) -> int:
         most = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert time.process_time() - started < PATIENCE * 4  # tracing is slow
+    assert time.process_time() - started < PATIENCE * 4  # tracing slows the call down
     return most
 
 
@@ -87,7 +87,7 @@ def cost(action: Callable[[], Any]) -> int:
          {"problem": Phrase("array-bytes", shape=(1099511627776,), dtype="bytes32", found=4)})),
     ],
 )  # fmt: skip
-def test_shapes_that_do_not_match_their_bytes(body: bytes, line: Fault) -> None:
+def test_shapes_that_do_not_match_their_bytes_are_refused(body: bytes, line: Fault) -> None:
     data = saved(v=body)
     assert refusal(data) == line
     assert cost(lambda: refusal(data)) < BOUND
@@ -102,7 +102,7 @@ def test_element_types_without_numbers_are_not_evaluated(code: str) -> None:
 
 
 @pytest.mark.parametrize("sides", [(1,) * 33, (1,) * 100_000, (1 << 62,), (1 << 2000,)])
-def test_shapes_beyond_numpy_limits(sides: tuple[int, ...]) -> None:
+def test_shapes_beyond_the_limits_of_numpy_are_refused(sides: tuple[int, ...]) -> None:
     line = refusal(saved(v=array_of(sides, b"12345678")))
     assert line == (
         "F002.pickle",
@@ -144,7 +144,7 @@ def test_shapes_beyond_numpy_limits(sides: tuple[int, ...]) -> None:
          "problem": Phrase("sparse-no-shape")})),
     ],
 )  # fmt: skip
-def test_sparse_matrices_that_contradict_themselves(changes: Any, line: Fault) -> None:
+def test_inconsistent_sparse_matrices_are_refused(changes: Any, line: Fault) -> None:
     data = saved(v=matrix(**changes))
     assert refusal(data) == line
     assert cost(lambda: refusal(data)) < BOUND
@@ -165,7 +165,7 @@ def test_sparse_shape_is_checked_before_densifying() -> None:
     )
 
 
-def test_sparse_matrix_without_parts() -> None:
+def test_sparse_matrix_without_its_arrays_is_refused() -> None:
     state = mapping(_shape=shape(2, 3), data=whole(1))
     body = created("scipy.sparse.csc", "csc_matrix", state)
     assert refusal(saved(v=body)) == (
@@ -201,7 +201,7 @@ def selection(indices: list[int], *sides: int) -> bytes:
          found=2)})),
     ],
 )  # fmt: skip
-def test_selections_out_of_range(data: bytes, line: Fault) -> None:
+def test_selections_out_of_range_are_refused(data: bytes, line: Fault) -> None:
     assert refusal(data) == line
 
 
@@ -213,13 +213,13 @@ def test_selection_of_long_strings_is_not_evaluated() -> None:
 
 
 @pytest.mark.parametrize("name", ["Ch", "ChHandle"])
-def test_expression_that_contains_itself(name: str) -> None:
+def test_expression_that_contains_itself_is_not_expanded(name: str) -> None:
     body = named("chumpy.ch", name) + b")\x81q\x01}" + text("x") + b"h\x01sb"
     found = opened(saved(v=body)).get("v")
     assert found == Opaque(Phrase("unread-expression-endless", name=f"chumpy.ch.{name}"))
 
 
-def test_containers_that_contain_themselves() -> None:
+def test_containers_that_contain_themselves_are_not_expanded() -> None:
     data = saved(
         a=b"]q\x01h\x01a",
         b=b"}q\x02" + text("x") + b"h\x02s",
@@ -240,7 +240,7 @@ WRAPPERS = {
 
 
 @pytest.mark.parametrize("kind", WRAPPERS)
-def test_nesting_100_000_deep(kind: str) -> None:
+def test_nesting_100_000_deep_is_not_expanded(kind: str) -> None:
     before, after = WRAPPERS[kind]
     found = opened(saved(v=before * 100_000 + b"N" + after * 100_000)).get("v")
     assert found == ENDLESS or found == Opaque(
@@ -256,29 +256,29 @@ def doubled(first: bytes, step: Callable[[bytes], bytes], count: int) -> bytes:
 
 
 @pytest.mark.parametrize("count", [20, 100])
-def test_lists_of_the_same_list_twice(count: int) -> None:
-    """The billion laughs: 2^100 items in 800 bytes."""
+def test_lists_that_repeatedly_contain_the_same_list_are_not_expanded(count: int) -> None:
+    """The "billion laughs" attack: 2^100 items in 800 bytes."""
     for step in (lambda inner: b"](" + inner * 2 + b"e", lambda inner: inner * 2 + b"\x86"):
         data = saved(v=doubled(b"]", step, count))
         assert opened(data).get("v") == ENDLESS
         assert cost(lambda data=data: opened(data).get("v")) < BOUND
 
 
-def test_sets_of_the_same_list_repeatedly() -> None:
+def test_repeated_sets_of_the_same_list_are_refused() -> None:
     items = b"](" + b"N" * 100_000 + b"eq\x01"
     again = named("__builtin__", "set") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
     assert is_too_long(refusal(data))
 
 
-def test_dicts_with_the_same_key_repeatedly() -> None:
+def test_repeated_dicts_with_the_same_keys_are_refused() -> None:
     items = b"](" + (text("k") + b"N\x86") * 100_000 + b"eq\x01"
     again = named("collections", "OrderedDict") + b"(h\x01tR"
     data = saved(v=b"](" + items + again * 1000 + b"e")
     assert is_too_long(refusal(data))
 
 
-def test_long_string_used_repeatedly() -> None:
+def test_repeated_use_of_a_long_string_is_refused() -> None:
     long = payload(b"x" * 1_000_000) + b"q\x01"
     encoded = unicode("x" * 1_000_000) + b"q\x02" + unicode("latin1") + b"q\x03"
     encode = named("_codecs", "encode") + b"(h\x02h\x03tR"
@@ -295,13 +295,13 @@ def test_long_string_used_repeatedly() -> None:
         assert cost(lambda data=data: self_contained(data)) < BOUND
 
 
-def test_strings_are_not_an_array() -> None:
-    """Numpy would make every element as long as the longest."""
+def test_strings_are_not_converted_to_an_array() -> None:
+    """Numpy would allocate the length of the longest string for every element."""
     data = saved(v=b"](" + payload(b"x" * 1_000_000) + b"e" + b"(" + b"K\x01" * 10_000 + b"e")
     assert cost(lambda: self_contained(data)) < BOUND
 
 
-def test_huge_memo_index_allocates_nothing() -> None:
+def test_huge_memo_index_does_not_allocate_memory() -> None:
     data = saved(v=b"Nr\xff\xff\xff\x7fj\xff\xff\xff\x7f" + b"0")
     assert opened(data).get("v") is None
     assert cost(lambda: opened(data)) < 1 << 20
@@ -317,7 +317,7 @@ def test_endless_opcodes_terminate(step: bytes) -> None:
     )
 
 
-def test_huge_declared_lengths_allocate_nothing() -> None:
+def test_huge_declared_lengths_do_not_allocate_memory() -> None:
     for step in (b"B\xff\xff\xff\x7f", b"\x8e" + b"\xff" * 5 + b"\0" * 3, b"\x96" + b"\xff" * 8):
         assert cost(lambda step=step: refusal(saved(v=step))) < 1 << 20
 
@@ -345,7 +345,7 @@ def test_huge_declared_lengths_allocate_nothing() -> None:
          found=Phrase("noun-text"))})),
     ],
 )  # fmt: skip
-def test_keys_that_are_not_strings(key: bytes, found: Fault) -> None:
+def test_keys_other_than_strings_are_refused(key: bytes, found: Fault) -> None:
     assert refusal(saved(v=b"}" + key + b"Ns")) == found
     assert refusal(saved(v=b"(" + key + b"Nd")) == found
 
@@ -371,5 +371,5 @@ def test_top_level_object_must_be_a_dict(body: bytes, found: Fault) -> None:
     assert refusal(finished(body)) == found
 
 
-def test_same_name_as_str_and_bytes() -> None:
+def test_equal_names_as_str_and_bytes_are_refused() -> None:
     assert refusal(pickle.dumps({b"v": 1, "v": 2})) == ("F002.pickle-twice", None, {"item": "v"})

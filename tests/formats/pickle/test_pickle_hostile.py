@@ -1,4 +1,4 @@
-"""Malicious pickles: each gives one line, and nothing in them is executed, written or allocated."""
+"""Malicious pickles, which are refused in one line without execution, writing or allocation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ FORBIDDEN = "which is not allowed; nothing was executed"
 
 @pytest.fixture(autouse=True)
 def marker(tmp_path: Path) -> Iterator[Path]:
-    """A file that every attack would write."""
+    """A file that every attack writes if it succeeds."""
     path = tmp_path / "marker"
     yield path
     assert not path.exists()
@@ -108,7 +108,7 @@ def test_attacks_in_this_file_work_with_the_standard_unpickler(tmp_path: Path) -
         ("numpy.ndarray", ""),
     ],
 )
-def test_globals_outside_the_table(module: str, name: str, marker: Path) -> None:
+def test_globals_outside_the_table_are_refused(module: str, name: str, marker: Path) -> None:
     argument = text(written(marker))
     problem = Phrase("pickle-global", name=printable(f"{module}.{name}"))
     fault = ("F002.pickle", None, {"problem": problem})
@@ -149,7 +149,7 @@ CODE = text("f8")
          found=Phrase("noun", name="chumpy.ch.Ch"))})),
     ],
 )  # fmt: skip
-def test_calls_of_non_functions(body: bytes, line: Fault) -> None:
+def test_calls_of_non_functions_are_refused(body: bytes, line: Fault) -> None:
     assert refusal(saved(v=body)) == line
 
 
@@ -189,7 +189,9 @@ RECONSTRUCT = ("numpy.core.multiarray", "_reconstruct")
         ("numpy.core.multiarray", "scalar", [text("f8"), text("x" * 8)], "a string, a string"),
     ],
 )  # fmt: skip
-def test_unusual_arguments(module: str, name: str, arguments: list[bytes], found: str) -> None:
+def test_unusual_arguments_are_refused(
+    module: str, name: str, arguments: list[bytes], found: str
+) -> None:
     key, _, values = refusal(saved(v=reduced(module, name, *arguments)))
     problem = values["problem"]
     assert (key, problem.key) == ("F002.pickle", "pickle-arguments")
@@ -217,7 +219,7 @@ def test_unusual_arguments(module: str, name: str, arguments: list[bytes], found
          found=Phrase("noun-other", kind="list"))})),
     ],
 )  # fmt: skip
-def test_new_objects_of_other_classes(body: bytes, found: Fault) -> None:
+def test_new_objects_of_other_classes_are_refused(body: bytes, found: Fault) -> None:
     assert refusal(saved(v=body)) == found
 
 
@@ -260,11 +262,11 @@ SLOTS = several(b"N", mapping(toarray=whole(1)))
          {"problem": Phrase("pickle-dtype-state", found=Phrase("noun-other", kind="tuple"))})),
     ],
 )  # fmt: skip
-def test_malformed_states(body: bytes, line: Fault) -> None:
+def test_malformed_states_are_refused(body: bytes, line: Fault) -> None:
     assert refusal(saved(v=body)) == line
 
 
-def test_states_set_no_attributes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_set_no_attributes_of_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     state = mapping(
         x=array(np.ones(2)),
         __class__=whole(1),
@@ -280,7 +282,7 @@ def test_states_set_no_attributes(monkeypatch: pytest.MonkeyPatch) -> None:
     assert archive.get("b") == Opaque(Phrase("unread-chumpy", name="chumpy.ch.Ch"))
 
 
-def test_loads_share_no_state() -> None:
+def test_pickles_share_no_state() -> None:
     refusal(saved(v=named(*MATRIX) + mapping(role=text("x")) + b"b"))
     assert opened(saved(v=matrix())).sparse("v").shape == (2, 3)
 
@@ -304,7 +306,7 @@ def test_loads_share_no_state() -> None:
          found=Phrase("noun-buffer"))})),
     ],
 )  # fmt: skip
-def test_opcodes_with_out_of_range_references(body: bytes, found: Fault) -> None:
+def test_opcodes_with_out_of_range_references_are_refused(body: bytes, found: Fault) -> None:
     assert refusal(saved(v=body)) == found
 
 
@@ -376,5 +378,5 @@ def test_opcodes_with_out_of_range_references(body: bytes, found: Fault) -> None
     ],
     ids=lambda value: repr(value[:12]),
 )  # fmt: skip
-def test_damage(body: bytes, line: Fault) -> None:
+def test_damaged_opcodes_are_refused(body: bytes, line: Fault) -> None:
     assert refusal(b"\x80\x02}" + text("vv") + body + b"s.") == line

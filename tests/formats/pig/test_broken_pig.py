@@ -1,4 +1,4 @@
-"""Broken PIG models with their exact messages: file, line, what was found and expected."""
+"""Broken PIG models and their messages: file, line, found and expected values."""
 
 import numpy as np
 import pytest
@@ -169,7 +169,7 @@ def test_broken_table_is_refused_with_file_and_line(folder, change, message):
         (["t_pose_joints", "skinning_weights"], ["t_pose_joints.txt", "skinning_weights.txt"]),
     ],
 )
-def test_missing_files_are_named_with_the_folder(folder, gone, names):
+def test_missing_files_are_reported_with_the_folder(folder, gone, names):
     write(folder, **dict.fromkeys(gone))
     assert refusal(folder) == ("pig", "F002.pig-folder", None, {"missing": names})
 
@@ -192,7 +192,7 @@ def test_large_file_in_the_folder_is_refused_before_it_is_read(folder):
 # Unusual weights that load
 
 
-def test_vertices_without_weights_stay_in_the_rest_pose(folder):
+def test_vertices_without_weights_do_not_move(folder):
     rows = WEIGHTS.replace("1 1 1\n", "").replace("2 3 1\n", "0 3 0\n")
     figure, warnings = read(write(folder, skinning_weights=rows))
     assert warnings == [
@@ -201,12 +201,12 @@ def test_vertices_without_weights_stay_in_the_rest_pose(folder):
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = 1.0
     assert_array_equal(deform(figure, pose)[0][[1, 3]], [[1, 0, 0], [1, 1, 0]])
-    # They would not move with normalised weights either.
+    # With normalised weights, these vertices would not move either.
     assert dict(figure.facts)["normalising"] == "would move rest vertices by up to 0.00 mm"
     assert dict(figure.facts)["weights"] == "raw; their sums are 1.000 to 1.000"
 
 
-def test_weight_sums_far_from_1_are_counted_with_the_worst(folder):
+def test_weight_sums_far_from_1_are_counted_and_the_worst_is_reported(folder):
     rows = WEIGHTS.replace("1 1 1\n", "1 1 0.98\n").replace("2 3 1\n", "2 3 1.5\n")
     _, warnings = read(write(folder, skinning_weights=rows))
     assert warnings == [
@@ -218,7 +218,7 @@ def test_weight_sums_far_from_1_are_counted_with_the_worst(folder):
     ]
 
 
-def test_negative_weights_are_counted_and_kept(folder):
+def test_negative_weights_are_counted_and_used(folder):
     rows = WEIGHTS.replace("0 2 0.75", "0 2 1.25").replace("1 2 0.25", "1 2 -0.25")
     figure, warnings = read(write(folder, skinning_weights=rows))
     assert warnings == [("W002.pig-negative", None, {"name": "skinning_weights.txt", "n": 1})]
@@ -311,12 +311,12 @@ def test_truncated_pickle_is_refused(tmp_path, cut):
          {"found": "HTML or XML (a failed download?)"})),
     ],
 )  # fmt: skip
-def test_non_model_pickle_is_refused(tmp_path, data, message):
+def test_pickle_of_other_data_is_refused(tmp_path, data, message):
     (tmp_path / "a.pkl").write_bytes(data)
     assert refusal(tmp_path / "a.pkl") == message
 
 
-def test_pickle_with_another_global_names_it(tmp_path):
+def test_pickle_with_a_disallowed_global_is_refused_by_name(tmp_path):
     call = named("os", "system") + several(text("true")) + b"R"
     (tmp_path / "a.pkl").write_bytes(saved(vertices=call))
     problem = Phrase("pickle-global", name="os.system")
@@ -326,7 +326,7 @@ def test_pickle_with_another_global_names_it(tmp_path):
 # Poses
 
 
-def test_pose_of_another_length_is_refused_with_both_counts(folder):
+def test_pose_of_a_different_length_is_refused_with_both_counts(folder):
     figure = silent(write(folder))
     with pytest.raises(RigError, match=r"^expected 13 pose values for pig, found 12$"):
         apply_record(PoseRecord(vector=np.zeros(12)), figure, rest_pose(figure.skeleton))

@@ -1,4 +1,4 @@
-"""PIG models from a folder of tables or an archive: all files, and all spellings."""
+"""PIG models from a folder of tables or an archive: all files and all notations."""
 
 import pickle
 
@@ -28,7 +28,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.skinning import deform, joint_matrices
 
-EXACT = 1e-15  # metres; a rounding error or two of values near 1
+EXACT = 1e-15  # metres; one or two rounding errors of values near 1
 
 
 @pytest.fixture
@@ -40,14 +40,14 @@ def facts(figure):
     return dict(figure.facts)
 
 
-# The folder
+# Models in a folder
 
 
 def test_folder_with_every_file_is_read(folder):
     assert_good(silent(write(folder)))
 
 
-def test_core_files_alone_are_read(folder):
+def test_core_files_without_optional_files_are_read(folder):
     figure = silent(write(folder, CORE))
     assert_core(figure)
     assert (figure.body_parts, figure.symmetry, figure.reduced) == (None, None, None)
@@ -76,11 +76,11 @@ def test_folder_is_recognised_and_named_after_itself(folder):
     ],
     ids="crlf cr crcrlf bom tabs blank-led cut-newline newlines gaps ctrl-z".split(),  # noqa: SIM905
 )
-def test_table_format_variants_load_silently(folder, change):
+def test_table_format_variants_load_without_warnings(folder, change):
     assert_good(silent(write(folder, {name: change(text.encode()) for name, text in GOOD.items()})))
 
 
-def test_numbers_may_be_written_in_any_way(folder):
+def test_numbers_may_be_written_in_any_notation(folder):
     changed = "-0 +0 .0\n1.000000000 0e5 -1.08033e-07\n0 10e-1 0\n1 1. 0\n2 2 -1"
     figure, warnings = read(write(folder, vertices=changed))
     assert warnings == []
@@ -89,43 +89,45 @@ def test_numbers_may_be_written_in_any_way(folder):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_weights_may_come_in_any_order(folder, seed):
+def test_weights_may_be_in_any_order(folder, seed):
     rows = GOOD["skinning_weights.txt"].splitlines()
     np.random.default_rng(seed).shuffle(rows)
     assert influences(silent(write(folder, skinning_weights="\n".join(rows)))) == WEIGHTS
 
 
-def test_weights_are_kept_as_stored(folder):
+def test_weights_are_used_as_stored(folder):
     rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.24800000\n2 3 1\n2 4 0.5\n1 4 0.5\n"
-    figure = silent(write(folder, skinning_weights=rows))  # up to 0.01 is the authors' rounding
+    # Deviations up to 0.01 are rounding by the authors.
+    figure = silent(write(folder, skinning_weights=rows))
     assert influences(figure)[:3] == [[(0, 0.998)], [(1, 1.002)], [(0, 0.75), (1, 0.248)]]
     # Raw weights scale a vertex about the origin, even at rest.
     rest = [[0, 0, 0], [1.002, 0, 0], [0, 0.998, 0], [1, 1, 0], [2, 2, -1]]
     assert_allclose(deform(figure)[0], rest, rtol=0, atol=EXACT)
 
 
-def test_fact_reports_the_effect_of_normalising(folder):
+def test_fact_states_the_effect_of_normalising(folder):
     rows = "0 0 0.998\n1 1 1.002\n0 2 0.75\n1 2 0.25\n2 3 0.999\n2 4 0.5\n1 4 0.503\n"
     told = facts(silent(write(folder, skinning_weights=rows)))
-    # The last vertex is 3 m from the origin, its weights sum to 1.003: 9 mm, the largest error.
+    # The last vertex is 3 m from the origin, and its weights sum to 1.003; 9 mm is the largest
+    # error.
     assert told["normalising"] == "would move rest vertices by up to 9.00 mm"
     assert told["weights"] == "raw; their sums are 0.998 to 1.003"
 
 
-def test_fact_reports_the_distance_of_regressed_joints(folder):
-    # Joint 2 is regressed to the middle of (1, 1, 0) and (2, 2, -1), sqrt(1.5) m from where it is.
+def test_fact_states_the_distance_of_regressed_joints(folder):
+    # Joint 2 is regressed to the middle of (1, 1, 0) and (2, 2, -1), sqrt(1.5) m from its position.
     assert facts(silent(write(folder)))["joint regressor"] == (
         "408.25 mm from the file's joints on average, 1224.74 mm at most; "
         "used when the rest mesh changes"
     )
 
 
-def test_unused_files_are_named(folder):
+def test_unused_files_are_listed(folder):
     write(folder, {**GOOD, "PIG.obj": "v 0 0 0", "SOURCE.md": "x", ".hidden": "x"})
     assert facts(silent(folder))["not needed"] == "PIG.obj, SOURCE.md"
 
 
-def test_body_part_names_may_have_blanks_or_be_missing(folder):
+def test_body_part_names_may_have_spaces_or_be_missing(folder):
     figure = silent(write(folder, body_part_defs="NOT BODY\r\nMAIN BODY\r\nHEAD\r\n"))
     assert figure.body_parts.names == ("NOT BODY", "MAIN BODY", "HEAD")
     figure = silent(write(folder, body_part_defs=None))
@@ -138,14 +140,16 @@ def test_body_part_names_may_have_blanks_or_be_missing(folder):
 def test_root_uses_euler_angles_and_others_rotation_vectors(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
-    # 90 degrees about z, the root's first value; 90 degrees about x for joint 1.
+    # The first root value rotates by 90 degrees about z; joint 1 rotates by 90 degrees about x.
     numbers = [0, 0, 0, np.pi / 2, 0, 0, np.pi / 2, 0, 0, 0, 0, 0, 1]
     assert apply_record(PoseRecord(vector=np.array(numbers)), figure, pose) == []
-    # Joint 2 is at (0, 1, 0.5) from joint 1: about x (0, -0.5, 1), plus (1, 0, 0), about z.
+    # Joint 2 is at (0, 1, 0.5) from joint 1; rotated about x it is (0, -0.5, 1), then (1, 0, 0) is
+    # added, then all is rotated about z.
     joints = joint_matrices(figure, pose)[:, :3, 3]
     assert_allclose(joints, [[0, 0, 0], [0, 1, 0], [0.5, 1, 1]], rtol=0, atol=EXACT)
-    # Vertex 2 is 3/4 (-1, 0, 0) by the root and 1/4 by joint 1, from where it is at (-1, 1, 0).
-    # About x that is (-1, 0, 1), with joint 1 (0, 0, 1), about z (0, 0, 1).
+    # Vertex 2 is moved to (-1, 0, 0) by the root with weight 3/4. From joint 1, with weight 1/4, it
+    # is at (-1, 1, 0): rotated about x (-1, 0, 1), plus joint 1 (0, 0, 1), rotated about z (0, 0,
+    # 1).
     expected = [-0.75, 0, 0.25]
     assert_allclose(deform(figure, pose)[0][2], expected, rtol=0, atol=EXACT)
 
@@ -155,12 +159,12 @@ def test_root_applies_its_third_angle_first(folder):
     pose = rest_pose(figure.skeleton)
     numbers = [0, 0, 0, np.pi / 2, 0, np.pi / 2, *[0] * 6, 1]
     apply_record(PoseRecord(vector=np.array(numbers)), figure, pose)
-    # Rz Rx: y goes to z by x and stays there; x goes to y by z.
+    # In Rz Rx, Rx maps y to z, where Rz leaves it, and Rz maps x to y.
     turn = joint_matrices(figure, pose)[0, :3, :3]
     assert_allclose(turn, [[0, 0, 1], [1, 0, 0], [0, 1, 0]], rtol=0, atol=EXACT)
 
 
-def test_scale_comes_before_translation_and_about_the_origin(folder):
+def test_scale_is_applied_before_translation_and_about_the_origin(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     apply_record(PoseRecord(vector=np.array([10.0, 20, 30, *[0] * 9, 2])), figure, pose)
@@ -168,7 +172,7 @@ def test_scale_comes_before_translation_and_about_the_origin(folder):
     assert_array_equal(joint_matrices(figure, pose)[2, :3, 3], [12, 22, 31])
 
 
-def test_scale_of_0_or_less_is_noted(folder):
+def test_scale_of_0_or_less_is_reported(folder):
     figure = silent(write(folder))
     pose = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(vector=np.array([0.0] * 12 + [-2])), figure, pose)
@@ -181,14 +185,14 @@ def test_scale_of_0_or_less_is_noted(folder):
 
 def test_vertex_on_a_seam_is_split_by_texture_coordinate(folder):
     sources, uv_indices, triangles = split_seams(silent(write(folder)).mesh)
-    # Vertices 1 and 2 twice; vertex 4, of no triangle, once.
+    # Vertices 1 and 2 occur twice; vertex 4, which is in no triangle, occurs once.
     assert sorted(sources.tolist()) == [0, 1, 1, 2, 2, 3, 4]
     assert sources[triangles].tolist() == [[0, 1, 2], [1, 3, 2]]
     assert uv_indices[triangles].tolist() == [[0, 1, 2], [3, 4, 5]]
 
 
 @pytest.mark.parametrize("gone", ["textures", "faces_tex"])
-def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
+def test_figure_without_texture_coordinates_is_untextured(folder, gone):
     figure, warnings = read(write(folder, **{gone: None}))
     assert_core(figure)
     assert (figure.mesh.uvs, figure.mesh.uv_triangles) == (None, None)
@@ -200,7 +204,7 @@ def test_without_texture_coordinates_the_figure_is_untextured(folder, gone):
 RED = np.full((2, 2, 4), (255, 0, 0, 255), np.uint8)
 
 
-def test_image_in_the_folder_becomes_the_texture(folder):
+def test_image_in_the_folder_is_used_as_texture(folder):
     write(folder)
     save_image(folder / "skin.png", RED)
     scene = viewer.load(folder)
@@ -211,7 +215,7 @@ def test_image_in_the_folder_becomes_the_texture(folder):
     assert scene.actors[0].figure.mesh.material_indices.tolist() == [0, 0]
 
 
-def test_two_images_are_not_chosen_from(folder):
+def test_neither_of_two_images_is_used(folder):
     write(folder)
     for name in ("a.png", "b.jpg"):
         save_image(folder / name, RED)
@@ -230,7 +234,7 @@ def test_invalid_image_in_the_folder_leaves_the_figure_untextured(folder):
     assert warning.endswith("; drawn untextured")
 
 
-def test_image_named_together_with_the_folder_becomes_the_texture(folder, tmp_path):
+def test_image_opened_together_with_the_folder_is_used_as_texture(folder, tmp_path):
     save_image(tmp_path / "red.png", RED)
     figure = viewer.load(tmp_path / "red.png", write(folder)).actors[0].figure
     assert figure.mesh.materials[0].texture == "red.png"
@@ -257,7 +261,7 @@ def test_vertex_major_matrices_are_recognised_by_shape(tmp_path):
     assert_good(silent(tmp_path / "pig.npz"))
 
 
-def test_columns_may_be_two_dimensional_and_of_other_types(tmp_path):
+def test_columns_may_be_two_dimensional_and_of_different_types(tmp_path):
     given = arrays()
     for name in ("parents", "body_parts", "sym", "reduced_ids"):
         given[name] = given[name][:, None].astype(">i2")
@@ -268,7 +272,7 @@ def test_columns_may_be_two_dimensional_and_of_other_types(tmp_path):
 
 
 def sparse(dense):
-    """A matrix in compressed columns, as Python 2 pickled it."""
+    """Return a matrix in compressed columns as pickled by Python 2."""
     rows = [np.flatnonzero(column) for column in dense.T]
     return matrix(
         sides=dense.shape,
@@ -314,7 +318,7 @@ def test_archive_reports_unused_keys(tmp_path):
     assert facts(silent(tmp_path / "pig.npz"))["not needed"] == "author"
 
 
-def test_pickle_that_calls_anything_else_is_refused(tmp_path):
+def test_pickle_with_other_calls_is_refused(tmp_path):
     (tmp_path / "PIG.pkl").write_bytes(
         saved(vertices=named("os", "system") + several(text("touch gone")) + b"R")
     )

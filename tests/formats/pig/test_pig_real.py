@@ -33,7 +33,7 @@ def pig(folder):
 
 
 def numbers(joints=None, translation=(0, 0, 0), scale=1.0):
-    """Return the authors' 190 values."""
+    """Return the 190 pose values of the authors."""
     vector = np.zeros(190)
     vector[:3], vector[189] = translation, scale
     for joint, turn in (joints or {}).items():
@@ -55,7 +55,7 @@ THREE = {8: (0, 0.5, 0), 23: (0, 0, 0.4), 46: (0, -0.3, 0.2)}
 # Counts
 
 
-def test_counts(pig):
+def test_counts_are_those_of_the_specification(pig):
     assert (pig.mesh.n_vertices, pig.mesh.n_triangles, len(pig.mesh.uvs)) == (11239, 22446, 12208)
     assert (pig.skeleton.n_joints, pig.skin.n_joints) == (62, 62)
     assert (len(pig.skin.weights), len(pig.joint_regressor.weights)) == (38841, 8079)
@@ -63,7 +63,7 @@ def test_counts(pig):
     assert pig.pose_layout.n_numbers == 190
 
 
-def test_influences_are_all_kept(pig):
+def test_all_influences_are_kept(pig):
     counts = influence_counts(pig.skin)
     assert (counts.max(), counts.argmax()) == (13, 5335)
     assert ((counts > 4).sum(), (counts > 8).sum(), counts.min()) == (3143, 646, 1)
@@ -72,7 +72,7 @@ def test_influences_are_all_kept(pig):
     assert sorted(set(range(62)) - set(pig.skin.joints.tolist())) == sorted(NO_WEIGHTS)
 
 
-def test_weights_are_raw(pig):
+def test_weights_are_used_as_stored(pig):
     sums = weight_sums(pig.skin)
     assert_allclose(sums[[1740, 109]], [0.998, 1.002], rtol=0, atol=1e-12)
     assert_allclose([sums.min(), sums.max()], [0.998, 1.002], rtol=0, atol=1e-12)
@@ -89,7 +89,7 @@ def test_regressed_joints_are_near_the_stored_ones(pig):
     assert fact.startswith("0.13 mm from the file's joints on average, 1.63 mm at most")
 
 
-def test_hierarchy_and_names(pig):
+def test_hierarchy_and_names_are_those_of_the_specification(pig):
     skeleton = pig.skeleton
     assert len(skeleton.names) == 62
     named = {0: "Hip", 4: "Front hip", 5: "RF hip", 16: "LF knee", 23: "Head", 24: "R eye"}
@@ -138,7 +138,7 @@ def test_hierarchy_and_names(pig):
     assert (at[rights, 1] < 0).all()
 
 
-def test_keypoints(pig):
+def test_keypoints_are_those_of_the_specification(pig):
     points = pig.keypoints
     assert len(points.names) == 19
     assert points.names[:2] + points.names[-2:] == ("nose", "left eye", "tail", "centre")
@@ -161,10 +161,10 @@ def test_mesh_faces_outwards(pig):
     assert round(volume(pig.mesh.positions, pig.mesh.triangles), 4) == 0.0076
 
 
-# Check values
+# Check values of the specification
 
 
-def test_rest_box_and_normals(pig):
+def test_rest_box_and_normals_have_the_check_values(pig):
     vertices, normals = deform(pig)
     box = [vertices.min(axis=0), vertices.max(axis=0)]
     expected = [[-0.215591, -0.081306, -0.208351], [0.447458, 0.081306, 0.067361]]
@@ -174,13 +174,13 @@ def test_rest_box_and_normals(pig):
     assert_allclose(pig.mesh.normals[[0, 10895]], expected, rtol=0, atol=PRINTED)
 
 
-def test_rotated_root(pig):
+def test_rotated_root_has_the_check_values(pig):
     pose = posed(pig, numbers(ROOT))
     row = joint_rotations(pig.skeleton, pose)[0, 0]
     assert_allclose(row, [0.572541, -0.818863, -0.040743], rtol=0, atol=PRINTED)
 
 
-def test_rotated_root_placed_and_scaled(pig):
+def test_placed_and_scaled_root_has_the_check_values(pig):
     pose = posed(pig, numbers(ROOT, **PLACED))
     nose = deform(pig, pose)[0][10895]
     assert_allclose(nose, [0.643911, 0.241038, 0.716217], rtol=0, atol=PRINTED)
@@ -188,7 +188,7 @@ def test_rotated_root_placed_and_scaled(pig):
     assert_allclose(tail, [0.132899, -0.415763, 0.398340], rtol=0, atol=PRINTED)
 
 
-def test_three_rotated_joints(pig):
+def test_three_rotated_joints_have_the_check_values(pig):
     pose = posed(pig, numbers(THREE))
     vertices = deform(pig, pose)[0]
     nose = [0.433938, 0.049298, -0.014247]
@@ -200,7 +200,7 @@ def test_three_rotated_joints(pig):
     assert_allclose(joints, expected, rtol=0, atol=PRINTED)
 
 
-# The pickle
+# The pickled model
 
 
 def test_pickle_equals_the_folder(pig, shared_data):
@@ -212,7 +212,7 @@ def test_pickle_equals_the_folder(pig, shared_data):
     for name in ("names", "parents", "rest_translations"):
         assert_array_equal(getattr(other.skeleton, name), getattr(pig.skeleton, name))
     assert_array_equal(other.skin.starts, pig.skin.starts)
-    for vertex in range(11239):  # in another order within a vertex
+    for vertex in range(11239):  # the order within a vertex differs
         rows = slice(pig.skin.starts[vertex], pig.skin.starts[vertex + 1])
         mine, theirs = np.argsort(pig.skin.joints[rows]), np.argsort(other.skin.joints[rows])
         assert_array_equal(other.skin.joints[rows][theirs], pig.skin.joints[rows][mine])
@@ -221,7 +221,7 @@ def test_pickle_equals_the_folder(pig, shared_data):
         np.lexsort((each.joint_regressor.vertices, each.joint_regressor.joints))
         for each in (pig, other)
     )
-    # The pickle has these weights as float32.
+    # The pickle stores these weights in single precision.
     found = other.joint_regressor.weights[theirs]
     assert_allclose(found, pig.joint_regressor.weights[mine], rtol=0, atol=3.1e-8)
 
@@ -241,12 +241,12 @@ def test_pose_file_of_190_values_round_trips(pig, folder, tmp_path, separator):
     pose = scene.actors[0].pose
     viewer.write(record_of(pig, pose), tmp_path / "again.txt")
     again = np.loadtxt(tmp_path / "again.txt")
-    # To angles about x, y, z and back: some rounding errors of values near 1.
+    # Conversion to angles about x, y, z and back causes rounding errors of values near 1.
     assert_allclose(again, VECTOR, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize("count", [189, 191, 186])
-def test_pose_file_of_another_length_is_refused(folder, tmp_path, count):
+def test_pose_file_of_a_different_length_is_refused(folder, tmp_path, count):
     path = tmp_path / "pose.txt"
     path.write_text("0\n" * count)
     with pytest.raises(FormatError) as caught:

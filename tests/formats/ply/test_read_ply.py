@@ -1,4 +1,4 @@
-"""``.ply`` files in text and both byte orders: contents, warnings, and refusals."""
+"""The ``.ply`` reader for text and both byte orders: contents, warnings, and refusals."""
 
 import struct
 
@@ -65,7 +65,7 @@ def binary(order, elements, comments=()) -> bytes:
     return "\n".join([*lines, "end_header\n"]).encode() + body
 
 
-def test_ascii_file() -> None:
+def test_ascii_file_is_read() -> None:
     figure = silent(GOOD)
     assert figure.mesh.positions.tolist() == SQUARE
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 1, 2], [0, 2, 3]]
@@ -80,7 +80,9 @@ def test_ascii_file() -> None:
 @pytest.mark.parametrize("order", "<>")
 @pytest.mark.parametrize("number", ["float", "double", "short"])
 @pytest.mark.parametrize("index", ["uchar", "short", "int", "uint"])
-def test_binary_file_of_every_type_and_byte_order(order: str, number: str, index: str) -> None:
+def test_binary_file_of_every_type_and_byte_order_is_read(
+    order: str, number: str, index: str
+) -> None:
     vertices = [[x, y, z] for x, y, z in [(0, 0, 0), (2, 0, 0), (2, 2, 0), (-3, 2, 7)]]
     faces = [[[0, 1, 2]], [[0, 2, 3]]]
     data = binary(
@@ -96,7 +98,7 @@ def test_binary_file_of_every_type_and_byte_order(order: str, number: str, index
 
 
 @pytest.mark.parametrize("order", "<>")
-def test_properties_in_any_order_and_unknown_elements(order: str) -> None:
+def test_properties_may_be_in_any_order_and_unknown_elements_are_skipped(order: str) -> None:
     data = binary(
         order,
         [
@@ -120,8 +122,8 @@ def test_properties_in_any_order_and_unknown_elements(order: str) -> None:
     assert warnings == [unused("element camera", "vertex red", "face flags", "face quality")]
 
 
-def test_colours_of_vertices_become_linear() -> None:
-    """sRGB 188 is 0.5029 of the light; 0.5 is 0.2140; numbers are limited to 0 to 1."""
+def test_vertex_colours_are_converted_to_linear() -> None:
+    """sRGB 188 is 0.5029 in linear light, and 0.5 is 0.2140; floats are clamped to 0 to 1."""
     triangle = ("face", ["list uchar uchar vertex_indices"], [[[0, 1, 2]]])
     places = ["float x", "float y", "float z"]
     names = ["uchar red", "uchar green", "uchar blue"]
@@ -138,7 +140,7 @@ def test_colours_of_vertices_become_linear() -> None:
     np.testing.assert_allclose(figure.mesh.colors, wanted, atol=1e-6)
 
 
-def test_a_texture_replaces_colours_of_vertices(tmp_path) -> None:
+def test_texture_replaces_vertex_colours(tmp_path) -> None:
     (tmp_path / "a.png").write_bytes(encode_png(np.full((1, 1, 4), 255, np.uint8)))
     names = ["float x", "float y", "float z", "float s", "float t", "uchar red", "uchar green"]
     rows = [[0, 0, 0, 0, 0, 9, 9, 9], [1, 0, 0, 0, 0, 9, 9, 9], [0, 1, 0, 0, 0, 9, 9, 9]]
@@ -159,7 +161,7 @@ def test_trailing_ctrl_z_byte_of_binary_data_is_kept() -> None:
     assert mesh.mesh.positions[:, 2].tolist() == [26] * 3
 
 
-def test_per_corner_texture_coordinates_become_seams() -> None:
+def test_texture_coordinates_per_corner_are_read_as_seams() -> None:
     data = binary(
         "<",
         [
@@ -175,7 +177,7 @@ def test_per_corner_texture_coordinates_become_seams() -> None:
     assert mesh.uvs[mesh.uv_triangles].tolist() == [
         [[0, 0], [1, 0], [1, 1]], [[0.5, 0], [1, 1], [0, 1]]
     ]  # fmt: skip
-    assert len(mesh.uvs) == 5  # (1, 1) is shared
+    assert len(mesh.uvs) == 5  # (1, 1) is shared by two corners
 
 
 def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
@@ -187,7 +189,7 @@ def test_texture_coordinates_other_than_two_per_corner_are_ignored() -> None:
     assert warnings == [texcoord, unused("face texcoord")]
 
 
-def test_a_comment_names_the_texture(tmp_path) -> None:
+def test_texture_name_is_read_from_a_comment(tmp_path) -> None:
     pixels = np.full((2, 2, 4), 128, np.uint8)
     (tmp_path / "my skin.png").write_bytes(encode_png(pixels))
     text = GOOD.replace("float z\n", "float z\nproperty float u\nproperty float v\n")
@@ -203,10 +205,10 @@ def test_a_comment_names_the_texture(tmp_path) -> None:
     assert mesh.material_indices.tolist() == [0, 0, 0]
 
 
-def test_header_line_endings() -> None:
+def test_header_line_endings_may_vary() -> None:
     assert silent(GOOD.replace("\n", "\r\n")).mesh.n_triangles == 3
     assert silent(GOOD.replace("\n", "\r")).mesh.n_triangles == 3
-    rows = [[10.0, 0, 0]] * 3  # 10.0 as a big-endian float begins with 65, as a byte 10 below
+    rows = [[10.0, 0, 0]] * 3  # the bytes of value 10 must not be read as line ends
     data = binary("<", [("vertex", ["uchar x", "uchar y", "uchar z"], [[10, 1, 2]] * len(rows))])
     head, body = data.split(b"end_header\n")
     figure, _ = read(head + b"end_header\n" + body)
@@ -215,7 +217,7 @@ def test_header_line_endings() -> None:
     assert read(carriage)[0].mesh.positions.tolist() == [[10, 1, 2]] * 3
 
 
-def test_points_alone_are_a_warning() -> None:
+def test_file_with_only_points_is_read_with_a_warning() -> None:
     figure, warnings = read(f"{HEAD}{VERTEX}end_header\n{POINTS}")
     assert figure.mesh.n_vertices == 4 and figure.mesh.n_triangles == 0
     assert warnings == [("F007.ply-no-faces", None, {"n": 4})]
@@ -361,7 +363,8 @@ def test_exported_files_round_trip(tmp_path) -> None:
     written, mesh = actor.figure.mesh, scene.actors[0].figure.mesh
     assert scene.warnings == ()
     posed, _ = viewer.deform(actor.figure, actor.pose)
-    np.testing.assert_allclose(mesh.positions, posed, atol=1e-6)  # float32, for lengths up to 10
+    # Single precision, for lengths up to 10.
+    np.testing.assert_allclose(mesh.positions, posed, atol=1e-6)
     assert np.array_equal(mesh.triangles, written.triangles)
     corners = written.triangles if written.uv_triangles is None else written.uv_triangles
     np.testing.assert_allclose(mesh.uvs[mesh.uv_triangles], written.uvs[corners], atol=1e-7)

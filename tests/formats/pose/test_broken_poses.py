@@ -1,4 +1,4 @@
-"""Pose files with errors: refused with code, location and values."""
+"""Pose files with errors, which are refused with code, location and values."""
 
 from pathlib import Path
 
@@ -87,7 +87,7 @@ def text_refusal(text, name="a.json"):
         ("true", ("F002.pose-object", 1, {"found": Phrase("pose-word", word="true")})),
         ("1 2 3", ("F002.json", 1, {})),
         ("", ("F002.json", 1, {})),
-        # The line is that of the value, not of its key or of the file.
+        # The line is that of the value, not that of its key.
         ('{"betas":\n[1,\n2,\nNaN]}', ("F002.json-constant", 4, {"found": "NaN"})),
         ('{"comment": "a NaN",\n"betas":\n[1,\n2, 1e999]}', ("F003.pose-number", 4,
          {"item": "betas", "found": INF})),

@@ -1,4 +1,4 @@
-"""Pose files: round trips, smplx's names, errors, and use with a figure."""
+"""Pose files: round trips, names of smplx, and values for different models."""
 
 import json
 
@@ -37,7 +37,7 @@ def figures(tmp_path_factory):
 
 
 def parts(**values):
-    """Return the record read from given values."""
+    """Return the record that is read from the given values."""
     source = Source("a.json", json.dumps(values).encode())
     return pose.read(source), warnings_of(source.diagnostics)
 
@@ -90,7 +90,7 @@ def test_raw_pose_values_round_trip_as_text(figures, tmp_path, kind):
     assert warnings == []
     found = rest_pose(figure.skeleton)
     apply_record(record, figure, found)
-    # Conversion to rotation vectors and back: some rounding errors of values below 2.
+    # Conversion to rotation vectors and back causes rounding errors of values below 2.
     assert_allclose(turns(figure, found), turns(figure, given), rtol=0, atol=1e-14)
 
 
@@ -112,7 +112,7 @@ def test_record_with_smplx_names_round_trips(tmp_path):
         assert (record.flat_hands, record.hand_coefficients) == (True, False)
 
 
-def test_same_pose_gives_the_same_bytes(figures, tmp_path):
+def test_equal_poses_are_written_as_equal_bytes(figures, tmp_path):
     record = record_of(figures["smpl"], some_pose(figures["smpl"]))
     for suffix in (".json", ".npz", ".txt"):
         viewer.write(record, tmp_path / f"a{suffix}")
@@ -162,7 +162,7 @@ def test_parts_rotate_their_joints(figures):
     ],
 )
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
-def test_hands_are_angles_or_coefficients(figures, tmp_path, values, mean, kind, suffix):
+def test_hands_are_rotation_vectors_or_coefficients(figures, tmp_path, values, mean, kind, suffix):
     figure = figures["smplx"]
     path = tmp_path / f"a{suffix}"
     if suffix == ".npz":
@@ -183,7 +183,7 @@ def test_hands_are_angles_or_coefficients(figures, tmp_path, values, mean, kind,
 
 @pytest.mark.parametrize("shape", [(72,), (1, 72), (24, 3), (1, 24, 3)])
 @pytest.mark.parametrize("key", ["poses", "pose", "fullpose"])
-def test_vector_may_have_any_shape_of_one_frame(figures, tmp_path, shape, key):
+def test_vector_may_have_any_array_shape_of_one_frame(figures, tmp_path, shape, key):
     figure = figures["smpl"]
     np.savez(tmp_path / "a.npz", **{key: waves(72).reshape(shape).astype(np.float32)})
     posed = rest_pose(figure.skeleton)
@@ -202,7 +202,7 @@ def test_vector_of_a_related_model_poses_the_body(figures):
     assert_array_equal(turns(figure, posed)[22:], [np.eye(3)] * 33)
 
 
-def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
+def test_body_pose_of_smpl_does_not_change_the_face_of_smplx(figures):
     figure = figures["smplx"]
     posed = rest_pose(figure.skeleton)
     notes = apply_record(PoseRecord(parts={"body_pose": waves(69)}), figure, posed)
@@ -212,7 +212,7 @@ def test_body_pose_of_smpl_keeps_the_face_of_smplx(figures):
     assert apply_record(PoseRecord(parts={"body_pose": hands_at_rest}), figure, posed) == []
 
 
-def test_parts_that_a_figure_lacks_are_noted_unless_they_are_at_rest(figures):
+def test_missing_parts_of_the_figure_are_reported_unless_at_rest(figures):
     figure = figures["smpl"]
     record, _ = parts(jaw_pose=[0.1, 0, 0], leye_pose=[0, 0, 0], left_hand_pose=[0.5] * 6)
     assert told(apply_record(record, figure, rest_pose(figure.skeleton))) == [
@@ -221,7 +221,7 @@ def test_parts_that_a_figure_lacks_are_noted_unless_they_are_at_rest(figures):
     ]
 
 
-def test_unknown_keys_are_named_except_motion_keys():
+def test_unknown_keys_are_reported_except_motion_keys():
     _, warnings = parts(body_pose=[0] * 63, gender="male", mocap_framerate=120, fps=30)
     assert warnings == []
     _, warnings = parts(body_pose=[0] * 63, body_poses=[1], comment="me")
@@ -243,7 +243,7 @@ def test_unused_large_members_are_not_read(tmp_path):
     path = tmp_path / "a.npz"
     np.savez(path, poses=np.zeros((1, 72)), marker_data=np.arange(1000.0))
     data = bytearray(path.read_bytes())
-    data[data.index(np.arange(1000.0).tobytes()) + 4000] ^= 1  # would be reported when it is read
+    data[data.index(np.arange(1000.0).tobytes()) + 4000] ^= 1  # would be reported if it were read
     path.write_bytes(data)
     record, warnings = read(path)
     assert (len(record.vector), warnings) == (72, [])
@@ -251,6 +251,6 @@ def test_unused_large_members_are_not_read(tmp_path):
 
 @pytest.mark.parametrize("text", ["1 2 3\n4 5 6\n", "1\r\n2\r\n3\r\n4\r\n5\r\n6", "1\t2 3 4 5 6 "])
 @pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf", b"\n\n "])
-def test_text_may_be_laid_out_in_any_way(tmp_path, text, mark):
+def test_text_may_have_any_line_layout(tmp_path, text, mark):
     (tmp_path / "a.txt").write_bytes(mark + text.encode())
     assert read(tmp_path / "a.txt")[0].vector.tolist() == [1, 2, 3, 4, 5, 6]

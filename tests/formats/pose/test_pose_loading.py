@@ -23,7 +23,7 @@ BLUE = np.full((2, 2, 4), (0, 0, 255, 255), np.uint8)
 
 @pytest.fixture
 def files(tmp_path):
-    """One file of each kind, by the name without suffix."""
+    """One file of each kind, keyed by the name without suffix."""
     paths = {"pig": write_pig(tmp_path / "pig")}
     paths["bare"] = write_pig(tmp_path / "bare", {**CORE, "textures.txt": None})
     for name, text in {
@@ -57,7 +57,7 @@ def refusal(*paths):
 # Poses
 
 
-def test_coefficients_beyond_those_of_the_model_are_dropped_with_a_note(files):
+def test_coefficients_beyond_those_of_the_model_are_omitted_with_a_note(files):
     scene = viewer.load(files["smpl"], files["long"])
     assert scene.actors[0].pose.shape_weights.tolist() == [1.0] * 10
     assert scene.warnings[-1] == (
@@ -92,14 +92,14 @@ def test_shape_is_applied_to_a_body(files):
     assert scene.actors[0].pose.shape_weights.tolist() == [1, 2, *[0] * 8]
 
 
-def test_scale_of_0_is_noted(files):
+def test_scale_of_0_is_reported(files):
     scene = viewer.load(files["pig"], files["zero"])
     assert scene.warnings == (
         f"{files['zero']}: scale: expected a positive number, found 0; kept at 1",
     )
 
 
-def test_pose_alone_is_refused(files):
+def test_pose_without_a_figure_is_refused(files):
     wanted = "a pose without a figure: open it together with a figure"
     assert refusal(files["kick"]) == f"{files['kick']}: {wanted}"
     skin = files["kick"].with_name("a.skin")
@@ -117,7 +117,7 @@ def test_pose_alone_is_refused(files):
          "reason": 'no joint is called "tail"; there are 2: hip, knee'})),
     ],
 )  # fmt: skip
-def test_pose_of_another_figure_is_refused_with_both(files, figure, pose, message):
+def test_pose_of_another_figure_is_refused_with_both_names(files, figure, pose, message):
     with pytest.raises(FormatError) as caught:
         viewer.load(files[figure], files[pose])
     assert caught.value.path == files[pose]
@@ -148,7 +148,7 @@ def test_image_for_figures_without_texture_coordinates_is_refused(files, names):
     )
 
 
-def test_image_alone_is_refused(files):
+def test_image_without_a_figure_is_refused(files):
     assert (
         refusal(files["red"])
         == f"{files['red']}: an image without a figure: open it together with a figure"
@@ -162,7 +162,7 @@ def test_invalid_image_is_refused(files):
     assert (caught.value.path, caught.value.diagnostic.key) == (files["red"], "F001.picture")
 
 
-# A figure that is already open
+# Poses and images for a figure that is already open
 
 
 def additions(files, *names):
@@ -171,7 +171,7 @@ def additions(files, *names):
     return contents
 
 
-def test_pose_is_added_to_an_actor_in_place(files):
+def test_pose_is_applied_to_an_actor_in_place(files):
     actor = viewer.load(files["legs"]).actors[0]
     pose = actor.pose
     again, notes = add_to_actor(additions(files, "kick"), actor)
@@ -183,7 +183,7 @@ def test_pose_is_added_to_an_actor_in_place(files):
     assert (*fault_of(note), note.path) == ("F007.pose-clamped", None, {"n": 1}, files["far"])
 
 
-def test_texture_makes_an_actor_with_the_same_pose(files):
+def test_texture_results_in_an_actor_with_the_same_pose(files):
     actor = viewer.load(files["pig"]).actors[0]
     other, notes = add_to_actor(additions(files, "red", "bend"), actor)
     assert notes == []

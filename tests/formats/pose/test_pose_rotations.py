@@ -1,4 +1,4 @@
-"""Joint rotations in pose files: bit-exact round trips, and refusal of invalid ones."""
+"""Joint rotations in pose files: bit-exact round trips, and refusal of invalid rotations."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from viewer.rig.retargeting.pose_transfer import JointRotations
 
 NAMES = ("root", "", "left knee", "knee", "knee")
 ROWS = np.array([[0.5, 0.5, 0.5, 0.5], [0, 0, 0, 1], [0.6, 0, 0, 0.8], [0, 1, 0, 0], [0, 0, -1, 0]])
-BENEATH = ROWS[::-1] / 3  # of any length: they are not normalised
+BENEATH = ROWS[::-1] / 3  # of any length, because they are not normalised
 SHIFTS = np.arange(15.0).reshape(5, 3) / 7
 GOOD = {"dofs": {"a.x": 1.0}, "joint_names": ["a"], "joint_turns": [[0, 0, 0, 1]]}
 
@@ -45,7 +45,7 @@ def test_rotations_round_trip(tmp_path: Path, suffix, shifts):
 
 
 @pytest.mark.parametrize("suffix", [".json", ".npz"])
-def test_rotations_beneath_the_dofs_round_trip(tmp_path: Path, suffix):
+def test_rotations_below_the_dofs_round_trip(tmp_path: Path, suffix):
     path = tmp_path / f"a{suffix}"
     viewer.write(PoseRecord(dofs={"a.x": 0.25}, joint_rotations=turns(rotations=BENEATH)), path)
     source = Source(path, path.read_bytes())
@@ -91,14 +91,14 @@ def read(**values):
     return pose.read(Source("a.json", json.dumps(GOOD | values).encode()))
 
 
-def test_a_file_needs_only_names_and_rotations():
+def test_file_may_have_only_names_and_rotations():
     found = read(joint_turns=[[0, 0, 0, 2]]).joint_rotations
     assert found.relative.tolist() == [[0, 0, 0, 1]] and found.shifts.tolist() == [[0, 0, 0]]
     assert found.rotations is None
     assert (found.figure, found.up, found.layout) == ("", "y", "")
 
 
-def test_without_rotations_the_other_keys_are_ignored():
+def test_keys_of_rotations_are_ignored_without_rotations():
     source = Source("a.json", b'{"dofs": {"a.x": 1}, "joint_names": 3, "up": "y"}')
     assert pose.read(source).joint_rotations is None
     assert warnings_of(source.diagnostics) == [

@@ -1,4 +1,4 @@
-"""The .rig reader: names of files that belong together."""
+"""The .rig reader, which reads the names of files that belong together."""
 
 from pathlib import Path
 
@@ -25,7 +25,7 @@ def parse(text):
     [GOOD, GOOD.replace("\n", "\r\r\n"), GOOD.replace("\n\t", " "), GOOD.replace(" {", "{")],
     ids=["plain", "cr cr lf", "one line", "glued"],
 )
-def test_names_the_files_relative_to_itself(text):
+def test_file_names_are_relative_to_the_rig_file(text):
     name, files, source = parse(text)
     assert (name, files) == ("wasp", ["wasp.skel", "wasp.skin"])
     assert source.warnings == [] and detect(source) == "rig"
@@ -36,7 +36,7 @@ def test_morphs_are_listed_in_order():
     assert parse(text)[1] == ["wasp.skel", "wasp.skin", "head1.morph", "sub/head2.morph"]
 
 
-def test_names_with_blanks_are_quoted_and_a_rig_may_be_empty():
+def test_names_with_spaces_are_quoted_and_a_rig_may_be_empty():
     name, files, _ = parse('rig { skin "my wasp.skin" }')
     assert (name, files) == ("a", ["my wasp.skin"])
 
@@ -48,7 +48,7 @@ def test_names_with_blanks_are_quoted_and_a_rig_may_be_empty():
         (GOOD + "rig two { }", ("F006.rig-after", 7, {"found": b"rig"})),
     ],
 )
-def test_unusual_endings_warn(text, fault):
+def test_missing_or_extra_braces_at_the_end_are_reported(text, fault):
     *_, source = parse(text)
     assert warnings_of(source.diagnostics) == [fault]
 
@@ -81,6 +81,6 @@ def test_malformed_files_are_refused_with_their_line(text, fault):
     assert fault_of(caught.value.diagnostic) == fault
 
 
-def test_huge_morph_count_allocates_nothing():
+def test_huge_morph_count_is_refused_without_allocation():
     fault = refusal_of(lambda: parse(GOOD.replace("0 {", "2000000000 {")))
     assert fault == ("F002.rig-morphs", 4, {"expected": 2000000000, "found": 0})

@@ -1,4 +1,4 @@
-"""Rigged meshes in one ``.npz``: round trips, and messages about invalid parts."""
+"""Rigged meshes in one ``.npz`` file: round trips, and messages about invalid arrays."""
 
 from __future__ import annotations
 
@@ -140,11 +140,11 @@ def test_all_written_data_is_read_back(tmp_path):
     same(found.mesh.materials[1], wanted.mesh.materials[1])
     assert_array_equal(found.mesh.materials[0].image, wanted.mesh.materials[0].image)
     assert found.mesh.materials[1].image is None
-    # Eighths are exact in float32, too.
+    # Multiples of 1/8 are exact in single precision.
     assert_array_equal(found.correctives.values(), wanted.correctives.values())
 
 
-def test_parts_that_a_figure_lacks_are_left_out(tmp_path):
+def test_missing_parts_of_a_figure_are_left_out(tmp_path):
     whole = figure()
     bare = Figure(
         "bare",
@@ -286,7 +286,7 @@ BROKEN = {
 
 
 @pytest.mark.parametrize(("changes", "message"), BROKEN.values(), ids=BROKEN)
-def test_broken_files_are_refused_by_key(tmp_path, changes, message):
+def test_broken_files_are_refused_with_the_key(tmp_path, changes, message):
     path = tmp_path / "scan.npz"
     np.savez(path, **arrays_of(**changes))
     with pytest.raises(FormatError) as problem:
@@ -295,7 +295,7 @@ def test_broken_files_are_refused_by_key(tmp_path, changes, message):
     assert fault_of(problem.value.diagnostic) == message
 
 
-def test_correctives_of_another_mesh_are_refused(tmp_path):
+def test_correctives_for_a_different_mesh_are_refused(tmp_path):
     path = tmp_path / "scan.npz"
     np.savez(path, **arrays_of(correctives=np.zeros((9, 5, 3))))
     with pytest.raises(FormatError) as problem:

@@ -214,7 +214,7 @@ def test_broken_file_is_refused_with_its_line(text, fault):
     assert refusal(text) == fault
 
 
-def test_odd_names_are_shown_on_one_line():
+def test_unusual_names_are_shown_on_one_line():
     text = b"balljoint \xff\x1b[31m\xe2\x80\xa8 {\n pose x 0 0 }"
     assert shown(refusal(text)) == (
         'pose of joint \ufffd\\x1b[31m\\u2028: expected a number, found "x"'
@@ -244,19 +244,19 @@ def test_truncated_file_is_refused_or_loads_with_a_warning(cut):
 
 
 @pytest.mark.slow
-def test_100_000_nested_joints_load():
+def test_100_000_nested_joints_are_read():
     skeleton = silent("balljoint a{" * 100_000 + "}" * 100_000)
     assert skeleton.n_joints == 100_000
     assert skeleton.parents[[0, 1, -1]].tolist() == [-1, 0, 99_998]
 
 
 @pytest.mark.slow
-def test_100_000_unclosed_joints_name_the_innermost():
+def test_100_000_unclosed_joints_are_refused_at_the_innermost():
     values = {"found": None, "joint": Phrase("joint", name="a"), "line": 100_000}
     assert refusal("balljoint a{\n" * 100_000) == ("F002.joint-open", 100_000, values)
 
 
-def test_20_000_siblings_load():
+def test_20_000_siblings_are_read():
     skeleton = silent("balljoint r{\n" + "balljoint a{}\n" * 20_000 + "}")
     assert skeleton.parents.tolist() == [-1] + [0] * 20_000
 
@@ -281,12 +281,12 @@ def test_5_million_blank_lines_are_counted(end):
     assert refusal(text) == ("F002.number", line, {"item": item, "found": b"up"})
 
 
-def test_name_of_5_mb_loads():
+def test_name_of_5_mb_is_read():
     assert silent(f"balljoint {'x' * 5_000_000} {{}}").names == ("x" * 5_000_000,)
 
 
 @pytest.mark.slow
-def test_refusal_takes_little_memory():
+def test_refusal_needs_little_memory():
     text = b"balljoint a {\n" + b"offset 0 0 0\n" * 20_000 + b"pose up"
     tracemalloc.start()
     try:

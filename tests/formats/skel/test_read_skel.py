@@ -1,4 +1,4 @@
-"""All quirks of ``.skel``, each as a tiny file."""
+"""All quirks of ``.skel``, each in a tiny file."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ def unknown(line, word):
     return "F006.unknown", line, {"found": word.encode()}
 
 
-def test_good_file_gives_every_value():
+def test_all_values_of_a_valid_file_are_read():
     assert_good(silent(GOOD))
 
 
@@ -37,11 +37,11 @@ def test_good_file_gives_every_value():
         pytest.param(GOOD.replace("1 2 3", "1. 2.0f 3F"), id="trailing f"),
     ],
 )
-def test_white_space_and_number_notation_do_not_matter(text):
+def test_white_space_and_number_notation_may_vary(text):
     assert_good(silent(text))
 
 
-def test_items_come_in_any_order_and_mix_with_joints():
+def test_items_may_be_in_any_order_and_between_joints():
     skeleton = silent(
         "balljoint root { balljoint arm { offset 0 1 0 } pose 0.5 0.25 7 boxmax 0.5 0.25 1 "
         "rotzlimit -100000 100000 rotylimit 0 0.5 offset 1 2 3 boxmin -0.5 -0.25 -1 "
@@ -50,7 +50,7 @@ def test_items_come_in_any_order_and_mix_with_joints():
     assert_good(skeleton)
 
 
-def test_last_of_repeated_items_wins():
+def test_last_of_repeated_items_is_used():
     skeleton = silent(
         "balljoint a { offset 1 1 1 pose 1 1 1 rotxlimit 0 1 boxmin 0 0 0 boxmax 5 5 5 "
         "offset 2 3 4 pose 5 6 7 rotxlimit -9 9 boxmin -1 -2 -3 boxmax 1 2 3 }"
@@ -84,11 +84,11 @@ def test_empty_joint_has_the_defaults():
         ('balljoint "quoted" {', '"quoted"'),
     ],
 )
-def test_names_are_all_words_up_to_the_brace(head, name):
+def test_name_consists_of_all_words_up_to_the_brace(head, name):
     assert silent(head + "}").names == (name,)
 
 
-def test_name_in_latin_1_is_kept_byte_by_byte():
+def test_name_in_latin_1_is_preserved_byte_by_byte():
     skeleton = silent(b"balljoint \xe9t\xe9 {}")
     assert skeleton.names[0].encode("utf-8", "surrogateescape") == b"\xe9t\xe9"
 
@@ -101,7 +101,7 @@ def test_joints_are_numbered_in_file_order_even_with_equal_names():
     assert skeleton.parents.tolist() == [-1, 0, 1, 0, 0, 4]
 
 
-def test_several_roots_stand_side_by_side():
+def test_several_roots_are_read():
     skeleton = silent("balljoint a { balljoint b {} } balljoint c { balljoint d {} }")
     assert skeleton.parents.tolist() == [-1, 0, -1, 2]
     assert skeleton.dof_joints.tolist() == [0] * 6 + [1] * 3 + [2] * 3 + [3] * 3
@@ -117,7 +117,7 @@ def test_boxes_may_be_flat():
     assert skeleton.boxes.tolist() == [[[0, 0, 1], [2, 0, 1]]]
 
 
-def test_box_with_one_corner_takes_the_other_from_the_default():
+def test_box_with_one_corner_gets_the_other_by_default():
     assert silent("balljoint a { boxmin -2 -2 -2 }").boxes.tolist() == [[[-2] * 3, [0.1] * 3]]
 
 
@@ -125,7 +125,8 @@ def test_box_with_one_corner_takes_the_other_from_the_default():
 
 
 def test_pose_is_clamped_after_the_whole_joint_is_read():
-    # As knee_r of test.skel, and with the pose before its limits as in horse.skel.
+    # The order is that of knee_r in test.skel, then with the pose before its limits as in
+    # horse.skel.
     after = "rotxlimit -2 0 rotylimit 0 0 rotzlimit 0 0 pose -3 1 2"
     before = "pose -3 1 2 rotxlimit -2 0 rotylimit 0 0 rotzlimit 0 0"
     for items in (after, before):
@@ -156,7 +157,7 @@ def test_limits_may_exclude_zero():
         ("100000 100000", [100000, INF]),
     ],
 )
-def test_limits_of_100000_mean_unlimited(written, meant):
+def test_limits_of_100000_are_read_as_unlimited(written, meant):
     assert silent(f"balljoint a {{ rotylimit {written} }}").dof_limits[4].tolist() == meant
 
 
@@ -193,7 +194,7 @@ def test_minimum_above_maximum_is_ignored_with_a_warning():
     ],
 )
 @pytest.mark.parametrize("place", ["before", "between", "after"])
-def test_unknown_item_is_skipped_whole(item, words, place):
+def test_unknown_item_is_skipped_completely(item, words, place):
     known = ["offset 1 2 3", "balljoint arm { offset 0 1 0 }"]
     known.insert({"before": 0, "between": 1, "after": 2}[place], f"\n{item}\n")
     skeleton, warnings = read(f"balljoint root {{ {' '.join(known)} }}")
@@ -216,24 +217,24 @@ def test_unknown_words_outside_of_all_joints_are_skipped(text):
     assert warnings == [unknown(1, text.split()[0])]
 
 
-def test_unknown_keyword_is_named_once_and_with_its_first_line():
+def test_unknown_keyword_is_reported_once_with_its_first_line():
     _, warnings = read("balljoint a {\npos 1\nfoo 2\npos 3\nballjoint b { pos 4 }\nfoo { }\n}")
     assert warnings == [unknown(2, "pos"), unknown(3, "foo")]
 
 
-def test_warnings_of_a_hopeless_file_stop_after_100():
+def test_warnings_of_a_file_are_limited_to_100():
     _, warnings = read(f"balljoint a {{ {chr(10).join(f'w{number}' for number in range(500))} }}")
     assert len(warnings) == 101
     assert warnings[99] == unknown(100, "w99")
     assert warnings[100] == ("F007.further-warnings", None, {})
 
 
-def test_keywords_are_lower_case():
+def test_keywords_must_be_lower_case():
     _, warnings = read("balljoint a { Offset 1 2 3 }")
     assert warnings == [unknown(1, "Offset")]
 
 
-def test_missing_brace_at_the_very_end_is_a_warning():
+def test_missing_brace_at_the_end_is_a_warning():
     skeleton, warnings = read(GOOD.rstrip().removesuffix("}"))
     assert_good(skeleton)
     assert warnings == [("F006.closing", None, {})]

@@ -1,4 +1,4 @@
-"""A tiny SKEL model with its published keys, and its forward pass for one pose, written out."""
+"""A tiny SKEL model with the published keys, and a written-out forward pass for one pose."""
 
 import numpy as np
 
@@ -15,7 +15,7 @@ PINS = {
     10: (-3.141589999, -0.6199010, 0),
 }
 HIP, SPINE = "zxy", "xzy"
-AXES = {  # letters, capital ones negative
+AXES = {  # axis letters; capitals are negative axes
     **{0: HIP, 1: HIP, 2: "Z", 6: "zXY", 7: "Z", 11: SPINE, 12: SPINE, 13: SPINE},
     **{14: "yZX", 15: "xyz", 18: "xZ", 19: "yzx", 20: "xyz", 23: "XZ"},
 }

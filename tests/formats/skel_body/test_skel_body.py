@@ -1,4 +1,4 @@
-"""SKEL against its published equations: axes of bones, shoulder blades, curved spine."""
+"""SKEL, compared with its published equations: axes of bones, shoulder blades, curved spine."""
 
 import numpy as np
 import pytest
@@ -32,18 +32,18 @@ def figure(tmp_path_factory):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_vertices_and_joints_agree_with_the_published_equations(figure, seed):
+def test_vertices_and_joints_match_the_published_equations(figure, seed):
     generator = np.random.default_rng(seed)
     pose = figure_pose(figure)
     q = generator.uniform(-1.5, 1.5, 46)
-    q[[20, 27]] = 1e-7, 0.0  # the published program has a case of its own for small angles
+    q[[20, 27]] = 1e-7, 0.0  # the published program treats small angles separately
     read_vector(figure.pose_layout, figure.skeleton, pose, q)
     pose.shape_weights = generator.normal(size=N_SHAPES)
     pose.figure_translation = generator.normal(size=3)
     vertices, joints = forward(MODEL, q, pose.shape_weights, pose.figure_translation)
     assert_allclose(deform(figure, pose)[0], vertices, atol=ROUNDING)
     assert_allclose(joint_matrices(figure, pose)[:, :3, 3], joints, atol=ROUNDING)
-    # Many poses at once have the same joints.
+    # Batched poses have the same joints.
     skeleton = shaped(figure, pose.shape_weights).skeleton
     found = worlds(skeleton, [pose, pose])[1, :, :3, 3] + pose.figure_translation
     assert_allclose(found, joints, atol=ROUNDING)
@@ -59,7 +59,7 @@ def test_parameters_have_their_published_names():
     assert (DOF_NAMES[30], DOF_NAMES[45]) == ("shoulder_r_y", "wrist_deviation_l")
 
 
-def test_bones_are_said_to_be_omitted(tmp_path):
+def test_omitted_bones_are_reported(tmp_path):
     source = load(tmp_path)
     scene = viewer.load(source.path)
     assert [found.key for found in scene.diagnostics] == ["F007.skel-bones"]

@@ -1,4 +1,4 @@
-"""Broken ``.skin`` files with the error that each is refused for, and large files."""
+"""Broken ``.skin`` files with the error of each, and large files."""
 
 import tracemalloc
 from pathlib import Path
@@ -194,7 +194,7 @@ def test_truncated_file_is_refused_or_loads_with_a_warning(cut):
         assert figure.mesh.n_vertices == 3
 
 
-def test_paths_and_words_are_never_taken_for_format_strings():
+def test_paths_and_words_are_never_used_as_format_strings():
     with pytest.raises(FormatError) as caught:
         read("positions %s {", Path("a{0}%d\n.skin"))
     assert str(caught.value) == 'a{0}%d\\n.skin:1: positions: expected a count, found "%s"'
@@ -209,7 +209,7 @@ def test_paths_and_words_are_never_taken_for_format_strings():
 @pytest.mark.parametrize("count", ["2000000000", "99999999999", "1e38", "-5", "-0.5"])
 def test_absurd_count_is_refused_without_allocating(name, count):
     text = f"{BARE}{name} {count} {{ 1 2 3 }}".encode()
-    refusal_of(lambda: read(text))  # modules are loaded once, whichever test comes first
+    refusal_of(lambda: read(text))  # load modules before measuring
     tracemalloc.start()
     try:
         key, line, values = refusal_of(lambda: read(text))
@@ -223,7 +223,7 @@ def test_absurd_count_is_refused_without_allocating(name, count):
 
 def test_absurd_number_of_influences_is_refused_without_allocating():
     text = GOOD.replace("1 1 1\n}", "1e38 1 1\n}").encode()
-    refusal_of(lambda: read(text))  # modules are loaded once, whichever test comes first
+    refusal_of(lambda: read(text))  # load modules before measuring
     tracemalloc.start()
     try:
         fault = refusal_of(lambda: read(text))
@@ -254,7 +254,7 @@ def test_word_of_5_mb_is_refused():
 
 
 @pytest.mark.slow
-def test_20_000_materials_load():
+def test_20_000_materials_are_read():
     figure, warnings = read(BARE + "material a { texture gone.png }" * 20_000 + TRIANGLES)
     assert len(figure.mesh.materials) == 20_000
     assert figure.mesh.material_indices.tolist() == [-1, 19_999]
@@ -262,7 +262,7 @@ def test_20_000_materials_load():
 
 
 @pytest.mark.slow
-def test_20_000_sections_of_triangles_load():
+def test_20_000_sections_of_triangles_are_read():
     assert read(BARE + "triangles 1 {2 1 0}" * 20_000)[0].mesh.n_triangles == 20_001
 
 
@@ -271,6 +271,6 @@ def test_20_000_joints_are_bound():
     assert silent(BARE + text).skin.n_joints == 20_000
 
 
-def test_invalid_word_far_down_is_found():
+def test_invalid_word_far_into_the_file_is_found():
     text = "positions 200000 {\n" + "0.5 1.5 2.5\n" * 199_999 + "0.5 1.5 2.5x\n}"
     assert refusal_of(lambda: read(text)) == ("F002.number", 200001, number(199_999, b"2.5x"))

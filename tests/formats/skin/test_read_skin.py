@@ -1,4 +1,4 @@
-"""All quirks of ``.skin``, each as a tiny file."""
+"""All quirks of ``.skin``, each in a tiny file."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from formats.skin_text import (
 from numpy.testing import assert_allclose
 
 
-def test_good_file_gives_every_value():
+def test_all_values_of_a_valid_file_are_read():
     figure = silent(GOOD)
     assert_good(figure)
     assert figure.name == "a"
@@ -48,12 +48,13 @@ def test_good_file_gives_every_value():
         pytest.param(GOOD + "triangles 0 { }", id="an empty section of triangles"),
     ],
 )
-def test_white_space_order_and_optional_braces_do_not_matter(text):
+def test_white_space_section_order_and_optional_braces_may_vary(text):
     assert_good(silent(text))
 
 
-def test_bind_matrix_rows_in_the_file_are_columns():
-    # 90 degrees about z, scaled by 2: x goes to 2y, y to -2x, z to 2z; then moved by 1 2 3.
+def test_bind_matrix_rows_in_the_file_are_read_as_columns():
+    # A rotation by 90 degrees about z, scaled by 2, maps x to 2y, y to -2x and z to 2z; then 1 2 3
+    # is added.
     rows = "0 2 0  -2 0 0  0 0 2  1 2 3"
     figure = silent(
         BARE + f"skinweights 3 {{ 1 0 1 1 0 1 1 0 1 }} bindings 1 {{ matrix {{ {rows} }} }}"
@@ -62,15 +63,15 @@ def test_bind_matrix_rows_in_the_file_are_columns():
     assert_allclose(np.linalg.inv(figure.skin.inverse_bind[0]), expected, atol=1e-15)
 
 
-def test_clockwise_triangles_are_kept_as_they_are():
+def test_clockwise_triangles_are_not_flipped():
     assert silent(GOOD.replace("0 1 2", "0 2 1")).mesh.triangles.tolist() == [[0, 2, 1]]
 
 
-def test_flat_triangles_are_kept():
+def test_zero_area_triangles_are_kept():
     assert silent(GOOD.replace("0 1 2", "1 1 2")).mesh.triangles.tolist() == [[1, 1, 2]]
 
 
-def test_normals_are_kept_as_stored():
+def test_normals_are_used_as_stored():
     assert silent(GOOD.replace("0 1 0\n}", "0 1.73 0\n}", 1)).mesh.normals[2].tolist() == [
         0,
         1.73,
@@ -94,7 +95,7 @@ def test_zero_weights_and_a_joint_listed_twice_are_kept():
     assert figure.skin.weights[1:5].tolist() == [0.25, 0.5, 0.25, 0]
 
 
-def test_several_sections_of_triangles_follow_each_other():
+def test_several_sections_of_triangles_are_appended():
     figure = silent(GOOD + "triangles 2 { 2 1 0 0 2 1 }")
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [2, 1, 0], [0, 2, 1]]
 
@@ -123,7 +124,7 @@ def test_zero_normals_are_computed():
     ]
 
 
-def test_last_repeated_section_wins():
+def test_last_repeated_section_is_used():
     figure, warnings = read(GOOD + POSITIONS.replace("2 0 0", "9 0 0") + POSITIONS)
     assert_good(figure)
     assert warnings == ["a.skin:33: repeated positions section: the last one is used"]
@@ -142,7 +143,7 @@ def test_last_repeated_section_wins():
     ],
 )
 @pytest.mark.parametrize("place", range(6))
-def test_unknown_section_is_skipped_whole(section, place):
+def test_unknown_section_is_skipped_completely(section, place):
     parts = [POSITIONS, NORMALS, WEIGHTS, TRIANGLES, BINDINGS]
     parts.insert(place, section + "\n")
     line = "".join(parts[:place]).count("\n") + 1
@@ -152,7 +153,7 @@ def test_unknown_section_is_skipped_whole(section, place):
     assert warnings == [f'a.skin:{line}: ignored unknown section "{first}"']
 
 
-def test_unknown_section_is_named_once_and_with_its_first_line():
+def test_unknown_section_is_reported_once_with_its_first_line():
     _, warnings = read("foo { }\nbar { }\nfoo { }\n" + GOOD)
     assert warnings == [
         'a.skin:1: ignored unknown section "foo"',
@@ -161,7 +162,7 @@ def test_unknown_section_is_named_once_and_with_its_first_line():
 
 
 @pytest.mark.parametrize("name", ["triangles", "skinweights", "bindings"])
-def test_missing_brace_at_the_very_end_is_a_warning(name):
+def test_missing_brace_at_the_end_is_a_warning(name):
     sections = {"triangles": TRIANGLES, "skinweights": WEIGHTS, "bindings": BINDINGS}
     last = sections.pop(name)
     text = POSITIONS + NORMALS + "".join(sections.values()) + last.rstrip().removesuffix("}")
@@ -170,13 +171,13 @@ def test_missing_brace_at_the_very_end_is_a_warning(name):
     assert warnings == [f'a.skin: {name}: missing "}}" at the end of the file']
 
 
-def test_extra_braces_are_a_warning():
+def test_extra_braces_are_reported_as_a_warning():
     figure, warnings = read(GOOD + "}}")
     assert_good(figure)
     assert warnings == ['a.skin: ignored 2 "}" outside any section']
 
 
-def test_vertices_without_influence_are_a_warning():
+def test_vertices_without_influence_are_reported_as_a_warning():
     figure, warnings = read(GOOD.replace("1 0 1.0", "0").replace("1 1 1\n", "1 1 0\n"))
     assert figure.skin.starts.tolist() == [0, 0, 2, 3]
     assert warnings == [
@@ -184,13 +185,13 @@ def test_vertices_without_influence_are_a_warning():
     ]
 
 
-def test_negative_weights_are_a_warning():
+def test_negative_weights_are_reported_as_a_warning():
     figure, warnings = read(GOOD.replace("0.25 1 0.75", "-0.25 1 1.25"))
     assert figure.skin.weights.tolist() == [1, -0.25, 1.25, 1]
     assert warnings == ["a.skin:13: 1 negative weight (first: -0.25 at vertex 1); used as stored"]
 
 
-def test_weights_that_do_not_add_up_are_a_warning():
+def test_weights_that_do_not_sum_to_1_are_reported_as_a_warning():
     figure, warnings = read(GOOD.replace("0 1.0", "0 0.98").replace("0.75", "0.5"))
     assert figure.skin.weights.tolist() == [0.98, 0.25, 0.5, 1]
     assert warnings == [
@@ -201,17 +202,17 @@ def test_weights_that_do_not_add_up_are_a_warning():
     ]
 
 
-def test_weight_sums_within_a_hundredth_give_no_warning():
+def test_weight_sums_within_a_hundredth_cause_no_warning():
     silent(GOOD.replace("0 1.0", "0 0.991"))
 
 
-def test_ill_conditioned_bind_matrix_is_a_warning():
+def test_ill_conditioned_bind_matrix_is_reported_as_a_warning():
     _, warnings = read(GOOD.replace("0 0 1\n  5", "0 0 1e-8\n  5"))
     assert warnings == ["a.skin:20: bindings: matrix 0 is ill-conditioned (condition number 1e+08)"]
 
 
-def test_far_vertex_is_a_warning():
+def test_stray_vertex_is_reported_as_a_warning():
     figure, warnings = read(GOOD.replace("  0 2 0\n", "  0 1e30 0\n"))
     assert figure.mesh.positions[2].tolist() == [0, 1e30, 0]
-    # Three vertices are not dense: the median distance is 2.
+    # Three vertices are sparse, with a median distance of 2.
     assert warnings == ["a.skin:4: stray vertex 2, 1e+30 units from the others"]

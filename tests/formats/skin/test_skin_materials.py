@@ -28,7 +28,7 @@ def textured(folder, material, rest=TRIANGLES):
         "material face { texture red.bmp \t }",
     ],
 )
-def test_material_covers_the_triangles_after_it(folder, material):
+def test_material_applies_to_the_triangles_after_it(folder, material):
     figure, warnings = textured(folder, material)
     assert warnings == []
     assert figure.mesh.uvs.tolist() == [[0, 0], [1.07, 0], [0, 1]]
@@ -37,7 +37,7 @@ def test_material_covers_the_triangles_after_it(folder, material):
     assert figure.mesh.materials[0].image.tolist() == [[[255, 0, 0, 255]] * 2]
 
 
-def test_texture_name_may_contain_blanks_and_backslashes(folder):
+def test_texture_name_may_contain_spaces_and_backslashes(folder):
     (folder / "tex").mkdir()
     (folder / "my green.png").rename(folder / "tex" / "my green.png")
     figure, warnings = textured(folder, "material { texture tex\\my green.png\n}")
@@ -65,7 +65,7 @@ def test_materials_with_the_same_texture_share_it(folder):
     assert first is second is third
 
 
-def test_material_without_texture_is_a_warning(folder):
+def test_material_without_texture_is_reported_as_a_warning(folder):
     figure, warnings = textured(folder, "material a { }\nmaterial { texture }\n")
     assert [(m.name, m.texture) for m in figure.mesh.materials] == [("a", None), ("", None)]
     assert warnings == [
@@ -84,7 +84,7 @@ def test_unknown_item_of_a_material_is_skipped(folder, item):
     ]
 
 
-def test_texture_without_texcoords_is_a_warning(folder):
+def test_texture_without_texcoords_is_reported_as_a_warning(folder):
     text = POSITIONS + NORMALS + WEIGHTS + "material { texture red.bmp }\n" + TRIANGLES + BINDINGS
     figure, warnings = read(text, folder / "a.skin")
     assert figure.mesh.materials[0].image is not None
@@ -100,7 +100,7 @@ def test_texture_without_texcoords_is_a_warning(folder):
         ("new\x1bline.png", "cannot be read: No such file or directory"),
     ],
 )
-def test_unreadable_texture_is_a_warning(folder, name, reason):
+def test_unreadable_texture_is_reported_as_a_warning(folder, name, reason):
     (folder / "folder").mkdir()
     (folder / "text.png").write_text("no picture")
     figure, warnings = textured(folder, f"material {{ texture {name} }}")
@@ -110,7 +110,7 @@ def test_unreadable_texture_is_a_warning(folder, name, reason):
     assert warnings == [f"{folder}/a.skin:21: texture {path}: {reason}; drawn untextured"]
 
 
-def test_truncated_texture_is_a_warning(folder):
+def test_truncated_texture_is_reported_as_a_warning(folder):
     whole = (folder / "red.bmp").read_bytes()
     (folder / "cut.bmp").write_bytes(whole[:-3])
     figure, warnings = textured(folder, "material { texture cut.bmp }")
@@ -120,7 +120,7 @@ def test_truncated_texture_is_a_warning(folder):
     assert warnings[0].endswith("; drawn untextured")
 
 
-def test_texture_that_ends_in_ctrl_z_is_complete(folder):
+def test_texture_that_ends_in_ctrl_z_is_read_completely(folder):
     # The last byte of a one-pixel-wide 24-bit BMP is padding, so four pixels are used.
     Image.new("RGB", (4, 1), (26, 26, 26)).save(folder / "dark.bmp")
     assert (folder / "dark.bmp").read_bytes().endswith(b"\x1a" * 12)

@@ -1,4 +1,4 @@
-"""Tiny STAR and SUPR models with their published keys, and their forward passes, joint by joint."""
+"""Tiny STAR and SUPR models with the published keys, and their forward passes, joint by joint."""
 
 import numpy as np
 
@@ -25,7 +25,7 @@ def star(parents=SMPL_PARENTS, seed=4):
 
 
 def supr(n_joints=7, seed=5):
-    """Return the arrays of SUPR, whose regressor mixes coordinates."""
+    """Return the arrays of SUPR, which has a regressor that mixes coordinates."""
     parents = (-1, *(joint // 2 for joint in range(n_joints - 1)))
     generator = np.random.default_rng(seed)
     arrays = star(parents, seed)
@@ -46,14 +46,14 @@ def turned(vector):
 
 
 def quaternion(vector):
-    """Return (x, y, z, w - 1)."""
+    """Return the quaternion of a rotation vector as (x, y, z, w - 1)."""
     angle = np.linalg.norm(vector)
     axis = vector / angle if angle else np.zeros(3)
     return np.append(np.sin(0.5 * angle) * axis, np.cos(0.5 * angle) - 1.0)
 
 
 def forward(arrays, vectors, betas, place):
-    """Return vertices and joints; ``vectors`` (J, 3) are rotation vectors."""
+    """Return vertices and joints for rotation vectors, (J, 3)."""
     parents = np.where(arrays["kintree_table"][0] > 1000, -1, arrays["kintree_table"][0])
     shaped = arrays["v_template"] + arrays["shapedirs"] @ betas
     regressor = arrays["J_regressor"]

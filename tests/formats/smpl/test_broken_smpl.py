@@ -1,4 +1,4 @@
-"""Broken body models with their exact messages."""
+"""Broken body models and their messages."""
 
 import numpy as np
 import pytest
@@ -44,7 +44,7 @@ def changed(key, index, value, dtype=np.float64):
 
 
 def table(*parents):
-    """Return a hierarchy that begins with these parents."""
+    """Return a hierarchy that starts with these parents."""
     row = SMPL["kintree_table"].astype(np.int64)
     row[0, 0] = -1
     row[0, : len(parents)] = parents
@@ -155,7 +155,7 @@ def table(*parents):
          {"item": "J_regressor", "joint": 0, "found": 1.1})),
         ({"J_regressor": SMPL["J_regressor"] * (np.arange(24) != 9)[:, None]},
          ("F002.smpl-regressor", None, {"item": "J_regressor", "joint": 9, "found": 0.0})),
-        # Objects that would have to be unpickled
+        # Objects that only a pickle can store
         ({"J_regressor": np.array({}, dtype=object)}, ("F002.archive-value", None,
          {"item": "J_regressor", "problem": Phrase("matrix-objects", shape=(24, 32),
          what=Phrase("unread-objects"))})),
@@ -175,7 +175,7 @@ def test_negative_weight_is_refused_with_its_vertex(refusal):
     )
 
 
-def test_weight_sums_off_by_half_a_thousandth_are_normalised(tmp_path):
+def test_weight_sums_with_errors_of_half_a_thousandth_are_normalised(tmp_path):
     factors = np.where(np.arange(32) % 2, 1.0005, 0.9995)[:, None]
     np.savez(tmp_path / "a.npz", **{**SMPL, "weights": SMPL["weights"] * factors})
     scene = viewer.load(tmp_path / "a.npz")
@@ -217,7 +217,7 @@ def test_weight_sums_off_by_half_a_thousandth_are_normalised(tmp_path):
          ))})),
     ],
 )  # fmt: skip
-def test_broken_extra_is_refused_with_its_key(refusal, change, message):
+def test_broken_optional_array_is_refused_with_its_key(refusal, change, message):
     assert refusal(SMPLX, **change) == message
 
 
@@ -235,7 +235,7 @@ def test_broken_extra_is_refused_with_its_key(refusal, change, message):
         (b"\0" * 5000, ("F002.archive", {"found": "zeros"})),
     ],
 )  # fmt: skip
-def test_non_model_file_is_described(tmp_path, name, data, found):
+def test_file_of_another_kind_is_described(tmp_path, name, data, found):
     (tmp_path / name).write_bytes(data)
     key, values = found
     assert refusal_of(tmp_path / name) == (key, None, values)
@@ -248,7 +248,7 @@ def test_truncated_model_is_refused(tmp_path):
     assert refusal_of(path)[0] == "F002.npz"
 
 
-def test_other_archive_is_described_by_its_content(tmp_path):
+def test_archive_of_other_data_is_described_by_its_content(tmp_path):
     np.savez(tmp_path / "a.npz", vertices=np.zeros((3, 3)), colour=np.zeros(3))
     with pytest.raises(FormatError) as caught:
         viewer.load(tmp_path / "a.npz")

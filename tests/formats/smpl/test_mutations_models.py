@@ -1,4 +1,4 @@
-"""Thousands of broken models and poses: each is posed to finite positions or gives one line."""
+"""Thousands of broken models and poses, which have finite vertices or are refused in one line."""
 
 import io
 import json
@@ -52,7 +52,7 @@ DTYPES = ["?", "i1", "u1", ">i2", "u4", "i8", "u8", "f2", ">f4", "f8", "U3", "S4
 
 
 def move(figure):
-    """Pose a figure in several ways, using all its parts."""
+    """Pose a figure in several ways that use all its parts."""
     pose = rest_pose(figure.skeleton)
     poses = [rest_pose(figure.skeleton) for _ in range(3)]
     poses[1].dofs[:] = 0.7
@@ -66,7 +66,7 @@ def move(figure):
 
 
 def check(source, target="head"):
-    """Read and use one file; errors must be one line that begins with the path."""
+    """Read and use one file; errors must be one line that starts with the path."""
     texts = source.warnings
     try:
         content = read(source)
@@ -89,7 +89,7 @@ def check(source, target="head"):
 
 
 def change_array(given, rng):
-    """Return the arrays with one change of a kind that a converter might make."""
+    """Return the arrays with one change as a converter might make it."""
     given = dict(given)
     key = rng.choice(list(given))
     array, kind = given[key], rng.randrange(9)
@@ -121,7 +121,7 @@ def converted(array, dtype):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_mutated_folder(tmp_path, seed):
+def test_mutated_folder_is_read_or_refused_in_one_line(tmp_path, seed):
     rng = random.Random(seed)
     folder = write(tmp_path / "pig")
     for _ in range(130):
@@ -132,7 +132,7 @@ def test_mutated_folder(tmp_path, seed):
 
 
 @pytest.mark.parametrize("word", ["nan", "1e39", "3.4e38", "-1", "99999999999", "0.5", "x", "1 1"])
-def test_every_number_of_a_folder_replaced(tmp_path, word):
+def test_folder_with_any_number_replaced_is_read_or_refused_in_one_line(tmp_path, word):
     folder = write(tmp_path / "pig")
     for name, text in GOOD.items():
         words = re.split(r"(\s+)", text)
@@ -144,7 +144,7 @@ def test_every_number_of_a_folder_replaced(tmp_path, word):
 
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("seed", range(3))
-def test_changed_arrays(name, seed):
+def test_changed_arrays_are_read_or_refused_in_one_line(name, seed):
     rng = random.Random(seed)
     for _ in range(60):
         given = MODELS[name]
@@ -159,7 +159,7 @@ def test_changed_arrays(name, seed):
 
 @pytest.mark.parametrize("name", MODELS)
 @pytest.mark.parametrize("suffix", [".npz", ".pkl"])
-def test_mutated_archive(name, suffix):
+def test_mutated_archive_is_read_or_refused_in_one_line(name, suffix):
     rng = random.Random(len(name) + len(suffix))
     given = {key: array for key, array in MODELS[name].items() if array.size < 700}
     for number in range(80):
@@ -170,7 +170,7 @@ def test_mutated_archive(name, suffix):
 
 @pytest.mark.parametrize("name", POSES)
 @pytest.mark.parametrize("seed", range(3))
-def test_mutated_pose(name, seed):
+def test_mutated_pose_is_read_or_refused_in_one_line(name, seed):
     rng = random.Random(seed)
     text = json.dumps(POSES[name], indent=1).encode()
     target = "hand" if name == "hand" else "head"
@@ -179,7 +179,7 @@ def test_mutated_pose(name, seed):
 
 
 @pytest.mark.parametrize("name", POSES)
-def test_pose_with_every_value_replaced(name):
+def test_pose_with_any_value_replaced_is_read_or_refused_in_one_line(name):
     values = [*("NaN", "1e999", "-1e38", "1e39", "null", "true", '"x"', "[]", "{}", "[[[1]]]")]
     values += ["[1, [2]]", "[null]", "1" + "0" * 400, '{"a": {}}', "[[1, 2], [3, 4]]", "-0"]
     target = "hand" if name == "hand" else "head"
@@ -190,7 +190,7 @@ def test_pose_with_every_value_replaced(name):
             check(Source("pose.json", text.encode()), target)
 
 
-def test_mutated_pose_arrays():
+def test_mutated_pose_arrays_are_read_or_refused_in_one_line():
     rng = random.Random(7)
     for name, values in POSES.items():
         given = {key: np.asarray(value) for key, value in values.items() if key != "dofs"}
@@ -200,7 +200,7 @@ def test_mutated_pose_arrays():
             check(Source("pose.npz", npz(change_array(given, rng))), target)
 
 
-def test_mutated_numbers():
+def test_mutated_numbers_are_read_or_refused_in_one_line():
     rng = random.Random(8)
     text = "\n".join(map(str, [0.25] * 48)).encode()
     for _ in range(80):

@@ -1,4 +1,4 @@
-"""STAR and SUPR against their published equations; animals by their joint tree."""
+"""STAR and SUPR, compared with their published equations, and animals recognised by joint tree."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def load(tmp_path, arrays):
 
 
 @pytest.mark.parametrize("make", [star, supr])
-def test_vertices_and_joints_agree_with_the_published_equations(tmp_path, make):
+def test_vertices_and_joints_match_the_published_equations(tmp_path, make):
     arrays = make()
     figure = load(tmp_path, arrays)
     generator = np.random.default_rng(6)
@@ -49,14 +49,14 @@ def test_models_are_recognised_by_their_correctives(tmp_path):
     assert dict(load(tmp_path, supr()).facts)["model"] == "SUPR"
 
 
-def test_supr_is_read_as_published_a_dict_in_an_npy_file(tmp_path):
+def test_supr_is_read_as_published_in_an_npy_file(tmp_path):
     np.save(tmp_path / "supr_neutral.npy", supr(), allow_pickle=True)
     figure = viewer.load(tmp_path / "supr_neutral.npy").actors[0].figure
     assert dict(figure.facts)["model"] == "SUPR"
     assert_allclose(deform(figure)[0], supr()["v_template"], atol=ROUNDING)
 
 
-def test_constants_of_the_regressor_do_not_follow_the_shape(tmp_path):
+def test_constants_of_the_regressor_do_not_depend_on_the_shape(tmp_path):
     figure = load(tmp_path, supr())
     weights = np.random.default_rng(2).normal(size=(2, N_SHAPES))
     rest = rest_joints(figure)
@@ -66,7 +66,7 @@ def test_constants_of_the_regressor_do_not_follow_the_shape(tmp_path):
     assert_allclose(rest_translations_of(figure, weights)[1], wanted, atol=ROUNDING)
 
 
-def test_other_counts_of_columns_are_refused(tmp_path):
+def test_wrong_number_of_corrective_columns_is_refused(tmp_path):
     arrays = star() | {"posedirs": np.zeros((30, 3, 94))}
     with pytest.raises(FormatError, match="207"):
         load(tmp_path, arrays)
@@ -78,7 +78,7 @@ SMAL_PARENTS = (
 )
 
 
-def test_animals_have_their_joint_names_and_stand_along_z(tmp_path):
+def test_animals_have_their_joint_names_and_z_up(tmp_path):
     arrays = star(SMAL_PARENTS)
     arrays["posedirs"] = np.zeros((30, 3, 9 * 34))
     height = np.zeros(35)
@@ -94,7 +94,7 @@ def test_animals_have_their_joint_names_and_stand_along_z(tmp_path):
     assert figure.up == "z" and dict(figure.facts)["model"] == "SMAL with ears"
 
 
-def test_trees_with_other_limbs_are_no_animals():
+def test_trees_with_different_limbs_are_not_animals():
     assert animal_of(SMAL_PARENTS[:33]).title == "SMAL"
     assert animal_of((*SMAL_PARENTS[:11], 5, *SMAL_PARENTS[12:])) is None
     assert animal_of([joint - 1 for joint in range(35)]) is None

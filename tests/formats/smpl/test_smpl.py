@@ -1,4 +1,4 @@
-"""Body models of the SMPL family, in all variants found in real files."""
+"""Body models of the SMPL family in all variants of real files."""
 
 import numpy as np
 import pytest
@@ -26,7 +26,7 @@ def read(path):
 
 @pytest.fixture
 def load(tmp_path):
-    """Write arrays as an ``.npz`` and return the figure; a value of None leaves a key out."""
+    """Write arrays to an ``.npz`` file and return the figure; keys set to None are left out."""
 
     def loaded(arrays, **changes):
         given = {**arrays, **changes}
@@ -40,7 +40,7 @@ def load(tmp_path):
 
 
 def assert_smpl(figure):
-    """Check all parts of ``SMPL``, regardless of how it was written."""
+    """Check all parts of ``SMPL``, which do not depend on how it was written."""
     assert_array_equal(figure.mesh.positions, SMPL["v_template"])
     assert_array_equal(figure.mesh.triangles, SMPL["f"])
     assert figure.skeleton.parents.tolist() == [
@@ -115,9 +115,9 @@ def test_family_member_is_recognised_by_its_hierarchy(load, kind):
     assert load.warnings == []
 
 
-def test_model_of_another_hierarchy_has_no_names(load):
+def test_model_with_a_different_hierarchy_has_no_joint_names(load):
     table = SMPL["kintree_table"].copy()
-    table[0, 23] = 20  # 24 joints, but not those of SMPL
+    table[0, 23] = 20  # 24 joints that are not those of SMPL
     figure = load(SMPL, kintree_table=table)
     assert figure.skeleton.names[:2] == ("joint_0", "joint_1")
     assert dict(figure.facts)["model"] == "a model in SMPL's layout"
@@ -139,7 +139,7 @@ def animal(n_joints=35):
     }
 
 
-def test_animal_model_is_read_with_generic_names(load):
+def test_model_with_an_unknown_hierarchy_is_read_with_generic_names(load):
     figure = load(animal())
     assert figure.skeleton.names == tuple(f"joint_{number}" for number in range(35))
     assert figure.correctives.offsets.shape == (306, VERTICES, 3)
@@ -157,7 +157,7 @@ def test_model_of_one_joint_has_no_correctives(load):
 
 
 @pytest.mark.parametrize("dtype", [np.float32, ">f8", ">f4"])
-def test_floats_of_any_type(load, dtype):
+def test_floats_of_any_type_are_read(load, dtype):
     floats = ["v_template", "weights", "J_regressor", "shapedirs", "posedirs"]
     changed = {key: SMPL[key].astype(dtype) for key in floats}
     figure = load(SMPL, **changed)
@@ -167,27 +167,27 @@ def test_floats_of_any_type(load, dtype):
     assert_allclose(vertices, SMPL["v_template"], rtol=0, atol=1e-7)
 
 
-def test_fortran_order(load):
+def test_fortran_order_is_read(load):
     assert_smpl(load({key: np.asfortranarray(array) for key, array in SMPL.items()}))
 
 
-def test_flattened_pose_directions(load):
+def test_flattened_pose_directions_are_read(load):
     rows = np.moveaxis(SMPL["posedirs"], 2, 0).reshape(207, 3 * VERTICES)
     assert_smpl(load(SMPL, posedirs=rows))
 
 
 @pytest.mark.parametrize("dtype", [np.int64, np.uint16, np.float32])
-def test_faces_of_any_type(load, dtype):
+def test_faces_of_any_type_are_read(load, dtype):
     assert_smpl(load(SMPL, f=SMPL["f"].astype(dtype)))
 
 
-def test_weight_sums_off_by_rounding_are_normalised(load):
+def test_weight_sums_with_rounding_errors_are_normalised(load):
     figure = load(SMPL, weights=SMPL["weights"] * (1.0 + 5e-4))
     assert load.warnings == []
     assert_smpl(figure)
 
 
-def test_model_without_shapes_or_correctives_warns(load):
+def test_model_without_shapes_or_correctives_is_read_with_warnings(load):
     figure = load(SMPL, shapedirs=None, posedirs=None)
     assert load.warnings == [
         ("F007.smpl-shapedirs", None, {}),
@@ -196,7 +196,7 @@ def test_model_without_shapes_or_correctives_warns(load):
     assert (figure.blend_shapes, figure.correctives) == (None, None)
 
 
-def test_zero_shape_columns_give_no_shapes(load):
+def test_model_with_zero_shape_columns_has_no_shapes(load):
     assert load(SMPL, shapedirs=np.zeros((VERTICES, 3, 0))).blend_shapes is None
 
 
@@ -217,7 +217,7 @@ def test_zero_shape_columns_give_no_shapes(load):
         ("mano", 10, 10, 0),
     ],
 )
-def test_columns_are_shapes_then_expressions(load, kind, columns, shapes, expressions):
+def test_columns_are_split_into_shapes_and_expressions(load, kind, columns, shapes, expressions):
     arrays = model(kind, 32)
     directions = np.arange(columns) * np.ones((VERTICES, 3, 1))
     figure = load(arrays, shapedirs=directions)
@@ -232,7 +232,7 @@ def test_columns_are_shapes_then_expressions(load, kind, columns, shapes, expres
     assert facts["coefficients"] == f"{shapes} shape, {expressions} expression"
 
 
-def test_shapes_may_be_named(load):
+def test_stated_names_of_shapes_are_used(load):
     names = np.array([f"width {number}" for number in range(10)])
     figure = load(SMPL, shape_names=names)
     assert figure.blend_shapes.names == tuple(names.tolist())
@@ -261,7 +261,7 @@ def test_landmarks_are_keypoints_on_triangles(load):
     assert_allclose(found[1], (2 * corners[0] + 13 * corners[1] + corners[2]) / 16, atol=1e-15)
 
 
-def test_symmetry_map_is_kept(load):
+def test_symmetry_map_is_read(load):
     partners = np.arange(VERTICES) ^ 1
     assert_array_equal(load(SMPL, vert_sym_idxs=partners).symmetry, partners)
 
@@ -279,13 +279,13 @@ def test_hands_have_their_components(load, kind):
         assert_array_equal(hand.mean, arrays[f"hands_mean{hand.side[:1]}"])
 
 
-def test_amass_model_has_no_hand_components(load):
+def test_amass_model_is_read_without_hand_components(load):
     arrays = {key: a for key, a in model("smplh", 32).items() if not key.startswith("hands")}
     assert load(arrays).hands == ()
     assert load.warnings == []
 
 
-def test_invalid_extras_are_ignored_with_a_warning(load):
+def test_invalid_optional_arrays_are_ignored_with_a_warning(load):
     arrays = model("smplx", 32)
     figure = load(
         arrays,
@@ -303,7 +303,7 @@ def test_invalid_extras_are_ignored_with_a_warning(load):
     assert load.warnings == [("F007.smpl-symmetry-range", None, {})]
 
 
-def test_facts_list_keys_used_ignored_and_unknown(load):
+def test_facts_list_used_ignored_and_unknown_keys(load):
     objects = np.array({"L_Hip": 1}, dtype=object)
     figure = load(SMPL, joint2num=objects, gender=np.array("neutral"), author=np.array("me"))
     facts = dict(figure.facts)
@@ -323,7 +323,7 @@ def test_facts_list_keys_used_ignored_and_unknown(load):
 
 @pytest.fixture
 def damaged(tmp_path):
-    """Write a model whose big arrays are damaged in the middle; their headers stay intact."""
+    """Write a model with large arrays damaged in the middle but with intact headers."""
 
     def write(*keys):
         path = tmp_path / "body.npz"
@@ -345,7 +345,7 @@ def test_shapes_and_correctives_are_read_lazily(damaged):
     rest = deform(figure, pose)[0]
     assert_allclose(rest, SMPL["v_template"], rtol=0, atol=1e-14)
 
-    pose.dofs[0] = 0.5  # the root drives no corrective
+    pose.dofs[0] = 0.5  # the root has no correctives
     turned = rest - SMPL["J"][0]
     turned = turned @ rotation_vector_to_matrix(np.array([0.5, 0, 0])).T + SMPL["J"][0]
     assert_allclose(deform(figure, pose)[0], turned, rtol=0, atol=1e-14)
@@ -373,8 +373,8 @@ def test_invalid_values_in_lazy_arrays_are_refused_on_reading(load):
 
 
 @pytest.mark.parametrize("dtype", ["f2", ">f2", "f4", ">f8"])
-def test_numbers_of_any_width_make_a_model(load, dtype):
-    """Weights rounded to half precision sum to 1 within 2^-11 of each; one per vertex is exact."""
+def test_numbers_of_any_width_are_read(load, dtype):
+    """Half precision rounds each weight by up to 2^-11; a single weight per vertex is exact."""
     weights = np.eye(24)[SMPL["weights"].argmax(axis=1)]
     figure = load(SMPL, **{"weights": weights.astype(dtype), "f": SMPL["f"].astype(dtype)})
     assert figure.skin.weights.tolist() == [1.0] * len(weights)

@@ -1,4 +1,4 @@
-"""Body models posed as by the package smplx and by the published formulas."""
+"""Body models, compared with the package smplx and with the published formulas."""
 
 from functools import cache
 from pathlib import Path
@@ -15,7 +15,7 @@ from viewer.rig.skinning import deform, joint_matrices
 
 EXPECTED = np.load(Path(__file__).parents[2] / "data" / "smplx_expected.npz")
 # smplx adds 1e-8 to the components of a rotation vector before it takes their norm.
-TOLERANCE = 1e-7  # metres; the specification allows 1e-6
+TOLERANCE = 1e-7  # metres; the tolerance of the specification is 1e-6
 PARTS = [
     *["global_orient", "body_pose", "left_hand_pose", "right_hand_pose", "hand_pose"],
     *["jaw_pose", "leye_pose", "reye_pose", "neck_pose"],
@@ -29,7 +29,7 @@ HANDS = {
 
 @cache
 def inputs_of_all_cases():
-    """Inputs stored in the file, by case."""
+    """The stored inputs, keyed by case."""
     cases = {name: {} for name in EXPECTED["cases"].tolist()}
     for key in EXPECTED.files:
         case, slash, name = key.partition("/")
@@ -89,9 +89,9 @@ def test_pose_equals_that_of_smplx(case, figure_of):
     assert_allclose(np.linalg.norm(normals, axis=1), 1.0, rtol=0, atol=1e-12)
 
 
-# The synthetic model in the layout of the published file
+# The synthetic model in the layout of the published files
 
-HALF_A_STEP = 2.5e-7  # metres; vertices are stored as float32, up to 2 m from the origin
+HALF_A_STEP = 2.5e-7  # metres; vertices are stored in single precision, up to 2 m from the origin
 
 
 @pytest.fixture(scope="module")
@@ -136,5 +136,5 @@ def test_synthetic_pickle_equals_its_npz(synthetic):
         (first.blend_shapes.offsets.values(), second.blend_shapes.offsets.values()),
         (first.correctives.values(), second.correctives.values()),
     ]:
-        # The joints are sums over vertices, in another order.
+        # The joints are sums over vertices in a different order.
         assert_allclose(a, b, rtol=0, atol=1e-14)

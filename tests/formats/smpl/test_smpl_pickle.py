@@ -28,7 +28,7 @@ MATRICES = ("kintree_table", "v_template", "f", "weights", "posedirs")
 
 
 def columns(dense):
-    """A matrix in compressed columns: values, rows, starts."""
+    """Return a matrix in compressed columns: values, rows, starts."""
     rows = [np.flatnonzero(column) for column in dense.T]
     values = np.concatenate([dense[row, number] for number, row in enumerate(rows)])
     return values, np.concatenate(rows), np.cumsum([0, *map(len, rows)])
@@ -40,12 +40,12 @@ def sparse(dense, **options):
 
 
 def chumpy(values):
-    """A chumpy value, as the authors' files store the shapes."""
+    """Return a chumpy value as in the authors' files, which store the shapes in this form."""
     return created("chumpy.ch", "Ch", mapping(x=array(values), _dirty_vars=b"N", _itr=b"N"))
 
 
 def python_2(**changes):
-    """The model as pickled by Python 2."""
+    """Return the model as pickled by Python 2."""
     given = {key: array(SMPL[key]) for key in MATRICES}
     given |= {"J_regressor": sparse(SMPL["J_regressor"]), "shapedirs": chumpy(SMPL["shapedirs"])}
     given |= {"bs_style": text("lbs"), "bs_type": text("lrotmin")}
@@ -79,9 +79,9 @@ def test_pickle_of_python_2_is_read(load):
     assert_smpl(load(python_2()))
 
 
-def test_regressor_may_be_dense_or_of_rows(load):
+def test_regressor_may_be_dense_or_in_compressed_rows(load):
     assert_smpl(load(python_2(J_regressor=array(SMPL["J_regressor"]))))
-    # The compressed columns of one are the compressed rows of the other.
+    # The compressed columns of the transpose are the compressed rows of the matrix.
     turned = SMPL["J_regressor"].T
     data, indices, indptr = columns(turned)
     rows = matrix(
@@ -100,7 +100,7 @@ def test_weights_may_be_sparse(load):
 
 
 def test_shapes_may_be_a_selection(load):
-    # As in MANO: ten columns picked from twenty.
+    # Ten of twenty columns are selected, as in MANO.
     wide = np.concatenate([np.zeros((32, 3, 10)), SMPL["shapedirs"]], axis=2)
     picked = np.arange(wide.size).reshape(wide.shape)[:, :, 10:].ravel()
     state = mapping(a=chumpy(wide), idxs=array(picked), preferred_shape=shape(32, 3, 10))
@@ -137,11 +137,11 @@ def test_pickle_of_python_3_is_read(load, monkeypatch, protocol, module):
 
 
 @pytest.mark.parametrize("protocol", [0, 1])
-def test_pickle_of_the_text_protocols_is_read(load, protocol):
+def test_pickle_with_text_protocol_is_read(load, protocol):
     assert_smpl(load(pickle.dumps(SMPL, protocol)))
 
 
-def test_regressor_of_another_size_is_refused_before_allocating(load):
+def test_regressor_of_wrong_size_is_refused_before_allocation(load):
     huge = matrix(
         sides=(24, 1 << 26),
         data=[1.0],
@@ -158,7 +158,7 @@ def test_regressor_of_another_size_is_refused_before_allocating(load):
     )
 
 
-def test_lists_of_numbers_are_arrays_too(load):
+def test_lists_of_numbers_are_read_as_arrays(load):
     figure = load(pickle.dumps({**SMPL, "f": SMPL["f"].tolist()}, 2))
     assert_smpl(figure)
 
@@ -173,5 +173,5 @@ def test_shapes_in_a_pickle_are_read_lazily(load):
     assert figure.blend_shapes.offsets.is_loaded
 
 
-def test_unknown_integers_next_to_arrays_do_not_matter(load):
+def test_unknown_integers_next_to_arrays_are_ignored(load):
     assert_smpl(load(python_2(version=whole(3))))

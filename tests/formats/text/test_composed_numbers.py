@@ -26,7 +26,8 @@ def several_floats(seed):
         values.append(round(rng.uniform(-1e3, 1e3), rng.randrange(8)))
         values.append(10 ** rng.uniform(-25, 25) * rng.choice([-1, 1]))
         values.append(struct.unpack("<f", struct.pack("<f", rng.gauss(0, 100)))[0])
-        values.append(rng.randrange(1 << 40) / (1 << rng.randrange(13)))  # ties of short formats
+        # Ties when rounded to few digits.
+        values.append(rng.randrange(1 << 40) / (1 << rng.randrange(13)))
         values.append(math.nextafter(10.0 ** rng.randint(-20, 20), rng.choice([0, math.inf])))
         values.append(struct.unpack("<d", rng.randbytes(8))[0])
     return values
@@ -37,13 +38,13 @@ def texts(values, digits_of):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_shortest_text_is_repr(seed):
+def test_shortest_text_equals_repr(seed):
     values = several_floats(seed)
     assert texts(values, shortest) == [*map(repr, values)]
 
 
 @pytest.mark.parametrize("count", [1, 6, 9, 15])
-def test_significant_digits_are_those_of_the_g_format(count):
+def test_significant_digits_match_the_g_format(count):
     values = several_floats(count)
     assert texts(values, lambda part: significant(part, count)) == [
         f"{v:.{count}g}" for v in values
@@ -51,8 +52,8 @@ def test_significant_digits_are_those_of_the_g_format(count):
 
 
 @pytest.mark.parametrize("decimals", [1, 6, 7, 8, 9, 15])
-def test_fixed_decimals_are_those_of_the_decimal_number(decimals):
-    # Exact decimal numbers, which no rounding changes.
+def test_fixed_decimals_match_the_exact_decimal_number(decimals):
+    # The expected values are exact decimal numbers without rounding.
     rng = random.Random(decimals)
     exact = [Decimal(rng.randrange(-(10**k), 10**k)).scaleb(-decimals) for k in range(1, 16)] * 50
     unit = Decimal(1).scaleb(-decimals)
@@ -62,26 +63,26 @@ def test_fixed_decimals_are_those_of_the_decimal_number(decimals):
     assert found == expected
 
 
-def test_fixed_decimals_out_of_range_are_those_of_the_f_format():
+def test_fixed_decimals_out_of_range_match_the_f_format():
     values = [1e15, -1e22, 1e300, 123456789012345678.0, 0.25, -0.0, -1e-9]
     values += [1.5, math.nan, math.inf, 2.5, -math.inf]
     found = texts(values, lambda part: fixed(part, 6))
     assert found == [f"{np.round(value, 6) + 0.0:.6f}" for value in values]
 
 
-def test_integers_of_up_to_16_digits():
+def test_integers_of_up_to_16_digits_match_str():
     values = [s * (10**k + d) for k in range(16) for d in (-1, 0, 1) for s in (-1, 1)]
     assert texts(values, integers) == [*map(str, values)]
 
 
-def test_separators_follow_their_columns():
+def test_separators_are_written_after_their_columns():
     rows = np.array([[1, -22, 333], [4444444444, 5, -6]])
     text = b"".join(row_texts(rows, integers, [b"//", b", "], b"\r\nf "))
     assert text == b"1//-22, 333\r\nf 4444444444//5, -6\r\nf "
     assert b"".join(row_texts(rows[:0], integers)) == b""
 
 
-def test_rows_beyond_one_part_are_complete():
+def test_rows_that_exceed_one_part_are_complete():
     rows = np.arange(60_000).reshape(-1, 3)
     lines = b"".join(row_texts(rows, integers)).splitlines()
     assert lines == [b"%d %d %d" % (k, k + 1, k + 2) for k in range(0, 60_000, 3)]

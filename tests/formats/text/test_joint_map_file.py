@@ -1,4 +1,4 @@
-"""Joint map files: round trip of names with any characters, and locations of invalid lines."""
+"""Joint map files: round trips of names with any characters, and locations of invalid lines."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_every_name_is_read_as_it_was_written():
     assert read(joint_map_text(JointMap(pairs), ("walk", "fox"))).pairs == pairs
 
 
-def test_comments_blank_lines_and_joints_at_rest():
+def test_comments_blank_lines_and_joints_at_rest_are_read():
     found = read("# figure = motion\r\n\r\nhip=Hips # root\r\n  tail = # rest\r\n leg#2 = a#1\r\n")
     assert found.pairs == (("hip", "Hips"), ("tail", ""), ("leg#2", "a#1"))
     assert found.lines == (3, 4, 5)
@@ -32,20 +32,20 @@ def test_comments_blank_lines_and_joints_at_rest():
 @pytest.mark.parametrize(
     "line", ["hip", "= Hips", "a = b = c", 'a "b" = c', '"a = b', '"" = b', r'"\x" = b']
 )
-def test_an_invalid_line_is_located(line):
+def test_invalid_line_is_reported_with_its_location(line):
     with pytest.raises(FormatError) as caught:
         read(f"hip = Hips\n{line}\n")
     found = caught.value.diagnostic
     assert (found.key, found.line, found.values) == ("F002.joint-map", 2, {"found": line})
 
 
-def test_long_lines_are_refused_at_once():
+def test_long_lines_are_refused_immediately():
     with pytest.raises(FormatError) as caught:
         read("hip = Hips\n" + "a" + 1_000_000 * " " + "b")
     assert caught.value.diagnostic.line == 2
 
 
-def test_a_map_without_joints_is_refused():
+def test_map_without_joints_is_refused():
     with pytest.raises(FormatError) as caught:
         read("# nothing\n")
     assert caught.value.diagnostic.key == "F002.joint-map-empty"

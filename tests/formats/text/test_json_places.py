@@ -1,4 +1,4 @@
-"""Positions in JSON texts, counted by hand or found by an independent parser."""
+"""Positions in JSON texts, counted by hand or determined by an independent parser."""
 
 import json
 
@@ -31,7 +31,7 @@ TEXT = r'{"a": [1, {"b": "x,]}\"", "c": []}, -2e5], "": {}, "d\u00e9": {"a": nul
 def test_value_is_found_by_its_path(path, value):
     place = value_place(TEXT, path)
     assert TEXT[place:].startswith(value)
-    # Python's parser, started at that position, reads the same value.
+    # Python's parser reads the same value if it starts at that position.
     found = json.loads(TEXT)
     for key in path:
         found = found[key]
@@ -43,7 +43,7 @@ def test_missing_value_has_no_position(path):
     assert value_place(TEXT, path) is None
 
 
-def test_last_duplicate_key_wins_and_the_second_is_reported():
+def test_last_duplicate_key_is_used_and_the_second_is_reported():
     text = '{"a": 1, "b": {"a": 2}, "c": [{"a": 3}, {"a": 4}], "a": 5}'
     assert text[value_place(text, ("a",))] == "5"
     assert repeated_key(text) == ("a", text.rindex('"a"'))

@@ -84,7 +84,7 @@ def test_exponents_and_ties_match_float_bit_for_bit(most):
         digits = "".join(rng.choices("0123456789", k=length))
         exponent = f"{rng.choice('eE')}{rng.choice(['', '+', '-'])}{rng.randint(0, 19)}"
         words.append(f"{rng.choice(['', '-'])}{digits[:place]}.{digits[place:]}{exponent}")
-        # Halfway between two floats: an odd integer of 54 bits over a power of two.
+        # An odd integer of 54 bits over a power of two is halfway between two floats.
         half = Decimal(rng.randrange(1 << 53, 1 << 54) | 1) / (1 << rng.randint(0, 8))
         words.append(f"{half:.20e}" if most > 20 else str(half)[:most])
     words = [word for word in words if abs(float(word)) <= LARGEST]
@@ -103,7 +103,7 @@ def test_repr_of_random_floats_round_trips_exactly():
 
 
 @pytest.mark.parametrize("chunk", [1, 2, 3, 7, 8, 9, 16, 17, 31, 64, 100])
-def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
+def test_numbers_are_not_split_at_chunk_boundaries(monkeypatch, chunk):
     monkeypatch.setattr(numbers, "_CHUNK", chunk)
     rng = random.Random(chunk)
     words = [repr(round(rng.uniform(-1e5, 1e5), rng.randrange(12))) for _ in range(300)]
@@ -115,7 +115,7 @@ def test_chunk_boundaries_split_no_number(monkeypatch, chunk):
 
 @pytest.mark.parametrize("chunk", [1, 5, 8, 64, 1 << 17])
 @pytest.mark.parametrize("word", [word for word in NO_NUMBERS if word])
-def test_non_number_is_found_at_its_index(monkeypatch, chunk, word):
+def test_invalid_number_is_reported_at_its_index(monkeypatch, chunk, word):
     monkeypatch.setattr(numbers, "_CHUNK", chunk)
     for index in (0, 1, 6):
         text = [*["0", "-1.5", "2e1", "3", "4", "5"][:index], word, "7", "bad", "8"]
@@ -125,7 +125,7 @@ def test_non_number_is_found_at_its_index(monkeypatch, chunk, word):
 
 
 @pytest.mark.parametrize("word", NO_NUMBERS)
-def test_single_non_number_is_refused(word):
+def test_single_invalid_number_is_refused(word):
     assert not is_number(word.encode())
     assert to_number(word.encode()) is None
 
@@ -133,7 +133,7 @@ def test_single_non_number_is_refused(word):
 @pytest.mark.slow
 @given(st.lists(st.text("0123456789.+-eEf_x \n\x00\u0663", max_size=20), max_size=10))
 @settings(max_examples=400)
-def test_block_and_single_words_agree(parts):
+def test_parsing_of_blocks_and_single_words_agrees(parts):
     data = " ".join(parts).encode()
     single = [to_number(word) for word in data.split()]
     first_bad = single.index(None) if None in single else -1
@@ -156,12 +156,12 @@ def test_non_ascii_letters_are_part_of_a_word(code):
     assert parsed(b"1 2" + bytes([code]) + b"3") == ([1.0], 1)
 
 
-def test_six_kinds_of_white_space_separate():
+def test_six_kinds_of_white_space_separate_words():
     assert parsed("1 2\t3\n4\r5\v6\f7") == ([1, 2, 3, 4, 5, 6, 7], -1)
 
 
 @pytest.mark.parametrize("text", ["", " ", "\n\n", " " * 5000])
-def test_no_words_give_no_numbers(text):
+def test_empty_text_has_no_numbers(text):
     assert parsed(text) == ([], -1)
 
 
@@ -191,7 +191,7 @@ def test_number_of_5_mb_is_read():
 
 
 @pytest.mark.parametrize("word", ["1e-400", "1e-324", ".0001e-330f", "0." + "0" * 400 + "1"])
-def test_underflow_does_not_give_an_integer(word):
+def test_underflow_does_not_produce_an_integer(word):
     assert parsed(f"{word} -{word}") == ([5e-324, -5e-324], -1)
     assert parsed(f"{word}\x01 1")[1] == 0
 

@@ -48,7 +48,7 @@ def test_reading_can_be_cancelled_at_any_part(large_files, reader):
     assert len(calls) == 6
 
 
-def test_cancelled_writing_leaves_only_the_old_file(tmp_path):
+def test_cancelled_writing_keeps_the_old_file(tmp_path):
     def receive(done, total, unit, what):
         assert (total, unit, what) == (0, "MB", "writing a.txt")
         raise Cancelled
@@ -59,7 +59,7 @@ def test_cancelled_writing_leaves_only_the_old_file(tmp_path):
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("a.txt", "old")]
 
 
-def test_reports_go_to_the_innermost_receiver_only():
+def test_reports_are_sent_only_to_the_innermost_receiver():
     outer, inner = [], []
     report(1, 2, "steps")
     with receiving(lambda *step: outer.append(step)):

@@ -1,4 +1,4 @@
-"""Tensors of torch: zip archives, legacy streams, and tensors inside other pickles."""
+"""Tensors of torch in zip archives, legacy streams, and other pickles."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def values(archive: Archive | None, key: str = "v") -> Any:
 
 @pytest.mark.parametrize("code", STORAGES)
 @pytest.mark.parametrize("write", [torch_zip, torch_legacy], ids=["zip", "legacy"])
-def test_element_types(code: str, write: Any) -> None:
+def test_element_types_are_read(code: str, write: Any) -> None:
     given = np.array([[0, 1, 2], [3, 1, 0]]).astype(code)
     found = values(opened(write({"v": given})))
     assert_array_equal(found, given)
@@ -66,13 +66,13 @@ def test_bfloat16_is_the_upper_half_of_a_float() -> None:
     assert found.tolist() == [1.5, -2.0, 3.25]
 
 
-def test_half_floats_become_doubles_in_arrays_that_are_asked_for() -> None:
+def test_half_floats_become_doubles_in_requested_arrays() -> None:
     archive = opened(torch_zip({"v": np.array([65504.0], np.float16)}))
     assert archive.array("v", (1,)).values().dtype == np.float64
 
 
 @pytest.mark.parametrize("order", ["little", "big"])
-def test_byte_orders(order: str) -> None:
+def test_byte_orders_are_read(order: str) -> None:
     assert_array_equal(values(opened(torch_zip({"v": ROWS}, order))), ROWS)
 
 
@@ -94,7 +94,7 @@ def test_bool_bytes_of_tensors_other_than_0_and_1_are_true() -> None:
     ],
     ids=["transposed", "rows", "column", "expanded", "number", "empty", "empty at the end"],
 )
-def test_strided_views(offset: int, size: Any, stride: Any, wanted: Any) -> None:
+def test_strided_views_are_read(offset: int, size: Any, stride: Any, wanted: Any) -> None:
     body = mapping(v=tensor(storage("FloatStorage", "0", 12), offset, size, stride))
     assert_array_equal(values(opened(zip_file(body, {"0": ROWS.tobytes()}))), wanted)
 
@@ -117,13 +117,13 @@ def test_shared_storages_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_unused_storages_are_never_read() -> None:
     data = bytearray(torch_zip({"v": ROWS, "big": np.arange(99.0), "n": {"w": ROWS}}))
     at = data.index(np.arange(99.0).tobytes())
-    data[at : at + 8] = b"\xff" * 8  # its checksum no longer matches
+    data[at : at + 8] = b"\xff" * 8  # this invalidates its checksum
     archive = opened(bytes(data))
     assert_array_equal(values(archive), ROWS)
     assert_array_equal(values(archive.inside("n"), "w"), ROWS)
 
 
-def test_nested_dicts_lists_and_plain_data() -> None:
+def test_nested_dicts_lists_and_plain_data_are_read() -> None:
     given = {"a": {"b": {"c": ROWS}, "t": "text"}, "l": [{"v": ROWS}, {"v": ROWS[:1]}], "n": 2.5}
     archive = opened(torch_zip(given))
     assert (archive.kind, archive.keys, archive.get("n")) == ("torch", ("a", "l", "n"), 2.5)
@@ -138,7 +138,7 @@ def test_nested_dicts_lists_and_plain_data() -> None:
     assert archive.inside("n") is None
 
 
-def test_parameters_sizes_devices_and_types() -> None:
+def test_parameters_sizes_devices_and_types_are_read() -> None:
     made = tensor(storage("FloatStorage", "0", 12), 0, (4, 3), (3, 1))
     hooks = named("collections", "OrderedDict") + b")R"
     body = mapping(
@@ -152,7 +152,7 @@ def test_parameters_sizes_devices_and_types() -> None:
     assert (archive.get("size"), archive.get("device")) == ((1, 2), "cuda")
 
 
-def test_types_that_only_newer_versions_store() -> None:
+def test_types_that_only_newer_versions_store_are_read() -> None:
     hooks = named("collections", "OrderedDict") + b")R"
     stored = storage("UntypedStorage", "0", 4)
     kind = named("torch", "uint16")
@@ -162,19 +162,19 @@ def test_types_that_only_newer_versions_store() -> None:
     assert (found.dtype, found.tolist()) == (np.uint16, [1, 65535])
 
 
-def test_tensors_in_a_plain_pickle() -> None:
+def test_tensors_in_a_plain_pickle_are_read() -> None:
     data = finished(mapping(v=nested_tensor(ROWS), w=nested_tensor(np.arange(3))))
     assert_array_equal(values(opened(data)), ROWS)
     assert values(opened(data), "w").tolist() == [0, 1, 2]
 
 
-def test_tensors_in_an_array_of_objects() -> None:
+def test_tensors_in_an_array_of_objects_are_read() -> None:
     archive = opened(object_npy({"pred_trans": ROWS, "frame": np.arange(4), "name": "a"}))
     assert (archive.kind, archive.keys) == ("npy", ("pred_trans", "frame", "name"))
     assert_array_equal(values(archive, "pred_trans"), ROWS)
 
 
-def test_big_endian_legacy_streams() -> None:
+def test_big_endian_legacy_streams_are_read() -> None:
     kept = storage("FloatStorage", "0", 12)
     body = mapping(v=tensor(kept, 0, (4, 3), (3, 1)))
     data = legacy_file(body, {"0": (12, ROWS.astype(">f4").tobytes())}, is_little=False)
@@ -188,7 +188,7 @@ def test_files_may_end_with_any_byte() -> None:
     assert warnings_of(source.diagnostics) == []
 
 
-def test_rezipped_files_may_be_deflated() -> None:
+def test_repacked_files_may_be_deflated() -> None:
     tensors = Tensors()
     body = value({"v": ROWS}, tensors.array)
     data = zip_file(body, tensors.stored, method=zipfile.ZIP_DEFLATED)
@@ -196,8 +196,8 @@ def test_rezipped_files_may_be_deflated() -> None:
 
 
 @pytest.mark.parametrize("name", ["torch_zip.pt", "torch_legacy.pt", "torch_nested.npy"])
-def test_files_of_torch_itself(name: str) -> None:
-    """See ``make_torch_files.py`` for what they contain."""
+def test_files_written_by_torch_are_read(name: str) -> None:
+    """``make_torch_files.py`` describes their contents."""
     archive = open_archive(Source.open(DATA / name))
     assert_array_equal(values(archive, "rows"), np.arange(6.0).reshape(2, 3))
     assert_array_equal(values(archive, "transposed"), np.arange(6.0).reshape(2, 3).T)

@@ -1,4 +1,4 @@
-"""Hostile torch files: false sizes, foreign names and damage give a one-line error."""
+"""Hostile torch files: false sizes, foreign names and damage, which are refused in one line."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from formats.torch.torch_bytes import (
 
 ROWS = np.arange(12, dtype=np.float32).reshape(4, 3)
 KEPT = storage("FloatStorage", "0", 12)
-BOUND = 8 << 20  # bytes of memory that may be allocated before the error
+BOUND = 8 << 20  # limit of allocated memory in bytes
 
 
 def view(offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
@@ -34,7 +34,7 @@ def view(offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
 
 
 def problem_of(data: bytes) -> str:
-    """The key of the phrase that describes the fault."""
+    """Return the key of the phrase that describes the error."""
     _, _, values = refusal(data)
     return str(values["problem"].key)
 
@@ -51,7 +51,7 @@ def problem_of(data: bytes) -> str:
         (0, (1 << 61, 1 << 61), (0, 0)),
     ],
 )
-def test_views_beyond_their_storage(offset: int, size: Any, stride: Any) -> None:
+def test_views_beyond_their_storage_are_refused(offset: int, size: Any, stride: Any) -> None:
     assert problem_of(view(offset, size, stride)) == "tensor-range"
 
 
@@ -59,11 +59,11 @@ def test_views_beyond_their_storage(offset: int, size: Any, stride: Any) -> None
     ("offset", "size", "stride"),
     [(-1, (1,), (1,)), (0, (2,), (-1,)), (0, (-2,), (1,)), (0, (1, 1), (1,)), (0, (1,) * 33, ())],
 )
-def test_views_that_torch_cannot_have(offset: int, size: Any, stride: Any) -> None:
+def test_impossible_views_are_refused(offset: int, size: Any, stride: Any) -> None:
     assert problem_of(view(offset, size, stride)) == "pickle-arguments"
 
 
-def test_views_that_expand_without_bounds() -> None:
+def test_views_that_expand_without_bounds_are_refused() -> None:
     data = view(0, (1 << 28, 2), (0, 0))
     assert problem_of(data) == "tensor-ratio"
     assert cost(lambda: refusal(data)) < BOUND
@@ -88,7 +88,7 @@ def test_views_that_expand_without_bounds() -> None:
     ],
     ids=lambda given: given if isinstance(given, str) else "",
 )
-def test_storages_that_contradict_the_archive(stored: bytes, key: str) -> None:
+def test_storages_that_contradict_the_archive_are_refused(stored: bytes, key: str) -> None:
     body = mapping(v=tensor(stored, 0, (11,), (1,)))
     data = zip_file(body, {"0": ROWS.tobytes()})
     assert problem_of(data) == key
@@ -118,7 +118,7 @@ def test_compiled_modules_are_refused(name: str) -> None:
         ("builtins", "eval"),
     ],
 )
-def test_other_names_are_refused_wherever_they_are(module: str, name: str, tmp_path: Path) -> None:
+def test_other_names_are_refused_everywhere(module: str, name: str, tmp_path: Path) -> None:
     marker = tmp_path / "marker"
     call = named(module, name) + several(unicode(f"touch {marker}")) + b"R"
     nested = named("torch.storage", "_load_from_bytes")
@@ -143,12 +143,12 @@ def test_other_names_are_refused_wherever_they_are(module: str, name: str, tmp_p
         ({}, "tensor-no-storage"),
     ],
 )
-def test_legacy_storages_that_contradict_the_pickle(stored: Any, key: str) -> None:
+def test_legacy_storages_that_contradict_the_pickle_are_refused(stored: Any, key: str) -> None:
     data = legacy_file(mapping(v=tensor(KEPT, 0, (12,), (1,))), stored)
     assert problem_of(data) == key
 
 
-def test_legacy_storages_given_twice() -> None:
+def test_duplicate_legacy_storages_are_refused() -> None:
     data = legacy_file(mapping(v=KEPT), {"0": (12, ROWS.tobytes())})
     keys = finished(value(["0"], nested_tensor))
     assert keys in data
@@ -157,7 +157,7 @@ def test_legacy_storages_given_twice() -> None:
     )
 
 
-def test_legacy_storages_larger_than_the_file() -> None:
+def test_legacy_storages_larger_than_the_file_are_refused() -> None:
     kept = storage("FloatStorage", "0", 1 << 50)
     data = legacy_file(mapping(v=kept), {"0": (1 << 50, b"")})
     assert problem_of(data) == "pickle-cut"
@@ -180,11 +180,11 @@ def bytes_of(stream: bytes) -> bytes:
     ],
     ids=["empty", "magic", "protocol", "dict", "zip"],
 )
-def test_bytes_that_are_no_storage(stream: bytes, key: str) -> None:
+def test_bytes_that_are_not_a_storage_are_refused(stream: bytes, key: str) -> None:
     assert problem_of(finished(mapping(v=bytes_of(stream)))) == key
 
 
-def test_streams_nested_without_end() -> None:
+def test_nested_streams_are_refused() -> None:
     stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
     for _ in range(3):
         stream = legacy_file(bytes_of(stream), {})
@@ -192,7 +192,7 @@ def test_streams_nested_without_end() -> None:
 
 
 @pytest.mark.slow
-def test_same_bytes_loaded_often_share_one_budget() -> None:
+def test_repeated_loading_of_the_same_bytes_is_refused() -> None:
     stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
     once = named("torch.storage", "_load_from_bytes") + b"(h\1tR0"
     body = b"}" + value(stream, nested_tensor) + b"q\1" + b"0" + once * 50_000
@@ -209,7 +209,7 @@ def test_same_bytes_loaded_often_share_one_budget() -> None:
     ],
     ids=["zip", "legacy", "npy"],
 )
-def test_damaged_files(data: bytes) -> None:
+def test_damaged_files_are_read_or_refused(data: bytes) -> None:
     dice = random.Random(len(data))
     for place in range(0, len(data), 3):
         self_contained(data[:place])

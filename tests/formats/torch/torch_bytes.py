@@ -1,4 +1,4 @@
-"""Torch and joblib files as bytes, written without these packages, with any fault on request."""
+"""Torch and joblib files as bytes, written without these packages, optionally with errors."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MAGIC = b"\x8a\nl\xfc\x9cF\xf9 j\xa8P\x19"
 
 
 def value(given: Any, array: Callable[[NDArray[Any]], bytes]) -> bytes:
-    """The opcodes of nested dicts, lists, tuples, strings, numbers and arrays."""
+    """Return the opcodes of nested dicts, lists, tuples, strings, numbers and arrays."""
     match given:
         case dict():
             pairs = b"".join(value(key, array) + value(of, array) for key, of in given.items())
@@ -55,13 +55,13 @@ def value(given: Any, array: Callable[[NDArray[Any]], bytes]) -> bytes:
 
 
 def storage(kind: str, key: str, count: int) -> bytes:
-    """The persistent id of a storage."""
+    """Return the persistent id of a storage."""
     parts = unicode("storage"), named("torch", kind), unicode(key), unicode("cpu"), whole(count)
     return several(*parts) + b"Q"
 
 
 def tensor(stored: bytes, offset: int, size: tuple[int, ...], stride: tuple[int, ...]) -> bytes:
-    """``_rebuild_tensor_v2`` of a storage."""
+    """Return a call of ``_rebuild_tensor_v2`` for a storage."""
     hooks = named("collections", "OrderedDict") + b")R"
     arguments = stored, whole(offset), shape(*size), shape(*stride), b"\x89", hooks
     return named("torch._utils", "_rebuild_tensor_v2") + several(*arguments) + b"R"
@@ -69,7 +69,7 @@ def tensor(stored: bytes, offset: int, size: tuple[int, ...], stride: tuple[int,
 
 @dataclass
 class Tensors:
-    """Collects the storages of the tensors in a value, one for each array."""
+    """The storages of the tensors in a value, collected one for each array."""
 
     stored: dict[str, bytes] = field(default_factory=dict)
     order: str = "<"
@@ -87,7 +87,7 @@ class Tensors:
 def zip_file(
     body: bytes, stored: dict[str, bytes], order: str = "little", method: int = 0, **more: bytes
 ) -> bytes:
-    """A torch file with a pickle, given without protocol and end, and its storages."""
+    """Return a torch file of a pickle, given without protocol and end, and its storages."""
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", method) as archive:
         archive.writestr("archive/data.pkl", b"\x80\x02" + body + b".")
@@ -101,13 +101,13 @@ def zip_file(
 
 
 def torch_zip(given: Any, order: str = "little") -> bytes:
-    """A torch file with a value, whose arrays become tensors."""
+    """Return a torch file of a value with its arrays as tensors."""
     tensors = Tensors(order="<" if order == "little" else ">")
     return zip_file(value(given, tensors.array), tensors.stored, order)
 
 
 def legacy_file(body: bytes, stored: dict[str, tuple[int, bytes]], is_little: bool = True) -> bytes:
-    """A legacy stream with a pickle and its storages, each after its number of elements."""
+    """Return a legacy stream of a pickle and its storages, each after its number of elements."""
     system = {"protocol_version": 1001, "little_endian": is_little, "type_sizes": {"int": 4}}
     keys = value([*stored], lambda _: b"")
     pickles = MAGIC, whole(1001), value(system, lambda _: b""), body, keys
@@ -116,7 +116,7 @@ def legacy_file(body: bytes, stored: dict[str, tuple[int, bytes]], is_little: bo
 
 
 def torch_legacy(given: Any) -> bytes:
-    """A legacy file with a value, whose arrays become tensors."""
+    """Return a legacy file of a value with its arrays as tensors."""
     tensors = Tensors()
     body = value(given, tensors.array)
     sizes = [array.size for array in _arrays(given)]
@@ -133,7 +133,7 @@ def _arrays(given: Any) -> list[NDArray[Any]]:
 
 
 def nested_tensor(values: NDArray[Any]) -> bytes:
-    """A tensor in an ordinary pickle: its storage is a legacy stream of its own."""
+    """Return a tensor in an ordinary pickle, with its storage as a separate legacy stream."""
     kept = storage(STORAGES[values.dtype.str[1:]], "7", values.size)
     stream = legacy_file(kept, {"7": (values.size, values.tobytes())})
     load = named("torch.storage", "_load_from_bytes") + several(value(stream, tensor_of)) + b"R"
@@ -147,7 +147,7 @@ def tensor_of(values: NDArray[Any]) -> bytes:
 
 
 def object_npy(given: Any, array: Callable[[NDArray[Any]], bytes] = tensor_of) -> bytes:
-    """An ``.npy`` file with a single object, as ``numpy.save`` writes a dict."""
+    """Return an ``.npy`` file of a single object, as ``numpy.save`` writes a dict."""
     header = b"{'descr': '|O', 'fortran_order': False, 'shape': (), }".ljust(117) + b"\n"
     dtype = named("numpy", "dtype") + several(unicode("O8"), b"\x89", b"\x88") + b"R"
     state = several(whole(3), unicode("|"), b"N", b"N", b"N", whole(-1), whole(-1), whole(63))

@@ -11,7 +11,7 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def rotation(vector: Any) -> Floats:
-    """Rodrigues' formula."""
+    """Return a rotation matrix by Rodrigues' formula."""
     vector = np.asarray(vector, dtype=np.float64)
     angle = float(np.linalg.norm(vector))
     if angle == 0.0:
@@ -24,10 +24,9 @@ def rotation(vector: Any) -> Floats:
 def vertices(
     kind: str, arrays: dict[str, Any], betas: Any, rotations: Floats, transl: Any
 ) -> tuple[Floats, Floats]:
-    """Vertices and joints of a pose: V = LBS(T(betas) + P(R), R) + transl.
-
-    ``rotations`` are (J, 3, 3); joints beyond them keep the identity, and fingers of SMPL-X and
-    SMPL+H the mean hand where ``rotations`` end before them.
+    """Return vertices and joints of a pose: V = LBS(T(betas) + P(R), R) + transl. ``rotations`` are
+    (J, 3, 3). Further joints have the identity, and further fingers of SMPL-X and SMPL+H the mean
+    hand.
     """
     parents = joint_parents(kind)
     given = len(rotations)

@@ -1,4 +1,4 @@
-"""Results with damaged bytes or foreign values: each gives a capture or a one-line error."""
+"""Results with damaged bytes or foreign values, which are read or refused in one line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ RESULTS: dict[str, Any] = {
 
 
 def small(tool: str) -> Any:
-    """Results of few frames, without large arrays."""
+    """Return results of few frames without large arrays."""
     if tool == "wham":
         return {
             number: {key: value for key, value in found.items() if key != "verts"}
@@ -54,7 +54,7 @@ def small(tool: str) -> Any:
 
 
 def self_contained(data: bytes) -> None:
-    """Open results in every space; refusals are ignored."""
+    """Open results in every space; ignore refusals."""
     source = Source("a.pkl", data)
     try:
         if detect(source) != "video_mocap":
@@ -70,7 +70,7 @@ def self_contained(data: bytes) -> None:
 
 
 @pytest.mark.parametrize("tool", RESULTS)
-def test_damaged_bytes(tool: str) -> None:
+def test_damaged_bytes_are_read_or_refused_in_one_line(tool: str) -> None:
     data, dice = RESULTS[tool](small(tool)), random.Random(3)
     for _ in range(60):
         place = dice.randrange(len(data))
@@ -98,7 +98,7 @@ def replaced(given: Any, path: tuple[Any, ...], value: Any) -> Any:
 
 
 def paths_of(given: Any, depth: int = 0) -> list[tuple[Any, ...]]:
-    """Paths of all values, up to the fourth level."""
+    """Return the paths of all values down to the fourth level."""
     if depth < 4 and isinstance(given, dict):
         items = list(given.items())
     elif depth < 4 and isinstance(given, list):
@@ -109,7 +109,7 @@ def paths_of(given: Any, depth: int = 0) -> list[tuple[Any, ...]]:
 
 
 @pytest.mark.parametrize("tool", [tool for tool in RESULTS if tool not in ("gvhmr", "slahmr")])
-def test_foreign_values(tool: str) -> None:
+def test_foreign_values_are_read_or_refused_in_one_line(tool: str) -> None:
     given, dice = small(tool), random.Random(3)
     known = FOREIGN if tool != "tram" else [v for v in FOREIGN if getattr(v, "dtype", "") != "<U1"]
     for path in paths_of(given):
@@ -118,7 +118,7 @@ def test_foreign_values(tool: str) -> None:
 
 
 @pytest.mark.parametrize("tool", ["gvhmr", "slahmr"])
-def test_foreign_arrays(tool: str) -> None:
+def test_foreign_arrays_are_read_or_refused_in_one_line(tool: str) -> None:
     given = small(tool)
     arrays = [
         value for value in FOREIGN if isinstance(value, np.ndarray) and value.dtype.kind in "fi"
@@ -128,7 +128,7 @@ def test_foreign_arrays(tool: str) -> None:
             self_contained(RESULTS[tool](replaced(given, path, value)))
 
 
-def test_archives_of_other_kinds_are_not_results() -> None:
+def test_archives_of_other_data_are_not_results() -> None:
     for value in FOREIGN:
         data = joblib_file({"a": value, "b": {"c": value}})
         try:

@@ -1,4 +1,4 @@
-"""GVHMR: both spaces, the mean hands, and the camera that connects the spaces."""
+"""GVHMR results: both spaces, the mean hands, and the camera that connects the spaces."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_vertices_follow_the_tools_formula(space: str, tmp_path: Path) -> None:
         assert_drawn(scene, 0, frame, wanted(space, frame))
 
 
-def test_the_camera_in_the_world_sees_what_the_camera_saw(tmp_path: Path) -> None:
+def test_camera_in_world_space_sees_the_people_as_in_camera_space(tmp_path: Path) -> None:
     path = gvhmr_file(tmp_path)
     world, camera = scene_of(path, "smplx", "world"), scene_of(path, "smplx", "camera")
     assert [len(scene.views) for scene in (world, camera)] == [1, 1]
@@ -56,7 +56,7 @@ def test_the_camera_in_the_world_sees_what_the_camera_saw(tmp_path: Path) -> Non
     assert world.views[0].size == (1280, 720)
 
 
-def test_people_stand_upright_beside_the_camera_that_stays(tmp_path: Path) -> None:
+def test_people_in_camera_space_are_upright_and_the_camera_is_fixed(tmp_path: Path) -> None:
     scene = scene_of(gvhmr_file(tmp_path), "smplx", "camera")
     actor, view = scene.actors[0], scene.views[0]
     assert_allclose(actor.placement[:3, :3], np.diag([1.0, -1.0, -1.0]), atol=1e-12)
@@ -64,7 +64,7 @@ def test_people_stand_upright_beside_the_camera_that_stays(tmp_path: Path) -> No
     assert view.motion is None
 
 
-def test_capture_says_what_it_is(tmp_path: Path) -> None:
+def test_capture_has_the_properties_of_the_file(tmp_path: Path) -> None:
     source = Source.open(gvhmr_file(tmp_path))
     assert detect(source) == "video_mocap"
     capture = open_results(source)
@@ -77,7 +77,7 @@ def test_capture_says_what_it_is(tmp_path: Path) -> None:
     assert (other.space, other.up) == ("camera", "-y")
 
 
-def test_info_says_what_was_recognised(tmp_path: Path) -> None:
+def test_info_states_the_recognised_tool(tmp_path: Path) -> None:
     scene = scene_of(gvhmr_file(tmp_path), "smplx")
     assert describe(scene)["captures"] == [
         ["capture", "GVHMR: 1 person, in world and camera space"],
@@ -85,7 +85,7 @@ def test_info_says_what_was_recognised(tmp_path: Path) -> None:
     ]
 
 
-def test_one_space_is_enough(tmp_path: Path) -> None:
+def test_single_space_is_sufficient(tmp_path: Path) -> None:
     given = gvhmr()
     del given["smpl_params_global"], given["K_fullimg"]
     source = Source(tmp_path / "a.pt", torch_zip(given))
@@ -108,7 +108,7 @@ def test_one_space_is_enough(tmp_path: Path) -> None:
         ({"body_pose": 5}, "F002.value"),
     ],
 )
-def test_arrays_that_do_not_fit(change: dict[str, object], key: str) -> None:
+def test_inconsistent_arrays_are_refused(change: dict[str, object], key: str) -> None:
     given = gvhmr()
     given["smpl_params_global"] = given["smpl_params_global"] | change
     with pytest.raises(FormatError) as caught:

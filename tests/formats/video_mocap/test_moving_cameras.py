@@ -1,4 +1,4 @@
-"""TRAM, PromptHMR and SLAHMR: people and moving cameras in a world."""
+"""TRAM, PromptHMR and SLAHMR results: people and moving cameras in world space."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def tram_vertices(track: int, row: int) -> np.ndarray:
 
 
 def seen(scene: Any, person: int, frame: int) -> np.ndarray:
-    """A person's vertices in the space of the moving camera."""
+    """Return the vertices of a person in the space of the moving camera."""
     timing = scene.actors[0].clip.timing
     view = view_at(scene.views[0], timing.time(frame - timing.first_frame))
     actor = scene.actors[0]
@@ -60,7 +60,7 @@ def seen(scene: Any, person: int, frame: int) -> np.ndarray:
 
 
 @pytest.mark.parametrize("prefix", ["world", "pred"])
-def test_tram_in_the_world(prefix: str, tmp_path: Path) -> None:
+def test_tram_people_are_placed_in_world_space_by_the_camera(prefix: str, tmp_path: Path) -> None:
     camera = tram_camera()
     if prefix == "pred":
         del camera["world_cam_R"], camera["world_cam_T"]
@@ -75,7 +75,7 @@ def test_tram_in_the_world(prefix: str, tmp_path: Path) -> None:
             assert_allclose(seen(scene, track, frame), tram_vertices(track, row), atol=2e-6)
 
 
-def test_tram_in_the_space_of_the_camera(tmp_path: Path) -> None:
+def test_tram_people_are_read_in_camera_space(tmp_path: Path) -> None:
     scene = scene_of(tram_folder(tmp_path), "smpl", "camera")
     for track, frames in TRACKS.items():
         for row, frame in enumerate(frames):
@@ -84,14 +84,14 @@ def test_tram_in_the_space_of_the_camera(tmp_path: Path) -> None:
     assert scene.views[0].intrinsic[0, 0] == 900.0
 
 
-def test_tram_axes_of_the_world(tmp_path: Path) -> None:
+def test_tram_up_axis_depends_on_the_stored_world(tmp_path: Path) -> None:
     assert open_results(Source.open(tram_folder(tmp_path))).up == "y"
     camera = {key: value for key, value in tram_camera().items() if "world" not in key}
     path = tram_folder(tmp_path / "old", camera)
     assert open_results(Source.open(path)).up == "-y"
 
 
-def test_tram_files_of_their_own(tmp_path: Path) -> None:
+def test_single_tram_person_files_are_read(tmp_path: Path) -> None:
     path = tram_folder(tmp_path)
     alone = path / "hps" / "hps_track_3.npy"
     capture = open_results(Source.open(alone))
@@ -102,7 +102,7 @@ def test_tram_files_of_their_own(tmp_path: Path) -> None:
     assert [*next(iter(open_results(Source.open(path / "hps")).parts())).bodies] == [0, 3]
 
 
-def test_tram_rotations_of_six_numbers(tmp_path: Path) -> None:
+def test_tram_rotations_of_six_numbers_are_read(tmp_path: Path) -> None:
     track = tram_track([0, 1], 0.0)
     del track["pred_rotmat"]
     path = tmp_path / "hps_track_0.npy"
@@ -112,7 +112,7 @@ def test_tram_rotations_of_six_numbers(tmp_path: Path) -> None:
     assert_allclose(matrices(vectors), wanted, atol=1e-6)
 
 
-def test_tram_cameras_with_too_few_frames(tmp_path: Path) -> None:
+def test_tram_cameras_with_too_few_frames_are_refused(tmp_path: Path) -> None:
     with pytest.raises(FormatError) as caught:
         open_results(Source.open(tram_folder(tmp_path, tram_camera(5))))
     assert caught.value.diagnostic is not None
@@ -126,7 +126,7 @@ def prompthmr_file(folder: Path, given: dict[str, Any] | None = None) -> Path:
 
 
 def prompthmr_vertices(space: str, row: int) -> np.ndarray:
-    """The tool's own call of smplx has flat hands, here given as 55 rotations."""
+    """The tool calls smplx with flat hands, given here as 55 rotations."""
     body = prompthmr()["people"][1][{"world": "smplx_world", "camera": "smplx_cam"}[space]]
     if space == "world":
         turned = matrices(body["pose"][row].reshape(55, 3))
@@ -147,7 +147,7 @@ def test_prompthmr_follows_the_tools_formula(space: str, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("names", [("Rcw", "Tcw"), ("Rwc", "Twc"), ("pred_cam_R", "pred_cam_T")])
-def test_prompthmr_cameras(names: tuple[str, str], tmp_path: Path) -> None:
+def test_prompthmr_cameras_are_read(names: tuple[str, str], tmp_path: Path) -> None:
     given = prompthmr()
     world = given["camera_world"]
     turned, placed = world.pop("Rcw"), world.pop("Tcw")
@@ -182,7 +182,7 @@ def slahmr_vertices(person: int, frame: int) -> np.ndarray:
     return vertices("smplh", model("smplh"), betas, turned, place)[0]
 
 
-def test_slahmr_in_both_spaces(tmp_path: Path) -> None:
+def test_slahmr_people_are_read_in_both_spaces(tmp_path: Path) -> None:
     path = slahmr_file(tmp_path)
     assert detect(Source.open(path)) == "video_mocap"
     world, camera = scene_of(path, "smplh"), scene_of(path, "smplh", "camera")
@@ -213,13 +213,13 @@ def test_cameras_that_cannot_be_drawn_are_omitted(
     assert [view.size for view in capture.views] == sizes
 
 
-def test_slahmr_without_a_camera(tmp_path: Path) -> None:
+def test_slahmr_file_without_a_camera_is_read(tmp_path: Path) -> None:
     path = slahmr_file(tmp_path, cam_R=None, intrins=None)
     capture = open_results(Source.open(path))
     assert (capture.in_space, capture.views, capture.up) == (None, (), "-y")
 
 
-def test_slahmr_tracks_say_who_is_present(tmp_path: Path) -> None:
+def test_slahmr_tracks_determine_who_is_present(tmp_path: Path) -> None:
     tracks = {
         "7": {"index": 1, "vis_mask": [1, 0, 1, 1]},
         "3": {"index": 0, "vis_mask": [-1, 1, 1, -1]},
@@ -235,14 +235,14 @@ def test_slahmr_tracks_say_who_is_present(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("text", ["{", "[]", '{"tracks": {"1": {"index": 0, "vis_mask": [1]}}}'])
-def test_slahmr_tracks_that_do_not_fit_are_ignored_with_a_note(text: str, tmp_path: Path) -> None:
+def test_inconsistent_slahmr_tracks_are_ignored_with_a_note(text: str, tmp_path: Path) -> None:
     (tmp_path / "track_info.json").write_text(text)
     capture = open_results(Source.open(slahmr_file(tmp_path)))
     assert [note.key for note in capture.warnings] == ["F007.video-tracks"]
     assert [*next(iter(capture.parts())).bodies] == [0, 1]
 
 
-def test_slahmr_last_iteration_of_a_folder(tmp_path: Path) -> None:
+def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path: Path) -> None:
     slahmr_file(tmp_path, "clip_000009_world_results.npz", trans=np.zeros((2, 4, 3)))
     slahmr_file(tmp_path, "clip_000060_world_results.npz")
     slahmr_file(tmp_path, "clip_000000_init_world_results.npz", trans=np.zeros((2, 4, 3)))

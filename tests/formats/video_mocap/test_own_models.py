@@ -1,4 +1,4 @@
-"""Captures drawn with the user's own SMPL-family model, if the model folder contains it."""
+"""Captures drawn with an SMPL-family model of the user, if the model folder contains it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def notes_of(path: Path) -> list[str]:
     return [one.key for one in load(path, motion=SETTINGS).diagnostics if "rate" not in one.key]
 
 
-def test_the_member_of_the_results_is_used(models: Path, tmp_path: Path) -> None:
+def test_model_of_the_same_family_member_is_used(models: Path, tmp_path: Path) -> None:
     body_model("smpl", models)
     body_model("smplx", models)
     scene = load(wham_file(tmp_path), motion=SETTINGS)
@@ -34,18 +34,18 @@ def test_the_member_of_the_results_is_used(models: Path, tmp_path: Path) -> None
     assert notes_of(wham_file(tmp_path)) == ["F007.own-model"]
 
 
-def test_other_members_are_not_used(models: Path, tmp_path: Path) -> None:
+def test_models_of_other_family_members_are_not_used(models: Path, tmp_path: Path) -> None:
     body_model("smpl", models)
     assert notes_of(gvhmr_file(tmp_path)) == ["F007.bundled-body-without-shapes"]
 
 
-def test_a_model_that_cannot_be_read_is_a_note(models: Path, tmp_path: Path) -> None:
+def test_model_that_cannot_be_read_is_reported_in_a_note(models: Path, tmp_path: Path) -> None:
     (models / "SMPL_NEUTRAL.npz").write_bytes(b"PK\x03\x04")
     wanted = ["F007.own-model-unreadable", "F007.bundled-body-without-shapes"]
     assert notes_of(wham_file(tmp_path)) == wanted
 
 
-def test_models_among_the_files_come_first(models: Path, tmp_path: Path) -> None:
+def test_models_among_the_files_take_precedence(models: Path, tmp_path: Path) -> None:
     body_model("smpl", models)
     scene = load(wham_file(tmp_path), body_model("smpl", tmp_path), motion=SETTINGS)
     assert "F007.own-model" not in [one.key for one in scene.diagnostics]

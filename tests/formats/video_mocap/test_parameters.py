@@ -1,4 +1,4 @@
-"""SMPL parameters in dicts of any layout: spellings, forms of rotations, people and frames."""
+"""SMPL parameters in dicts of any layout: key names, forms of rotations, people and frames."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def bodies(given: Any) -> dict[int, Any]:
          for frame in range(4)},
     ],
 )  # fmt: skip
-def test_spellings_and_forms(given: Any) -> None:
+def test_key_names_and_rotation_forms_are_recognised(given: Any) -> None:
     assert detect(source(given)) == "video_mocap"
     ((person, body),) = bodies(given).items()
     assert person == 0
@@ -65,12 +65,14 @@ def test_spellings_and_forms(given: Any) -> None:
 @pytest.mark.parametrize(
     ("place", "up", "space"), [("cam_t", "-y", ""), ("pred_cam_t", "-y", ""), ("trans", "", "")]
 )
-def test_cameras_have_y_down_and_worlds_are_judged(place: str, up: str, space: str) -> None:
+def test_camera_space_has_y_down_and_world_up_axis_is_estimated(
+    place: str, up: str, space: str
+) -> None:
     capture = open_results(source({"rotmat": TURNED, place: PLACES}))
     assert (capture.up, capture.space) == (up, space)
 
 
-def test_people_frames_and_shapes() -> None:
+def test_people_frames_and_shapes_are_read() -> None:
     one = {"rotmat": TURNED, "trans": PLACES, "betas": waves(10), "frames": np.array([5, 6, 8, 9])}
     two = {"rotmat": TURNED[:2], "trans": PLACES[:2], "shape": waves(2, 10)}
     found = bodies({7: one, 9: two})
@@ -81,7 +83,7 @@ def test_people_frames_and_shapes() -> None:
     assert [body.shape.shape for body in found.values()] == [(1, 10), (2, 10)]
 
 
-def test_single_frames_keep_their_numbers() -> None:
+def test_single_frames_are_sorted_by_their_numbers() -> None:
     frames = [
         {"rotmat": TURNED[row], "trans": PLACES[row], "frame_ids": np.array([number])}
         for row, number in ((0, 7), (1, 5))
@@ -92,8 +94,8 @@ def test_single_frames_keep_their_numbers() -> None:
 
 
 @pytest.mark.parametrize("key", ["", "track_id", "id"])
-def test_single_frames_of_two_people_keep_both(key: str) -> None:
-    # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7, in the order of the frames.
+def test_single_frames_of_two_people_are_read(key: str) -> None:
+    # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7; records are in the order of frames.
     listed = [(5, 4), (5, 9), (6, 4), (7, 9)]
     frames = [
         {"rotmat": TURNED[row], "trans": PLACES[row], "frame": number}
@@ -107,7 +109,7 @@ def test_single_frames_of_two_people_keep_both(key: str) -> None:
             9: [0, -1, 1],
         }
         assert_allclose(found[9].translations, PLACES[[1, 3]], atol=1e-12)
-    else:  # the second person of frame 5 is in no other frame
+    else:  # the second person of frame 5 is not in other frames
         assert sorted(found) == [0, 1]
         assert_allclose(found[0].translations, PLACES[[0, 2, 3]], atol=1e-12)
         assert_allclose(found[1].translations, PLACES[[1]], atol=1e-12)
@@ -119,7 +121,7 @@ def test_single_frames_of_two_people_keep_both(key: str) -> None:
 @pytest.mark.parametrize(
     "changes", [{"rotmat": TURNED[:1, :22]}, {"betas": np.zeros(5)}], ids=["joints", "shape"]
 )
-def test_single_frames_that_differ_are_people(changes: dict[str, Any]) -> None:
+def test_inconsistent_single_frames_are_separate_people(changes: dict[str, Any]) -> None:
     one = {"rotmat": TURNED[:1], "trans": PLACES[:1], "betas": np.zeros(10)}
     assert sorted(bodies([one, one | changes])) == [0, 1]
 
@@ -128,7 +130,7 @@ def test_single_frames_that_differ_are_people(changes: dict[str, Any]) -> None:
     ("keys", "numbers"),
     [(["1", "b"], [1, 2]), ([2, "b", "1"], [1, 2, 3]), (["\u00b2", "-4"], [0, 1])],
 )
-def test_keys_without_numbers_hide_nobody(keys: list[Any], numbers: list[int]) -> None:
+def test_people_without_numeric_keys_are_numbered(keys: list[Any], numbers: list[int]) -> None:
     one = {"rotmat": TURNED, "trans": PLACES}
     assert sorted(bodies(dict.fromkeys(keys, one))) == numbers
 
@@ -136,12 +138,12 @@ def test_keys_without_numbers_hide_nobody(keys: list[Any], numbers: list[int]) -
 @pytest.mark.parametrize(
     ("count", "names"), [(22, "SMPL"), (24, "SMPL"), (52, "SMPL+H"), (55, "SMPL-X")]
 )
-def test_members_of_the_family(count: int, names: str) -> None:
+def test_family_members_are_recognised(count: int, names: str) -> None:
     given = {"rotmat": np.tile(np.eye(3), (3, count, 1, 1)), "trans": np.zeros((3, 3))}
     assert open_results(source(given)).model == names
 
 
-def test_what_was_recognised_and_ignored_is_said() -> None:
+def test_recognised_and_ignored_keys_are_reported() -> None:
     opened = source({"rotmat": TURNED, "cam_t": PLACES, "verts": waves(4, 9, 3), "note": "x"})
     capture = open_results(opened)
     (found,) = [one for one in opened.diagnostics.warnings if one.key == "F007.video-parameters"]
@@ -157,7 +159,7 @@ def test_what_was_recognised_and_ignored_is_said() -> None:
     }
 
 
-def test_places_that_are_missing_are_a_note() -> None:
+def test_missing_translations_are_reported_in_a_note() -> None:
     opened = source({"rotmat": TURNED})
     open_results(opened)
     assert "F007.motion-place" in [one.key for one in opened.diagnostics.warnings]
@@ -173,7 +175,7 @@ def test_places_that_are_missing_are_a_note() -> None:
         ({"poses": VECTORS.reshape(4, 72), "cam_t": PLACES}, "video_mocap"),
     ],
 )
-def test_layouts_of_amass_stay_with_its_reader(given: Any, kind: str) -> None:
+def test_layouts_of_amass_are_left_to_its_reader(given: Any, kind: str) -> None:
     assert detect(Source("a.npz", npz(**given))) == kind
     single = {key: np.asarray(value, dtype=np.float32) for key, value in given.items()}
     assert detect(Source("a.pt", torch_zip(single))) == kind

@@ -1,4 +1,4 @@
-"""SAM 3D Body: people as points, upright, with the camera that saw them."""
+"""SAM 3D Body results: people as upright points, with their camera."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ K = np.array([[900.0, 0, 640], [0, 900, 360], [0, 0, 1]])
 
 
 def person(seed: float = 0.0, **changes: Any) -> dict[str, Any]:
-    """One person in a picture of 1280 x 720; y points down."""
+    """Return one person in a picture of 1280 x 720, with y down."""
     keypoints, place = waves(70, 3, seed=seed), np.array([0.2, -0.1, 4.0])
     seen = (keypoints + place) @ K.T
     found = {
@@ -66,7 +66,7 @@ def test_points_are_upright_in_front_of_the_camera(tmp_path: Path) -> None:
     parts = (given[key] for key in ("pred_keypoints_3d", "pred_joint_coords", "pred_vertices"))
     wanted = (np.concatenate([*parts]) + given["pred_cam_t"]) * DOWN
     assert scene.up == "y"
-    visible = np.arange(len(wanted)) != 70  # the origin of the rig is not a point of the body
+    visible = np.arange(len(wanted)) != 70  # the origin of the rig is not part of the body
     assert_allclose(actor.points[visible, :3], wanted[visible], atol=1e-12)
     assert actor.points[:, 3].tolist() == visible.tolist()
     layout = actor.figure.points
@@ -75,7 +75,7 @@ def test_points_are_upright_in_front_of_the_camera(tmp_path: Path) -> None:
     assert layout.names[-1] == "vertex19"
 
 
-def test_the_camera_is_found_from_the_keypoints(tmp_path: Path) -> None:
+def test_camera_is_computed_from_the_keypoints(tmp_path: Path) -> None:
     scene = load(npz(tmp_path))
     (view,) = scene.views
     assert_allclose(view.intrinsic, K, atol=1e-8)
@@ -86,7 +86,7 @@ def test_the_camera_is_found_from_the_keypoints(tmp_path: Path) -> None:
     assert_allclose(pixels[:, :2] / pixels[:, 2:], given["pred_keypoints_2d"], atol=1e-8)
 
 
-def test_joints_of_the_rig_have_parents_before_them() -> None:
+def test_joints_of_the_rig_are_preceded_by_their_parents() -> None:
     assert (len(JOINTS), len(set(JOINTS)), len(KEYPOINTS)) == (127, 127, 70)
     assert all(parent < joint for joint, parent in enumerate(PARENTS))
     ends = {JOINTS[joint]: JOINTS[PARENTS[joint]] for joint in range(1, 127)}
@@ -113,7 +113,7 @@ def test_joints_of_the_rig_have_parents_before_them() -> None:
     ],
     ids=["person", "picture", "frames", "frames of people", "list of frames"],
 )
-def test_pickles_of_people_and_frames(given: Any, wanted: Any, tmp_path: Path) -> None:
+def test_pickles_of_people_and_frames_are_read(given: Any, wanted: Any, tmp_path: Path) -> None:
     path = tmp_path / "out.pkl"
     path.write_bytes(joblib_file(given))
     assert detect(Source.open(path)) == "video_mocap"
@@ -124,7 +124,7 @@ def test_pickles_of_people_and_frames(given: Any, wanted: Any, tmp_path: Path) -
     assert {number: frames.tolist() for number, frames in found.items()} == wanted
 
 
-def test_arrays_with_an_axis_of_frames(tmp_path: Path) -> None:
+def test_arrays_with_an_axis_of_frames_are_read(tmp_path: Path) -> None:
     arrays = {key: value for key, value in person().items() if np.ndim(value)}
     stacked = {key: np.stack([value, value + 1.0, value]) for key, value in arrays.items()}
     np.savez(tmp_path / "a.npz", **stacked)
@@ -141,7 +141,9 @@ def test_arrays_with_an_axis_of_frames(tmp_path: Path) -> None:
         (["000001_0.npz", "000001_1.npz", "000002_0.npz"], {0: 2, 1: 1}),
     ],
 )
-def test_folders(names: list[str], wanted: dict[int, int], tmp_path: Path) -> None:
+def test_folders_of_results_are_read(
+    names: list[str], wanted: dict[int, int], tmp_path: Path
+) -> None:
     for name in names:
         npz(tmp_path, name)
     assert detect(Source.open(tmp_path)) == "video_mocap"
@@ -167,14 +169,14 @@ def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:
         ({"pred_global_rots": np.zeros((5, 3, 3))}, "F002.value"),
     ],
 )
-def test_arrays_that_do_not_fit(changes: dict[str, Any], key: str, tmp_path: Path) -> None:
+def test_inconsistent_arrays_are_refused(changes: dict[str, Any], key: str, tmp_path: Path) -> None:
     with pytest.raises(FormatError) as caught:
         open_results(Source.open(npz(tmp_path, **changes)))
     assert caught.value.diagnostic is not None
     assert caught.value.diagnostic.key == key
 
 
-def test_people_with_different_numbers_of_points(tmp_path: Path) -> None:
+def test_people_with_different_numbers_of_points_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "out.pkl"
     path.write_bytes(joblib_file([person(), person(pred_vertices=waves(7, 3))]))
     with pytest.raises(FormatError) as caught:
@@ -183,15 +185,15 @@ def test_people_with_different_numbers_of_points(tmp_path: Path) -> None:
     assert caught.value.diagnostic.key == "F002.video-points"
 
 
-@pytest.mark.skipif(not REAL.is_file(), reason="no real file beside the checkout")
-def test_a_real_file() -> None:
+@pytest.mark.skipif(not REAL.is_file(), reason="no real file next to the checkout")
+def test_real_file_is_read() -> None:
     archive = archive_of(Source.open(REAL))
     found = read_person(archive)
     assert (found.joints.shape, found.vertices.shape) == ((1, 127, 3), (1, 18439, 3))
     head, foot = (found.joints[0, JOINTS.index(name), 1] for name in ("c_head", "l_foot"))
     assert head > foot
     assert found.rotations is not None
-    # A knee lies along the thigh's own x axis, as in the rig's rest pose.
+    # A knee is on the x axis of its thigh, as in the rest pose of the rig.
     knee, hip = JOINTS.index("l_lowleg"), JOINTS.index("l_upleg")
     along = found.rotations[0, hip].T @ (found.joints[0, knee] - found.joints[0, hip])
     assert_allclose(along / np.linalg.norm(along), [1, 0, 0], atol=0.03)

@@ -1,4 +1,4 @@
-"""Dicts that repeatedly refer to the same values: refused before these are multiplied."""
+"""Dicts with repeated references to the same values, which are refused before they are expanded."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import open_results
 
-BOUND = 64 << 20  # bytes of memory that may be allocated before the error
+BOUND = 64 << 20  # limit of allocated memory in bytes
 
 
 def repeated(given: Any, times: int, name: str = "{}") -> bytes:
-    """A dict with the same value under many keys."""
+    """Return a dict with the same value under many keys."""
     pairs = b"".join(unicode(name.format(index)) + b"h\1" for index in range(times))
     return b"}(" + pairs + b"u"
 
 
 def shared(given: Any, times: int, name: str = "{}", outer: int = 0) -> bytes:
-    """A file of a dict of dicts that share their values."""
+    """Return a file of a dict of dicts that share their values."""
     first = value(given, lambda values: aligned_array(np.asarray(values))) + b"q\1" + b"0"
     body = first + repeated(given, times, name)
     if outer:
@@ -45,7 +45,7 @@ def refused(data: bytes) -> str:
 
 
 @pytest.mark.slow
-def test_people_who_share_their_frames() -> None:
+def test_people_with_shared_frames_are_refused() -> None:
     one = {
         "pose_world": np.zeros((1000, 72), np.float32),
         "trans_world": np.zeros((1000, 3), np.float32),
@@ -58,17 +58,17 @@ def test_people_who_share_their_frames() -> None:
     assert cost(lambda: refused(data)) < BOUND
 
 
-def test_dicts_within_dicts_without_poses() -> None:
+def test_nested_dicts_without_poses_are_refused() -> None:
     assert refused(shared({"a": 1}, 400, outer=400)) == "F002.unknown-archive"
 
 
 @pytest.mark.slow
-def test_pictures_with_the_same_people() -> None:
+def test_pictures_with_the_same_people_are_refused() -> None:
     nobody = {key: 1 for key in person() if key != "pred_cam_t"}
     assert refused(shared(nobody, 2000, outer=2000)) == "F002.unknown-archive"
 
 
-def test_frames_with_the_same_detections() -> None:
+def test_frames_with_the_same_detections_are_refused() -> None:
     frame = next(iter(phalp(1).values()))
     frame = {key: value * 90 if isinstance(value, list) else value for key, value in frame.items()}
     frame["tracked_time"] = [1] * len(frame["tid"])

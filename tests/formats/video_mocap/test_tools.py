@@ -1,4 +1,4 @@
-"""The table of tools: modules, and pages that name every tool."""
+"""The table of tools: its modules, and the manual pages that name every tool."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def test_modules_have_the_functions_of_their_rows(tool: str) -> None:
 
 
 @pytest.mark.parametrize("page", ["README.md", "viewer/manual/video.md"])
-def test_pages_name_every_tool(page: str) -> None:
+def test_manual_pages_name_every_tool(page: str) -> None:
     text = (ROOT / page).read_text("utf-8")
     for row in TOOLS.values():
         for title in row.title.removesuffix(" of other tools").split(", "):

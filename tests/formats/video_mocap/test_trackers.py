@@ -1,4 +1,4 @@
-"""4D-Humans and PHALP: detections frame by frame, with people who are out of sight."""
+"""4D-Humans and PHALP results: detections frame by frame, with people out of sight."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_people_out_of_sight_are_omitted_and_counted(tmp_path: Path) -> None:
     assert found["F007.video-ghosts"] == {"n": 2}
 
 
-def test_the_camera_is_that_of_the_network(tmp_path: Path) -> None:
+def test_camera_is_that_of_the_network(tmp_path: Path) -> None:
     capture = open_results(Source.open(phalp_file(tmp_path)))
     (view,) = capture.views
     assert view.size == (1280, 720)
@@ -71,7 +71,7 @@ def test_files_are_recognised_by_their_frames(tmp_path: Path) -> None:
                     "betas": np.ones(10)}] * 2}, "F002.video-rotation"),
     ],
 )  # fmt: skip
-def test_frames_that_do_not_fit(changes: dict[str, Any], key: str) -> None:
+def test_inconsistent_frames_are_refused(changes: dict[str, Any], key: str) -> None:
     frames = phalp()
     frames["out/img/000001.jpg"] |= changes
     with pytest.raises(FormatError) as caught:

@@ -1,4 +1,4 @@
-"""WHAM: people with IDs and gaps, both spaces, a shape per frame, an assumed frame rate."""
+"""WHAM results: people with IDs and gaps, both spaces, shapes per frame, assumed frame rates."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_people_are_absent_outside_their_frames(tmp_path: Path) -> None:
     assert seen[4] == [False] * 3 + [True, True, False, True, True]
 
 
-def test_the_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
+def test_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
     path = wham_file(tmp_path)
     weights = scene_of(path, "smpl").actors[0].clip.shape_weights
     assert_allclose(weights, wham()[0]["betas"], atol=1e-12)
@@ -59,7 +59,7 @@ def test_the_shape_varies_unless_it_is_averaged(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("given", "rate"), [(None, 30.0), (25.0, 25.0)])
-def test_frame_rates_are_given_or_assumed(given: float | None, rate: float, tmp_path: Path) -> None:
+def test_frame_rate_is_given_or_assumed(given: float | None, rate: float, tmp_path: Path) -> None:
     source = Source.open(wham_file(tmp_path))
     assert detect(source) == "video_mocap"
     body = next(iter(open_results(source, given).parts())).bodies[4]
@@ -89,7 +89,7 @@ def refusal(changes: dict[str, Any]) -> str:
         ({"betas": np.array("x")}, "F002.value"),
     ],
 )
-def test_arrays_that_do_not_fit(changes: dict[str, Any], key: str) -> None:
+def test_inconsistent_arrays_are_refused(changes: dict[str, Any], key: str) -> None:
     assert refusal(changes) == key
 
 
@@ -101,7 +101,7 @@ def test_keys_are_numbers_of_people() -> None:
     assert caught.value.diagnostic.values["item"] == "x"
 
 
-def test_nobody_is_refused() -> None:
+def test_results_without_people_are_refused() -> None:
     empty = {0: {key: value[:0] for key, value in wham()[0].items()}}
     with pytest.raises(FormatError) as caught:
         open_results(Source("a.pkl", joblib_file(empty)))

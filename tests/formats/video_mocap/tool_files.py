@@ -1,4 +1,4 @@
-"""Small results of each tool, in the layouts of their own programs."""
+"""Small results of each tool in the layout of its program."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Scene
 
 UPRIGHT = np.array([np.pi, 0.0, 0.0])
-"""Rotation vector of a person who stands upright in a camera's space, where y points down."""
+"""The rotation vector of a person who is upright in camera space, where y points down."""
 
 AHEAD = np.array([0.0, 0.0, 4.0])
-"""A place four metres in front of a camera."""
+"""A position four metres in front of a camera."""
 
 
 def single(values: Any) -> Any:
-    """Numbers in single precision, as all tools store them."""
+    """Return numbers in single precision, as all tools store them."""
     return np.asarray(values, dtype=np.float32)
 
 
 def matrices(vectors: Any) -> Any:
-    """Rotation matrices of rotation vectors (..., 3)."""
+    """Return the rotation matrices of rotation vectors (..., 3)."""
     flat = np.asarray(vectors, dtype=np.float64).reshape(-1, 3)
     return np.array([rotation(vector) for vector in flat]).reshape(*np.shape(vectors), 3)
 
 
 def gvhmr(length: int = 4) -> dict[str, Any]:
-    """One person in both spaces, rotated by the same camera."""
+    """Return one person in both spaces, rotated by the same camera."""
     body = {
         "body_pose": single(waves(length, 63) / 2),
         "betas": single(np.tile(waves(10), (length, 1))),
@@ -60,7 +60,7 @@ def gvhmr(length: int = 4) -> dict[str, Any]:
 
 
 def wham(length: int = 4) -> dict[int, dict[str, Any]]:
-    """Two people; the second appears in frame 3 and is missing in frame 5."""
+    """Return two people; the second appears in frame 3 and is missing in frame 5."""
     people = {}
     for person, frames in ((0, range(length)), (4, [3, 4, 6, 7, 8][:length])):
         pose = waves(length, 72, seed=person)
@@ -89,21 +89,21 @@ def wham_file(folder: Path) -> Path:
 
 
 def body_model(kind: str, folder: Path) -> Path:
-    """A synthetic body model in the format of the published ones."""
+    """Return a synthetic body model in the format of the published models."""
     path = folder / f"{kind.upper()}_NEUTRAL.npz"
-    if not path.exists():  # two scenes of one file share it, so it must not change
+    if not path.exists():  # two scenes of one file share the model, so it must not change
         np.savez(path, **model(kind))
     return path
 
 
 def scene_of(path: Path, kind: str, space: str = "", **settings: Any) -> Scene:
-    """Results for a synthetic body model."""
+    """Return the results for a synthetic body model."""
     body = body_model(kind, path.parent)
     return load(path, body, motion=MotionSettings(space=space, **settings))
 
 
 def drawn(scene: Scene, person: int, frame: int) -> Any:
-    """A person's vertices in a frame of the video, in the space of the file; None if absent."""
+    """Return a person's vertices in a video frame, in the space of the file; None if absent."""
     actor = next(actor for actor in scene.actors if actor.person == person)
     timing = actor.clip.timing
     pose_actor(actor, timing.time(frame - timing.first_frame))
@@ -113,12 +113,12 @@ def drawn(scene: Scene, person: int, frame: int) -> Any:
 
 
 def assert_drawn(scene: Scene, person: int, frame: int, wanted: Any) -> None:
-    """Vertices agree with a tool's own formula; the files have single precision."""
+    """Assert that vertices match a tool's formula; the files have single precision."""
     assert_allclose(drawn(scene, person, frame), wanted, rtol=0, atol=1e-6)
 
 
 def phalp(length: int = 3) -> dict[str, Any]:
-    """Person 2 in all frames; person 5 is visible in the first, and lost in the others."""
+    """Return person 2 in all frames, and person 5, who is visible only in the first."""
     frames: dict[str, Any] = {}
     for frame in range(length):
         detections = [phalp_body(person, frame) for person in (2, 5)]
@@ -149,7 +149,7 @@ def phalp_body(person: int, frame: int) -> tuple[dict[str, Any], Any]:
 
 
 def turns(length: int, seed: float) -> tuple[Any, Any]:
-    """Rotations and translations of a moving camera."""
+    """Return the rotations and translations of a moving camera."""
     return single(matrices(waves(length, 3, seed=seed))), single(waves(length, 3, seed=seed + 1))
 
 
@@ -168,7 +168,7 @@ def tram_track(frames: list[int], seed: float) -> dict[str, Any]:
 
 
 def six_of(turned: Any) -> Any:
-    """6D rotations: the first two columns, one after the other."""
+    """Return 6D rotations, the first two columns one after the other."""
     return np.swapaxes(np.asarray(turned)[..., :2], -1, -2).reshape(len(turned), -1)
 
 
@@ -187,7 +187,7 @@ def tram_camera(length: int = 6) -> dict[str, Any]:
 
 
 def prompthmr(length: int = 4) -> dict[str, Any]:
-    """One person with finger matrices that are all zero."""
+    """Return one person with finger matrices of zeros."""
     vectors = waves(length, 55, 3, seed=1.0) / 2
     vectors[:, 0] += UPRIGHT
     turned = single(matrices(vectors))
@@ -221,7 +221,7 @@ def prompthmr(length: int = 4) -> dict[str, Any]:
 
 
 def slahmr(length: int = 4) -> dict[str, Any]:
-    """Two people, and a camera that both share."""
+    """Return two people who share a camera."""
     turned, placed = turns(length, 4.0)
     roots = waves(2, length, 3, seed=1.0) / 4 + UPRIGHT
     return {

@@ -15,7 +15,7 @@ ABOUT_X, ABOUT_Y, ABOUT_Z = [HALF, 0, 0, HALF], [0, HALF, 0, HALF], [0, 0, HALF,
 
 
 def humanoid(extension: str, prefix: str, scale: float = 1.0, **more: Any) -> File:
-    """Return a person in a T-pose, its bones as nodes 0 to 5."""
+    """Return a person in a T-pose with bones as nodes 0 to 5."""
     bones = {bone: {"node": node} for node, bone in enumerate(BONES)}
     told = {"specVersion": "1.0", "humanoid": {"humanBones": bones}, **more}
     file = File(extensionsUsed=[extension], extensions={extension: told})
@@ -28,7 +28,7 @@ def humanoid(extension: str, prefix: str, scale: float = 1.0, **more: Any) -> Fi
 
 
 def character() -> File:
-    """Return a character of half the size; its upper arm has other axes at rest."""
+    """Return a character of half the size, with different rest axes of the upper arm."""
     binds = [{"node": 6, "index": 0, "weight": 1.0}]
     expressions = {"preset": {"happy": {"morphTargetBinds": binds}}}
     file = humanoid("VRMC_vrm", "c", 0.5, expressions=expressions)

@@ -1,4 +1,4 @@
-"""A complete VRM character with hair that swings, built array by array.
+"""A complete VRM character with swinging hair, built array by array.
 
 It stands in a T-pose and faces +z (version 1.0) or -z (0.x). Boxes follow some bones, a strand of
 hair hangs from the head, and an animation rotates the hips and the head.
@@ -62,7 +62,7 @@ def png(color: tuple[int, int, int]) -> bytes:
 
 
 def swinging(version: int = 1, turn: bool = True) -> File:
-    """Return the character in one version of VRM; ``turn``: with the animation."""
+    """Return the character in one version of VRM; ``turn`` adds the animation."""
     file = File()
     front = 1.0 if version else -1.0
     places = {name: np.array(place) * (front, 1, front) for name, (_, place) in _TREE.items()}

@@ -45,7 +45,7 @@ def written(folder: Path, name: str, file: File) -> Path:
     return path
 
 
-def test_a_motion_opened_alone_is_a_skeleton(tmp_path: Path) -> None:
+def test_motion_opened_alone_is_shown_as_a_skeleton(tmp_path: Path) -> None:
     scene = viewer.load(written(tmp_path, "wave.vrma", motion()))
     (actor,) = scene.actors
     skeleton = actor.figure.require_skeleton()
@@ -53,11 +53,12 @@ def test_a_motion_opened_alone_is_a_skeleton(tmp_path: Path) -> None:
     assert actor.clip is not None and (actor.clip.start, actor.clip.end) == (0.0, 1.0)
     pose_actor(actor, 1.0)
     arm = joint_matrices(actor.figure, actor.require_pose())[skeleton.names.index("m4"), :3, 3]
-    # 0.4 along x; the chain 0, 0.5, 0 is vertical; 0.2 along x points backwards.
+    # The limb of 0.4 is along x, the chain of 0, 0.5, 0 is vertical, and the 0.2 along x points
+    # backwards.
     assert_allclose(arm, [0.4, 1.5 + 0.3, -0.2], atol=1e-6)
 
 
-def test_a_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> None:
+def test_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> None:
     paths = (written(tmp_path, "a.vrm", character()), written(tmp_path, "wave.vrma", motion()))
     scene = viewer.load(*paths)
     (actor,) = scene.actors
@@ -72,16 +73,16 @@ def test_a_character_plays_a_motion_with_facial_expressions(tmp_path: Path) -> N
     worlds = joint_matrices(figure, actor.require_pose())
     names = figure.require_skeleton().names
     arm, below = (worlds[names.index(name)] for name in ("c3", "c4"))
-    # Hips and arm, then the rest pose: Ry Rz Rx, each by 90 degrees.
+    # Rotations of hips and arm, then of the rest pose: Ry Rz Rx, each by 90 degrees.
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]]) @ [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
     quarter = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     assert_allclose(arm[:3, :3], turn @ quarter, atol=1e-6)
-    # The lower arm is now above the upper arm; at half the size, half the distance.
+    # The lower arm is now above the upper arm, at half the distance because of half the size.
     assert_allclose(below[:3, 3] - arm[:3, 3], turn @ quarter @ [0.15, 0, 0], atol=1e-6)
     assert_allclose(worlds[names.index("c0"), :3, 3], [0.2, 0.5, 0.0], atol=1e-6)
 
 
-def test_a_captured_body_drives_a_character(tmp_path: Path) -> None:
+def test_captured_body_drives_a_character(tmp_path: Path) -> None:
     poses = np.random.default_rng(2).uniform(-0.3, 0.3, (3, 156))
     path = tmp_path / "walk.npz"
     still = {"trans": np.zeros((3, 3)), "betas": np.zeros(10), "gender": "neutral"}
@@ -102,7 +103,7 @@ def test_a_captured_body_drives_a_character(tmp_path: Path) -> None:
         assert_allclose(ways[0], ways[1], atol=1e-9)
 
 
-def test_a_model_of_a_character_file_is_driven(tmp_path: Path) -> None:
+def test_model_option_accepts_a_character_file(tmp_path: Path) -> None:
     settings = MotionSettings(model=written(tmp_path, "a.vrm", character()))
     (actor,) = viewer.load(written(tmp_path, "wave.vrma", motion()), motion=settings).actors
     assert actor.figure.mesh is not None and actor.clip is not None

@@ -1,4 +1,4 @@
-"""Constraints of nodes in glTF files."""
+"""Node constraints in glTF files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ AT = f"/extensions/{NAME}"
 
 
 def file_of(*constraints: dict[str, Any] | None) -> File:
-    """Return a file with a chain of nodes, each with a constraint or none."""
+    """Return a file with a chain of nodes, each with or without a constraint."""
     file = File(extensionsUsed=[NAME])
     for node, constraint in enumerate(constraints):
         item: dict[str, Any] = {"name": f"n{node}"}
@@ -48,11 +48,11 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
     assert skeleton.constraints == (
         Constraint(2, 0, "roll", (0.0, 1.0, 0.0)),
         Constraint(1, 2, "rotation", weight=0.25),
-        # Its position depends on its ancestors.
+        # The position of the source depends on its ancestors.
         Constraint(3, 0, "aim", (-1.0, 0.0, 0.0)),
     )
     assert not source.diagnostics
-    # Sliders of joints that follow others would have no effect.
+    # Sliders of constrained joints would have no effect.
     assert skeleton.dof_joints[skeleton.locked].tolist() == [1, 1, 1, 2, 2, 2, 3, 3, 3]
 
 
@@ -60,7 +60,7 @@ def test_constraints_are_read_in_the_order_of_evaluation() -> None:
     "constraints",
     [
         (None, {"rotation": {"source": 2}}, {"rotation": {"source": 1}}),
-        # The source's position depends on the joint that aims at it.
+        # The position of the source depends on the joint that aims at it.
         (None, {"aim": {"source": 2, "aimAxis": "PositiveX"}}, None),
     ],
 )
@@ -89,7 +89,7 @@ def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: s
     assert found.values["expected"] == expected
 
 
-def test_exported_poses_contain_what_constraints_do(tmp_path: Path) -> None:
+def test_exported_poses_include_the_effect_of_constraints(tmp_path: Path) -> None:
     file = file_of(None, {"rotation": {"source": 0}}, None)
     file.root["nodes"][2]["mesh"] = file.mesh()
     half = math.sqrt(0.5)
@@ -105,5 +105,6 @@ def test_exported_poses_contain_what_constraints_do(tmp_path: Path) -> None:
         (actor,) = load(name).actors
         pose_actor(actor, 1.0)
         corners = deform(actor.figure, actor.require_pose())[0]
-        # The parent rotates to 180 degrees, the joint by the 90 degrees since its rest pose.
+        # The parent rotates to 180 degrees, and the joint by its 90 degrees relative to the rest
+        # pose.
         assert_allclose(corners, [[0, 0, 0], [0, -1, 0], [1, 0, 0]], atol=1e-6)

@@ -50,7 +50,7 @@ def hair(actor: Actor, time: float) -> np.ndarray:
     return matrices[[names.index(name) for name in HAIR], :3, 3]
 
 
-def test_joints_point_at_the_next_one_of_their_chain(folder: Path) -> None:
+def test_joints_point_at_the_next_joint_of_their_chain(folder: Path) -> None:
     actor = load(folder / "ada1.vrm").actors[0]
     skeleton, springs = actor.figure.require_skeleton(), springs_in(actor)
     assert [skeleton.names[joint] for joint in springs.joints] == [*HAIR[:3]]
@@ -63,13 +63,13 @@ def test_joints_point_at_the_next_one_of_their_chain(folder: Path) -> None:
     assert dict(actor.figure.facts)["springs"] == "1 chain, 3 joints, 2 colliders"
 
 
-def test_version_0_swings_everything_below_a_bone(folder: Path) -> None:
+def test_version_0_swings_all_joints_below_a_bone(folder: Path) -> None:
     actor = load(folder / "ada0.vrm").actors[0]
     skeleton, springs = actor.figure.require_skeleton(), springs_in(actor)
     assert [skeleton.names[joint] for joint in springs.joints] == [*HAIR]
-    # The last joint points 7 cm further along its own direction.
+    # The last joint points 7 cm further in its own direction.
     assert_allclose(springs.tails[-1], [0, -0.07, 0])
-    # Unity's z axis points the other way.
+    # The z axis of Unity has the opposite direction.
     assert_allclose(springs.colliders.offsets, [[0, 0.05, -0.02]])
 
 
@@ -108,7 +108,7 @@ def test_hair_lags_behind_the_head_and_keeps_its_length(folder: Path, version: i
     assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-12)
 
 
-def test_every_time_has_one_result(folder: Path) -> None:
+def test_result_depends_only_on_the_time(folder: Path) -> None:
     played = load(folder / "ada1.vrm", motion=ON).actors[0]
     for step in range(60):
         hair(played, step / 60 * 1.2)
@@ -119,7 +119,7 @@ def test_every_time_has_one_result(folder: Path) -> None:
     assert np.array_equal(hair(scrubbed, 1.4), last)
 
 
-def test_actors_posed_together_swing_as_alone(folder: Path) -> None:
+def test_actors_posed_together_swing_as_if_posed_alone(folder: Path) -> None:
     actors = [load(folder / "ada1.vrm", motion=ON).actors[0]]
     actors.append(actors[0].copy())
     actors[1].offset = 0.25

@@ -23,7 +23,7 @@ PARENTS = {1: 0, 2: 1, 3: 2, 4: 2, 5: 2}
 
 def _file(**extensions: Any) -> File:
     """Return a character of six joints with meaningless names, and a mesh with two targets."""
-    # The left arm is at -x, as in a figure that faces -z.
+    # The left arm is at -x, as in figures that face -z.
     places = [[0, 1, 0], [0, 0.2, 0], [0, 0.2, 0], [0, 0.3, 0], [-0.3, 0, 0], [0.3, 0, 0]]
     file = File(extensionsUsed=[*extensions], extensions=extensions)
     for node, place in enumerate(places):
@@ -52,7 +52,7 @@ def _modern(expressions: dict[str, Any]) -> dict[str, Any]:
     return {**told, "meta": meta, "expressions": {"preset": expressions}}
 
 
-def test_joints_are_identified_by_bones_whatever_their_names(tmp_path: Path) -> None:
+def test_joints_with_any_names_are_identified_by_bones(tmp_path: Path) -> None:
     scene, figure = _loaded(_file(VRMC_vrm=_modern({})), tmp_path)
     skeleton = figure.require_skeleton()
     meanings = dict(zip(skeleton.names, joint_meanings(skeleton), strict=True))
@@ -61,7 +61,7 @@ def test_joints_are_identified_by_bones_whatever_their_names(tmp_path: Path) -> 
     assert guess_front(scene) == "-z"
 
 
-def test_bones_of_version_0_are_a_list_with_other_thumb_names(tmp_path: Path) -> None:
+def test_bones_of_version_0_are_a_list_with_different_thumb_names(tmp_path: Path) -> None:
     bones = [{"bone": bone, "node": node} for bone, node in BONES.items()]
     bones += [{"bone": "leftThumbProximal", "node": 6}]
     _, figure = _loaded(_file(VRM={"humanoid": {"humanBones": bones}}), tmp_path)
@@ -92,7 +92,7 @@ def test_expressions_are_sums_of_morph_targets(tmp_path: Path) -> None:
     assert_allclose(moved(0, 0, 0.5, 1.0), np.tile([0.25, 1.0, 0.0], (3, 1)))
 
 
-def test_expressions_of_version_0_bind_meshes_in_percent(tmp_path: Path) -> None:
+def test_binds_of_version_0_expressions_are_in_percent(tmp_path: Path) -> None:
     group = {"name": "Joy", "binds": [{"mesh": 0, "index": 1, "weight": 50}], "isBinary": True}
     told = {"blendShapeMaster": {"blendShapeGroups": [group]}}
     _, figure = _loaded(_file(VRM=told), tmp_path)
@@ -138,7 +138,7 @@ def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path: Path) -> Non
     assert humanoid is not None and set(humanoid.joints) == set(BONES) - {"head"}
 
 
-def test_a_character_of_another_program_opens(shared_data: Path) -> None:
+def test_character_of_another_program_is_read(shared_data: Path) -> None:
     scene = viewer.load(shared_data / "gltf" / "vrm0_sphere.vrm")
     skeleton = scene.actors[0].figure.require_skeleton()
     assert skeleton.humanoid is not None and len(skeleton.humanoid.joints) == 22

@@ -1,4 +1,4 @@
-"""Count of existing OpenGL objects, as reported by OpenGL itself."""
+"""The number of existing OpenGL objects, as reported by OpenGL."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Buffers of closed figures and of failed uploads are freed."""
+"""Release of the buffers of closed figures and failed uploads."""
 
 from __future__ import annotations
 
@@ -32,7 +32,8 @@ def scene(count: int) -> Scene:
 def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
     found = []
     for _ in range(4):
-        # One at a time, and nine as instances; every pose is new, every option makes buffers.
+        # Draw one at a time, and nine as instances; every pose is new, and every option creates
+        # buffers.
         for count in (1, 9):
             opened = scene(count)
             for frame, options in enumerate(OPTIONS):
@@ -41,13 +42,13 @@ def test_closed_figures_leave_no_objects_behind(offscreen) -> None:
         draw(offscreen, Scene([]), plain())
         with offscreen.context:
             found.append(gl_objects())
-    # The first round compiles programs and makes the buffers that all figures share.
+    # The first round compiles programs and creates the buffers that all figures share.
     assert found[1] == found[2] == found[3]
     assert found[1].total() > 20
 
 
 @pytest.mark.parametrize("count", [1, 9])
-def test_a_refused_scene_leaves_no_objects_and_the_old_one_unchanged(
+def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(
     offscreen, monkeypatch, count
 ) -> None:
     old = Scene([Actor(arm(2))])
@@ -75,12 +76,13 @@ def test_a_refused_scene_leaves_no_objects_and_the_old_one_unchanged(
                 assert gl_objects() == before
             monkeypatch.undo()
         refused += 1
-    assert refused > 12  # mesh, skin, palette, texture and skeleton have each failed once
+    # The uploads of mesh, skin, palette, texture and skeleton have each failed once.
+    assert refused > 12
     np.testing.assert_array_equal(draw(offscreen, old, camera=front()), picture)
 
 
-def test_a_shape_that_does_not_fit_can_be_tried_again(offscreen, monkeypatch) -> None:
-    """Allocating the second of two buffers fails: the first one is freed."""
+def test_shape_without_enough_memory_can_be_tried_again(offscreen, monkeypatch) -> None:
+    """Allocation of the second of two buffers fails, so the first is freed."""
     figure = arm(2)
     mesh = figure.require_mesh()
     opened = Scene([Actor(figure)])

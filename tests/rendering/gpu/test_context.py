@@ -1,4 +1,4 @@
-"""Machines without a usable OpenGL, simulated by the environment; each has its own message."""
+"""Machines without usable OpenGL, simulated by environment variables, and their messages."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.offscreen import Offscreen
 
 ROOT = Path(__file__).resolve().parents[3]
-LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is Linux's way")
+LINUX = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="EGL is used only on Linux")
 
 TINY_SKEL = """balljoint root {
   boxmin -0.1 0 -0.1
@@ -28,7 +28,7 @@ TINY_SKEL = """balljoint root {
 
 
 def viewer_render(tmp_path, *arguments: str, **environment: str):
-    """Run ``viewer render`` on one joint in a fresh process; return it and the image's path."""
+    """Run ``viewer render`` on one joint in a new process; return it and the path of the image."""
     skel, output = tmp_path / "one.skel", tmp_path / "one.png"
     skel.write_text(TINY_SKEL)
     command = [sys.executable, "-m", "viewer", "render", str(skel), "-o", str(output)]
@@ -57,7 +57,7 @@ INSTALL = "(on Debian or Ubuntu: apt install libegl1 libgl1 libgl1-mesa-dri)"
 
 
 @LINUX
-def test_missing_egl_device_names_the_remedies(tmp_path):
+def test_missing_egl_device_is_reported_with_remedies(tmp_path):
     result = viewer_render(tmp_path, __EGL_VENDOR_LIBRARY_FILENAMES="/nonexistent")
     check_refusal(
         *result,
@@ -68,8 +68,8 @@ def test_missing_egl_device_names_the_remedies(tmp_path):
 
 
 @LINUX
-def test_missing_driver_files_are_named_in_one_line(tmp_path):
-    """Mesa's own warnings must not come before ours."""
+def test_missing_driver_files_are_reported_in_one_line(tmp_path):
+    """Warnings printed by Mesa must not precede the message."""
     result = viewer_render(tmp_path, LIBGL_DRIVERS_PATH="/nonexistent")
     check_refusal(
         *result,
@@ -80,7 +80,7 @@ def test_missing_driver_files_are_named_in_one_line(tmp_path):
 
 
 @LINUX
-def test_an_old_opengl_is_named_with_its_version_and_renderer(tmp_path):
+def test_old_opengl_is_reported_with_its_version_and_renderer(tmp_path):
     result, output = viewer_render(tmp_path, MESA_GL_VERSION_OVERRIDE="3.1")
     assert result.returncode == 4
     assert result.stderr.startswith(
@@ -100,7 +100,7 @@ def test_an_old_opengl_is_named_with_its_version_and_renderer(tmp_path):
         ("MESA_GL_VERSION_OVERRIDE", "2.1", ("OpenGL 3.3 is needed", "offers 2.1")),
     ],
 )
-def test_an_old_shading_language_is_distinguished_from_an_old_opengl(tmp_path, name, value, words):
+def test_old_shading_language_is_distinguished_from_old_opengl(tmp_path, name, value, words):
     result, output = viewer_render(tmp_path, **{name: value})
     assert result.returncode == 4 and result.stderr.count("\n") == 1, result.stderr
     for word in (*words, "renderer ", f"{name}={value}"):
@@ -120,11 +120,11 @@ def test_an_old_shading_language_is_distinguished_from_an_old_opengl(tmp_path, n
             4,
             ("missing drawing", "EGL found 0 devices"),
         ),
-        # No server has this display number.
+        # No X server has this display number.
         ({"DISPLAY": ":654321"}, 0, ("note    display", ":654321", "-> ")),
     ],
 )
-def test_doctor_reports_the_same(environment, code, words):
+def test_doctor_reports_the_same_message(environment, code, words):
     variables = {**os.environ, "WAYLAND_DISPLAY": "", **environment}
     done = subprocess.run(
         [sys.executable, "-m", "viewer", "doctor"],
@@ -135,7 +135,7 @@ def test_doctor_reports_the_same(environment, code, words):
 
 
 @LINUX
-def test_a_missing_libegl_names_its_package(tmp_path):
+def test_missing_libegl_is_reported_with_its_package(tmp_path):
     result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBEGL="libnope.so")
     check_refusal(
         *result, code=4, message=f"libEGL was not found {INSTALL} [libnope.so not loaded]"
@@ -143,13 +143,13 @@ def test_a_missing_libegl_names_its_package(tmp_path):
 
 
 @LINUX
-def test_a_missing_libgl_names_its_package(tmp_path):
+def test_missing_libgl_is_reported_with_its_package(tmp_path):
     result = viewer_render(tmp_path, GLCONTEXT_LINUX_LIBGL="libnope.so")
     check_refusal(*result, code=4, message=f"libGL was not found {INSTALL} [libnope.so not loaded]")
 
 
 @LINUX
-def test_a_missing_device_reports_the_number_of_devices(tmp_path):
+def test_missing_device_is_reported_with_the_number_of_devices(tmp_path):
     count = device_count()
     known = "0, the only one," if count == 1 else f"0 to {count - 1},"
     for number in ("99", "-1"):
@@ -161,7 +161,7 @@ def test_a_missing_device_reports_the_number_of_devices(tmp_path):
 
 
 @LINUX
-def test_a_missing_device_is_reported_before_anything_is_read(tmp_path, capsys):
+def test_missing_device_is_reported_before_files_are_read(tmp_path, capsys):
     assert run(["render", "missing.skel", "-o", str(tmp_path / "x.png"), "--gpu", "-1"]) == 2
     assert "found -1" in capsys.readouterr().err
 
@@ -176,14 +176,14 @@ def test_only_a_negative_device_number_is_a_usage_error(tmp_path):
 
 
 @LINUX
-def test_the_first_device_can_be_requested(tmp_path):
+def test_first_device_can_be_requested(tmp_path):
     result, output = viewer_render(tmp_path, "--gpu", "0")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
 
 
 @pytest.mark.parametrize("size", ["0x48", "64x0", "0x0", "100000x48", "64x100000"])
-def test_a_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
+def test_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
     result, output = viewer_render(tmp_path, "--size", size)
     width, height = size.split("x")
     assert result.returncode == 2
@@ -193,7 +193,7 @@ def test_a_size_that_cannot_be_drawn_is_a_usage_error(tmp_path, size):
     assert not output.exists()
 
 
-def test_too_many_samples_fall_back_to_the_maximum(tmp_path):
+def test_too_many_samples_are_reduced_to_the_maximum(tmp_path):
     result, output = viewer_render(tmp_path, "--samples", "4096")
     assert result.returncode == 0
     assert result.stderr.startswith("warning: 4096 samples per pixel requested, ")
@@ -202,7 +202,7 @@ def test_too_many_samples_fall_back_to_the_maximum(tmp_path):
 
 
 @LINUX
-def test_another_rasteriser_draws_without_warnings(tmp_path):
+def test_different_rasteriser_draws_without_warnings(tmp_path):
     result, output = viewer_render(
         tmp_path, "--quality", "normal", "--samples", "1", GALLIUM_DRIVER="softpipe"
     )
@@ -211,7 +211,7 @@ def test_another_rasteriser_draws_without_warnings(tmp_path):
 
 
 @LINUX
-def test_drawing_needs_no_display(tmp_path):
+def test_drawing_does_not_need_a_display(tmp_path):
     result, output = viewer_render(tmp_path, DISPLAY="", WAYLAND_DISPLAY="")
     assert (result.returncode, result.stderr) == (0, "")
     assert output.is_file()
@@ -247,7 +247,7 @@ def test_library_messages_are_explained(text, start):
 
 
 @LINUX
-def test_an_invalid_device_is_an_error_in_process_too():
+def test_invalid_device_is_also_an_error_within_the_process():
     for number in (99, -1):
         with pytest.raises(ViewerError, match=f"found {number} ") as caught:
             headless_context(number)
@@ -256,13 +256,13 @@ def test_an_invalid_device_is_an_error_in_process_too():
 
 def test_opengl_errors_are_raised_with_the_operation(ctx):
     check_errors(ctx, "nothing")
-    ctx.enable_direct(0xFFFF)  # no such capability
+    ctx.enable_direct(0xFFFF)  # this capability does not exist
     with pytest.raises(RenderError, match=r"^a mistake: GL_INVALID_ENUM on "):
         check_errors(ctx, "a mistake")
 
 
-def test_an_upload_without_memory_reports_the_requested_size(ctx, monkeypatch):
-    """moderngl raises nothing; only the context's error state reveals it."""
+def test_upload_without_memory_reports_the_requested_size(ctx, monkeypatch):
+    """moderngl raises nothing; only the error state of the context shows the failure."""
     monkeypatch.setattr(moderngl.Context, "error", property(lambda self: "GL_OUT_OF_MEMORY"))
     with pytest.raises(
         RenderError,
@@ -288,7 +288,7 @@ def test_two_contexts_coexist():
     first.release()
 
 
-def test_inaccessible_graphics_card_is_a_note(monkeypatch):
+def test_inaccessible_graphics_card_is_reported_in_a_note(monkeypatch):
     monkeypatch.setattr("viewer.rendering.offscreen.is_software", lambda context: True)
     nodes = ["/dev/dri/renderD128"]
     monkeypatch.setattr("viewer.rendering.offscreen.unreadable_devices", lambda: nodes)

@@ -8,9 +8,9 @@ from viewer.rendering.gpu.context import device_count
 from viewer.rendering.gpu.egl_devices import EglDevice, device_of_worker, egl_devices
 
 SOFTWARE = EglDevice(2, None, True)
-# EGL lists cards in another order than CUDA.
+# EGL lists cards in a different order than CUDA.
 CARDS = [EglDevice(0, 1), EglDevice(1, 0), SOFTWARE]
-# A driver that numbers only the card in CUDA_VISIBLE_DEVICES.
+# This driver numbers only the card in CUDA_VISIBLE_DEVICES.
 ONE_VISIBLE = [EglDevice(0, None), EglDevice(1, 0), SOFTWARE]
 
 
@@ -31,6 +31,6 @@ def test_workers_draw_on_the_visible_card_or_take_cards_in_turn(devices, visible
     assert [device_of_worker(rank, devices, visible) for rank in range(3)] == chosen
 
 
-def test_devices_are_those_that_contexts_are_made_on() -> None:
+def test_listed_devices_are_those_used_by_contexts() -> None:
     devices = egl_devices()
     assert [one.index for one in devices] == [*range(device_count())]

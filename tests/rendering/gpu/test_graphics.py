@@ -1,4 +1,4 @@
-"""A context and its programs outlive the renderers that borrow them."""
+"""A context and its programs, which outlive the renderers that use them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def picture(offscreen):
     return offscreen.render(scene, SIZE, camera, DisplayOptions(), scene_box(scene))
 
 
-def test_renderers_that_share_a_context_draw_the_same():
+def test_renderers_that_share_a_context_draw_equal_images():
     with Offscreen() as alone:
         expected = picture(alone)
     graphics = Graphics()
@@ -45,7 +45,7 @@ def test_programs_are_compiled_once_for_all_renderers():
     graphics.release()
 
 
-def test_each_thread_has_its_own_context():
+def test_each_thread_has_a_separate_context():
     found = []
     mine = thread_graphics()
 

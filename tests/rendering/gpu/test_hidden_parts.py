@@ -1,4 +1,4 @@
-"""Hidden parts of a mesh are neither drawn nor picked nor framed, for one actor alone."""
+"""Hidden parts of a mesh, which are not drawn, picked or framed, for each actor separately."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ def offscreen():
 
 
 def rows():
-    """Return a grid of 4 rows of 8 triangles: feet, belly twice, and a head without a part."""
+    """Return a grid of 4 rows of 8 triangles: feet, two of belly, and a head without a part."""
     figure = grid_figure(4)
     parts = np.repeat([0, 1, 1, -1], 8)
     return replace(figure, mesh=replace(figure.mesh, parts=("feet", "belly"), triangle_parts=parts))
@@ -60,12 +60,12 @@ def test_hidden_parts_are_not_picked_and_other_triangles_keep_their_numbers(offs
     assert picked(offscreen, scene, 1.2) in range(24, 32)
 
 
-def test_hidden_parts_do_not_count_for_the_camera():
+def test_camera_is_fitted_without_hidden_parts():
     actor = Actor(rows(), hidden_parts=frozenset({0, 1}))
     assert scene_box(Scene([actor]))[:, 1] == pytest.approx([0.75, 1.5])
 
 
-def test_actors_of_one_figure_hide_different_parts(offscreen):
+def test_actors_of_one_figure_may_hide_different_parts(offscreen):
     figure = rows()
     aside = np.eye(4)
     aside[2, 3] = -0.5

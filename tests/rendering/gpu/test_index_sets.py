@@ -1,4 +1,4 @@
-"""Triangle order for the vertex cache: neighbours are consecutive, none is lost, runs are kept."""
+"""Triangle order for the vertex cache: consecutive neighbours, all triangles, unchanged runs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from viewer.rendering.gpu.surfaces import PLAIN
 
 
 def shaded(triangles, kept=32) -> int:
-    """Return how many vertices are shaded with a cache of the last few."""
+    """Return the number of vertices that are shaded with a small cache."""
     recent: list[int] = []
     count = 0
     for vertex in np.ravel(triangles).tolist():
@@ -35,7 +35,7 @@ def test_shuffled_triangles_are_sorted_spatially(ctx):
     assert np.array_equal(indices, shuffled[made.order])
     assert sorted(made.order) == list(range(len(shuffled)))
     assert made.spans == ((0, 3 * len(shuffled)),)
-    # At best one vertex for two triangles, at worst three for each.
+    # The optimum is one vertex for two triangles, the worst case three for each.
     assert shaded(shuffled) > 2.9 * len(shuffled)
     assert shaded(indices) < 0.9 * len(shuffled)
 
@@ -56,7 +56,7 @@ def test_material_runs_keep_their_order(ctx):
     assert np.array_equal(indices, ball.triangles[made.order])
 
 
-def test_without_positions_the_order_stays(ctx):
+def test_order_is_unchanged_without_positions(ctx):
     ball = sphere(6)
     made, indices = drawn(ctx, ball.triangles, np.zeros(len(ball.triangles)), None)
     assert np.array_equal(indices, ball.triangles)
@@ -64,7 +64,7 @@ def test_without_positions_the_order_stays(ctx):
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_few_triangles_are_sorted_too(ctx, count):
+def test_small_numbers_of_triangles_are_sorted(ctx, count):
     points = np.zeros((3, 3))
     triangles = np.array([[0, 1, 2]], dtype=np.int32)[:count]
     made, _ = index_set(ctx, triangles, np.zeros(count), [PLAIN], points), None
@@ -72,7 +72,7 @@ def test_few_triangles_are_sorted_too(ctx, count):
     made.indices.release()
 
 
-def test_the_curve_interleaves_the_bits_of_cells():
+def test_curve_interleaves_the_bits_of_cells():
     cells = np.array([[0, 0, 0], [1023, 1023, 1023], [5, 3, 6], [512, 0, 1]], dtype=float)
     wanted = []
     for cell in cells.astype(int):
@@ -82,5 +82,5 @@ def test_the_curve_interleaves_the_bits_of_cells():
                 place |= (int(cell[axis]) >> bit & 1) << (3 * bit + axis)
         wanted.append(place)
     assert curve_places(cells).tolist() == wanted
-    # The size and place of the cloud do not matter.
+    # The result does not depend on size and position of the cloud.
     assert curve_places(cells / 1024 + 64.0).tolist() == wanted

@@ -1,4 +1,4 @@
-"""Actors drawn as instances, against the float64 reference and images of single actors."""
+"""Actors drawn as instances, compared with the float64 reference and images of single actors."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ VARYINGS = "v_position", "v_normal"
 
 
 class Instances:
-    """Instances whose vertices are read back instead of drawn."""
+    """Instances with vertices that are read back instead of drawn."""
 
     def __init__(self, ctx, figure: Figure, way: str = "") -> None:
         self.context, self.programs = ctx, Programs(ctx)
@@ -100,7 +100,7 @@ def test_every_instance_matches_the_reference(ctx, how, n_joints):
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
 @pytest.mark.parametrize("way", WAYS)
-def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
+def test_bundled_body_with_correctives_and_shape_matches_the_reference(ctx, how, way):
     figure = viewer.load(bundled_body()).actors[0].figure
     assert figure.correctives is not None
     instances = Instances(ctx, figure, way)
@@ -111,7 +111,7 @@ def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
     for actor in actors:
         actor.pose.shape_weights[:2] = 1.5, -1.0
     check(instances, actors, how)
-    # Some at rest, then all: old offsets must not remain.
+    # Some, then all actors are at rest; old offsets must not remain.
     actors[1].pose = figure_pose(figure)
     actors[1].pose.shape_weights[:2] = 1.5, -1.0
     check(instances, actors, how)
@@ -124,7 +124,7 @@ def test_the_bundled_body_with_correctives_and_shape(ctx, how, way):
 
 
 @pytest.mark.parametrize("how", HOW, ids=lambda how: how.method)
-def test_figures_far_from_the_origin_keep_their_digits(ctx, how):
+def test_figures_far_from_the_origin_keep_their_precision(ctx, how):
     origin = (1e4, -2e4, 5e3)
     figure = random_figure(np.random.default_rng(3), 20, origin=origin)
     instances = Instances(ctx, figure)
@@ -145,7 +145,7 @@ def test_weights_are_used_as_stored(ctx, sums):
     instances.release()
 
 
-def test_instances_grow_shrink_and_change_their_method(ctx):
+def test_number_and_method_of_instances_can_change(ctx):
     figure = random_figure(np.random.default_rng(4), 12)
     instances, actors = Instances(ctx, figure), cast(figure, 12)
     for chosen, how in (
@@ -177,7 +177,8 @@ def test_placement_and_scale_of_each_actor_are_applied(ctx):
         posed, directions = viewer.deform(figure, actor.pose)
         matrix = actor.placement[:3, :3]
         assert np.allclose(found, posed @ matrix.T + actor.placement[:3, 3], atol=1e-5 * 10)
-        # Normals transform by the inverse transpose: the placement stretches x to twice its length.
+        # Normals are transformed by the inverse transpose, since the placement doubles the length
+        # of x.
         wanted = directions @ np.linalg.inv(matrix)
         wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
         turned = turned / np.linalg.norm(turned, axis=1, keepdims=True)
@@ -278,7 +279,7 @@ def test_instances_of_a_removed_figure_are_freed(offscreen):
     assert len(offscreen.renderer.buffers._instanced) == 0
 
 
-def test_a_refused_upload_is_tried_again(ctx, monkeypatch):
+def test_refused_upload_is_tried_again(ctx, monkeypatch):
     figure = random_figure(np.random.default_rng(7), 6)
     instances, actors = Instances(ctx, figure), cast(figure, 3)
     poses = [actor.pose for actor in actors]
@@ -308,7 +309,7 @@ def test_instanced_skeletons_match_single_ones(offscreen):
             assert np.allclose(rows[..., 3] + boxes.center, wanted[..., 3], atol=1e-6)
 
 
-def test_point_figures_work_in_every_view(offscreen):
+def test_point_figures_are_drawn_with_all_options(offscreen):
     layout = PointLayout("one", ("a", "b"), [[0, 1]], [0, 0])
     actors = [Actor(Figure("points", points=layout)) for _ in range(FEWEST)]
     for number, actor in enumerate(actors[1:]):

@@ -1,4 +1,4 @@
-"""Smaller versions of a texture: sizes, averages in linear light, and sampled values."""
+"""Mipmap levels of textures: sizes, averages in linear light, and sampled values."""
 
 from __future__ import annotations
 
@@ -41,22 +41,33 @@ def test_uniform_colour_is_unchanged():
 
 
 def test_black_and_white_average_to_half_the_light():
-    """Linear 0.5 is 1.055 0.5^(1/2.4) - 0.055 = 0.7354 of 255: 188; a quarter 0.5371: 137."""
+    """Linear 0.5 is 1.055 0.5^(1/2.4) - 0.055 = 0.7354 or 188 of 255; 0.25 is 0.5371 or 137."""
     pixels = np.zeros((2, 4, 4), dtype=np.uint8)
     pixels[0, :2] = 255
     pixels[0, 2] = 255
     (first, second) = halved_pictures(pixels)
     assert first[0, :, 0].tolist() == [188, 137]
-    assert abs(int(second[0, 0, 0]) - 165) <= 1  # 0.375 of the light
+    assert abs(int(second[0, 0, 0]) - 165) <= 1  # 0.375 in linear light
 
 
-def test_every_pixel_is_the_average_of_its_four():
+def test_every_pixel_is_the_average_of_four_pixels():
     pixels = noise(8, 6)
     coded = pixels / 255.0
     linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
     mean = linear.reshape(4, 2, 3, 2, 4).mean(axis=(1, 3))
     wanted = np.where(mean <= 0.0031308, 12.92 * mean, 1.055 * mean ** (1 / 2.4) - 0.055)
     assert np.abs(halved_pictures(pixels)[0] - 255.0 * wanted).max() <= 1.0
+
+
+def test_linear_pixels_are_rounded_averages():
+    pixels = noise(8, 6)
+    sums = pixels.astype(int).reshape(4, 2, 3, 2, 4).sum(axis=(1, 3))
+    first, second, third = halved_pictures(pixels, is_linear=True)
+    np.testing.assert_array_equal(first, (sums + 2) // 4)
+    # The second level averages the exact means, not the rounded ones, and drops the third column.
+    exact = sums[:, :2].reshape(2, 2, 1, 2, 4).sum(axis=(1, 3))
+    np.testing.assert_array_equal(second, (exact + 8) // 16)
+    assert third.shape == (1, 1, 4)
 
 
 SHOW_LEVEL = """#version 330
@@ -76,7 +87,7 @@ void main() {
 
 
 def level_as_drawn(ctx, texture, level: int, size):
-    """Return a level's texels in linear light, 0 to 1, as a shader sees them."""
+    """Return the texels of a level in linear light, 0 to 1, as sampled by a shader."""
     program = ctx.program(vertex_shader=COVER, fragment_shader=SHOW_LEVEL)
     program["u_level"], program["u_size"] = float(level), size
     target = ctx.framebuffer([ctx.renderbuffer(size, 4, dtype="f4")])
@@ -94,7 +105,7 @@ def level_as_drawn(ctx, texture, level: int, size):
 @pytest.mark.parametrize("size", [(16, 16), (64, 16), (5, 3), (1, 8)])
 @pytest.mark.parametrize("own", [True, False])
 def test_shaders_see_every_level(ctx, monkeypatch, size, own):
-    """Ours and the driver's agree with the averages; drivers are free in treating odd sizes."""
+    """Our levels and the driver's match the averages; drivers may treat odd sizes differently."""
     monkeypatch.setattr(mipmaps, "is_software", lambda context: own)
     pixels = noise(*size)
     texture = ctx.texture(size[::-1], 4, pixels.tobytes(), internal_format=SRGB8_ALPHA8)
@@ -106,6 +117,6 @@ def test_shaders_see_every_level(ctx, monkeypatch, size, own):
         seen = level_as_drawn(ctx, texture, level, picture.shape[1::-1])[..., :3]
         if own or not odd:
             # llvmpipe decodes sRGB with an error of 0.0012. Steps of 8-bit sRGB are at most 0.009
-            # in linear light, and the driver rounds again at every level.
+            # in linear light, and the driver rounds at every level.
             np.testing.assert_allclose(seen, wanted, rtol=0, atol=2e-3 if own else 0.01 * level)
     texture.release()

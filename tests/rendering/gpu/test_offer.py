@@ -1,4 +1,4 @@
-"""Messages about OpenGL versions that are too old, or that only appear new enough."""
+"""Messages about OpenGL versions that are too old or only appear to be new enough."""
 
 import pytest
 
@@ -14,7 +14,7 @@ MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
         ("2.1 Mesa 22.3.6", "1.20", {}, "OpenGL 3.3", "offers 2.1 with GLSL 1.20 ("),
         ("OpenGL ES 3.2 Mesa", "OpenGL ES GLSL ES 3.20", {}, "OpenGL 3.3", "offers 3.2 with GLSL"),
         ("3.3 (Core Profile)", "1.50", {}, "GLSL 3.30", "offers GLSL 1.50 ("),
-        # The override applies to core profiles; a compatibility profile does not report it.
+        # The override applies to core profiles; compatibility profiles do not report it.
         (
             "4.5 (Compatibility Profile) Mesa 22.3.6",
             "4.50",
@@ -27,14 +27,16 @@ MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
         ("", "", {}, "OpenGL 3.3", "offers 0.0"),
     ],
 )
-def test_required_and_available_versions(version, language, environment, needed, offered):
+def test_required_and_available_versions_are_reported(
+    version, language, environment, needed, offered
+):
     text = offer_text(Offer(version, language, MESA), environment)
     before, after = text.split("; ")
     assert needed in before and offered in after and f"renderer {MESA}" in after
     assert all(f"{name}={value} is set" in after for name, value in environment.items())
 
 
-def test_no_text_claims_that_a_newer_version_is_too_old():
+def test_no_message_states_that_a_newer_version_is_too_old():
     for version in ("3.3", "4.5", "4.6 (Core Profile)"):
         text = offer_text(Offer(version, "4.60", MESA), {"MESA_GLSL_VERSION_OVERRIDE": "140"})
         assert "OpenGL 3.3 is needed" not in text and "GLSL 1.40" in text

@@ -1,4 +1,4 @@
-"""Resources of a refused upload are freed, however far it got."""
+"""Release of the resources of refused uploads, which may fail at any point."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Item:
         self.log.append(self.name)
 
 
-def test_owner_frees_the_last_first_and_only_once():
+def test_owner_frees_in_reverse_order_and_only_once():
     log, owner = [], Owner()
     for name in "abc":
         owner.keep(Item(log, name))
@@ -41,7 +41,7 @@ def test_guard_frees_on_failure():
 
 
 class Alive:
-    """Counts the objects that were created and not released."""
+    """A count of the objects that were created and not released."""
 
     def __init__(self, monkeypatch, refused: int) -> None:
         self.made, self.objects = 0, []
@@ -67,7 +67,7 @@ def makers():
 
 @pytest.mark.parametrize("name", ["mesh", "skeleton"])
 @pytest.mark.parametrize("refused", range(1, 13))
-def test_refused_upload_leaves_nothing_behind(ctx, monkeypatch, name, refused):
+def test_refused_upload_leaves_no_objects(ctx, monkeypatch, name, refused):
     alive = Alive(monkeypatch, refused)
     context = Spy(ctx, alive)
     try:
@@ -80,7 +80,7 @@ def test_refused_upload_leaves_nothing_behind(ctx, monkeypatch, name, refused):
     assert alive.objects and alive.left() == []
 
 
-def test_refused_posed_mesh_leaves_nothing_behind(ctx, monkeypatch):
+def test_refused_posed_mesh_leaves_no_objects(ctx, monkeypatch):
     programs, mesh = Programs(ctx), makers()["mesh"](ctx)
     for refused in (1, 2):
         with monkeypatch.context() as patch:

@@ -1,4 +1,4 @@
-"""Shader programs: compile errors name our file and line with every driver."""
+"""Shader programs, and compile errors with file and line for every driver."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def shaders(tmp_path, monkeypatch):
 
 
 def build(ctx, name: str):
-    """Compile every program that uses a file."""
+    """Compile every program that includes a file."""
     programs = Programs(ctx)
     try:
         if name.startswith("instance"):
@@ -52,7 +52,7 @@ def build(ctx, name: str):
 
 
 def lines_to_break(text: str) -> list[int]:
-    """Return lines, counted from 1, after which a meaningless statement is an error."""
+    """Return the lines, counted from 1, after which an invalid statement is an error."""
     lines = text.splitlines()
     return [
         number for number, line in enumerate(lines, 1) if line.startswith("    ") and ";" in line
@@ -83,7 +83,7 @@ def lines_to_break(text: str) -> list[int]:
         "edge.vert",
     ],
 )
-def test_a_shader_that_does_not_compile_names_file_and_line(ctx, shaders, name):
+def test_shader_that_does_not_compile_is_reported_with_file_and_line(ctx, shaders, name):
     path = shaders / name
     good = path.read_text()
     numbers = lines_to_break(good)
@@ -131,7 +131,7 @@ def test_every_shading_mode_compiles(ctx, shading):
     programs = Programs(ctx)
     programs.drawing("mesh", shading)
     for effects in ((), ("SHADOWS",), ("SHADOWS", "OCCLUSION")):
-        if shading != "scalar":  # which shows scalars on any material
+        if shading != "scalar":  # this mode shows scalars on any material
             programs.drawing("mesh", shading, materials=True, effects=effects)
     programs.release()
 
@@ -145,7 +145,7 @@ def test_every_skinning_method_compiles(ctx, method):
     programs.release()
 
 
-def test_uniforms_the_compiler_dropped_are_left_out(ctx):
+def test_uniforms_dropped_by_the_compiler_are_skipped(ctx):
     programs = Programs(ctx)
     line = programs.drawing("line")
     set_uniforms(line, {"u_no_such_thing": 1.0, "u_line_color": (0.25, 0.5, 0.75, 1.0)})

@@ -1,4 +1,4 @@
-"""The studio's light: the script reproduces the bundled file, and both equal the integrals."""
+"""The studio's light, reproduced by its script and compared with the integrals."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from numpy.testing import assert_allclose
 from viewer.resources import resource
 
 ROWS = np.array([3, 40, 70, 101])
-STEPS = 240  # steps of the quadrature, from pole to pole
+STEPS = 240  # steps of the quadrature from pole to pole
 
 
 @pytest.fixture
 def generator(monkeypatch):
-    """The modules of the script."""
+    """Return the modules of the script."""
     monkeypatch.syspath_prepend(str(Path(__file__).resolve().parents[3] / "assets"))
     import make_studio
 
@@ -31,7 +31,7 @@ def bundled():
 
 
 def sphere() -> tuple[np.ndarray, np.ndarray]:
-    """Return directions over the sphere, about +z, and the solid angle of each."""
+    """Return directions over the sphere about +z, and the solid angle of each."""
     polar = (np.arange(STEPS) + 0.5) * math.pi / STEPS
     around = (np.arange(2 * STEPS) + 0.5) * math.pi / STEPS
     p, a = np.meshgrid(polar, around, indexing="ij")
@@ -44,7 +44,7 @@ def lobe(alpha: float, n_h: np.ndarray) -> np.ndarray:
     return alpha**2 / (math.pi * (n_h**2 * (alpha**2 - 1.0) + 1.0) ** 2)
 
 
-def test_the_bundled_light_is_what_the_script_makes(generator, bundled):
+def test_bundled_light_is_the_output_of_the_script(generator, bundled):
     directions = generator.octahedral_directions(generator.SIZE)[np.ix_(ROWS, ROWS)]
     light, samples = generator.radiance, generator.SAMPLES
     for layer in (0, 2, 7):
@@ -62,15 +62,15 @@ def test_the_bundled_light_is_what_the_script_makes(generator, bundled):
 
 
 def test_borders_continue_the_octahedral_map(generator):
-    """Beyond an edge is the edge's own texel, mirrored about the centre of the edge."""
+    """Beyond an edge is the texel of the edge, mirrored about the centre of the edge."""
     points = generator.octahedral_directions(8)
     assert_allclose(points[0, 1:-1], points[1, 1:-1][::-1], atol=1e-12)
     assert_allclose(points[1:-1, -1], points[1:-1, -2][::-1], atol=1e-12)
 
 
 @pytest.mark.parametrize("layer", [3, 5, 7])
-def test_the_light_is_the_integral_of_the_lobe(generator, bundled, layer):
-    """The mean of radiance weighted by D(h) (n . l), for a view along the normal."""
+def test_light_is_the_integral_of_the_lobe(generator, bundled, layer):
+    """The expected value is the mean radiance, weighted by D(h) (n . l), along the normal."""
     points, angles = sphere()
     light = generator.radiance(points)
     for row, column in ((20, 20), (60, 75), (110, 40)):
@@ -83,7 +83,7 @@ def test_the_light_is_the_integral_of_the_lobe(generator, bundled, layer):
         assert_allclose(bundled["light"][layer][row, column], wanted, rtol=0.02)
 
 
-def test_the_last_layer_is_the_irradiance(generator, bundled):
+def test_last_layer_is_the_irradiance(generator, bundled):
     points, angles = sphere()
     light = generator.radiance(points)
     for row, column in ((20, 20), (60, 75), (110, 40)):
@@ -94,8 +94,8 @@ def test_the_last_layer_is_the_irradiance(generator, bundled):
 
 @pytest.mark.parametrize("roughness", [0.3, 0.5, 0.9])
 @pytest.mark.parametrize("n_v", [0.2, 0.7])
-def test_the_table_is_the_integral_of_the_brdf(bundled, roughness, n_v):
-    """Reflectance of F0 = 1 is factor + summand, that of F0 = 0 is the summand: below 1 both."""
+def test_table_is_the_integral_of_the_brdf(bundled, roughness, n_v):
+    """The reflectance of F0 = 1 is factor + summand, that of F0 = 0 the summand; both are < 1."""
     row, column = int(64 * roughness), int(64 * n_v)
     alpha, n_v = ((row + 0.5) / 64) ** 2, (column + 0.5) / 64
     points, angles = sphere()
@@ -106,7 +106,7 @@ def test_the_table_is_the_integral_of_the_brdf(bundled, roughness, n_v):
     n_l, n_h, v_h = points[:, 2], half[:, 2], half @ view
 
     def shadowing(cosine):
-        """Smith's Lambda of GGX (Heitz 2014, eq. 72)."""
+        """Return Smith's Lambda of GGX (Heitz 2014, eq. 72)."""
         return 0.5 * (np.sqrt(1.0 + alpha**2 * (1.0 / cosine**2 - 1.0)) - 1.0)
 
     visible = 1.0 / (1.0 + shadowing(n_l) + shadowing(n_v))

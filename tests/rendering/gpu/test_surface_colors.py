@@ -1,4 +1,4 @@
-"""Pixels of vertex colours, further texture coordinates, and filters of textures."""
+"""Pixels of vertex colours, additional texture coordinates, and texture filters."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def offscreen():
 # Textures
 
 
-def test_textures_of_the_third_set_are_placed_by_it(offscreen):
-    """The base texture has the second set, the mask-like opacity comes from the same texel."""
+def test_textures_use_their_set_of_coordinates(offscreen):
+    """All four sets of coordinates are tested; opacity is read from the texel of the colour."""
     colors = [(255, 0, 0), (0, 255, 0)], [(0, 0, 255), (255, 255, 255)]
     uvs = square().uvs
     sets = (np.full_like(uvs, 0.25), uvs[:, ::-1], np.full_like(uvs, 0.75), uvs * -1.0)
@@ -55,10 +55,8 @@ def test_textures_of_the_third_set_are_placed_by_it(offscreen):
 @pytest.mark.parametrize(
     ("minified", "wanted"), [("", 188), ("linear_mipmap_nearest", 188), ("nearest", (0, 255))]
 )
-def test_reduced_textures_are_averaged_unless_the_sampler_says_otherwise(
-    offscreen, minified, wanted
-):
-    """A checkerboard of texels, 3.2 of them per pixel, is half of the light: sRGB 188."""
+def test_reduced_textures_are_averaged_unless_the_sampler_forbids_it(offscreen, minified, wanted):
+    """The mean of a checkerboard with 3.2 texels per pixel is half of the light, sRGB 188."""
     white, black = (255, 255, 255), (0, 0, 0)
     rows = [[(white, black)[(x + y) % 2] for x in range(256)] for y in range(256)]
     made = texture(*rows, minification=minified)
@@ -70,8 +68,8 @@ def test_reduced_textures_are_averaged_unless_the_sampler_says_otherwise(
         assert np.abs(inner - wanted).max() <= 2
 
 
-def test_an_image_is_uploaded_once_per_sampler(offscreen):
-    """Three materials, three maps each: one image, two ways to wrap it, colours and data apart."""
+def test_image_is_uploaded_once_per_sampler(offscreen):
+    """Three materials have three maps each: one image, two wrap modes, colours and data."""
     made = texture([(1, 2, 3)], wrap=("repeat", "repeat"))
     clamped = replace(made, wrap=("clamp", "clamp"))
     data = {"metallic_texture": made, "roughness_texture": made}
@@ -89,7 +87,7 @@ def test_an_image_is_uploaded_once_per_sampler(offscreen):
 
 @pytest.mark.parametrize("count", [1, 8])
 def test_vertex_colours_multiply_the_base_colour(offscreen, count):
-    """Left to right they go from red to half blue; the pixel's middle is at x = 0.025."""
+    """The colours change from red on the left to half blue on the right."""
     colors = [[1, 0, 0, 1.0] if x < 0 else [0, 0, 0.5, 0.5] for x in square().positions[:, 0]]
     base = (0.5, 1.0, 1.0, 1.0)
     for material, factor in (
@@ -100,7 +98,7 @@ def test_vertex_colours_multiply_the_base_colour(offscreen, count):
         figure = painted(material, colors=np.array(colors))
         scene = Scene([Actor(figure) for _ in range(count)])
         shown = front_view(offscreen, scene, lights=dark())
-        found = np.array(pixel(shown, 0.0, 0.0))
+        found = np.array(pixel(shown, 0.0, 0.0))  # centred at x = 0.025
         expected = encoded([factor * 0.4875, 0.0, 0.5 * 0.5125])
         assert np.allclose(found[:3], expected, atol=2)
         if count == 1:
@@ -122,7 +120,7 @@ def test_vertex_colours_replace_the_colour_of_figures_without_materials(offscree
     assert np.array_equal(*pictures)
 
 
-def test_opacity_of_vertex_colours_is_cut_by_masks(offscreen):
+def test_masks_apply_to_the_opacity_of_vertex_colours(offscreen):
     colors = np.ones((4, 4))
     colors[:, 3] = np.where(square().positions[:, 0] < 0, 0.0, 1.0)
     material = Material("", None, WHITE, alpha_mode="mask", unlit=True, is_physical=True)

@@ -1,4 +1,4 @@
-"""Waiting for the driver lets other threads run."""
+"""Waiting for the driver, during which other threads run."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ void main() { gl_Position = vec4(in_corner, 0.0, 1.0); }
 """
 
 
-def test_other_threads_run_while_the_driver_is_waited_for(ctx):
+def test_other_threads_run_while_waiting_for_the_driver(ctx):
     program = ctx.program(vertex_shader=CORNERS, fragment_shader=SLOW)
     corners = np.array([-1, -1, 3, -1, -1, 3], dtype="f4")
     buffer = ctx.buffer(corners.tobytes())
     array = ctx.vertex_array(program, [(buffer, "2f", "in_corner")])
     target = ctx.simple_framebuffer((256, 256))
     target.use()
-    ctx.enable_only(ctx.NOTHING)  # other tests leave the depth test on
+    ctx.enable_only(ctx.NOTHING)  # other tests leave the depth test enabled
     waiter, ticks, done = Waiter(ctx), [], threading.Event()
 
     def tick() -> None:
@@ -46,7 +46,7 @@ def test_other_threads_run_while_the_driver_is_waited_for(ctx):
     thread.start()
     try:
         took = inside = steps = 0
-        while took < 0.05:  # the shader's work grows until it can be measured
+        while took < 0.05:  # the work of the shader grows until it can be measured
             steps = 4 * steps or 100
             program["u_steps"] = steps
             array.render()
@@ -63,7 +63,7 @@ def test_other_threads_run_while_the_driver_is_waited_for(ctx):
     assert waiter.is_free and inside >= 5
 
 
-def test_contexts_without_exposed_functions_are_waited_for_too():
+def test_waiting_works_without_exposed_functions():
     calls = []
     context = SimpleNamespace(mglo=object(), finish=lambda: calls.append("finish"))
     waiter = Waiter(context)
@@ -72,7 +72,7 @@ def test_contexts_without_exposed_functions_are_waited_for_too():
     assert not waiter.is_free and calls == ["finish"]
 
 
-def test_loader_without_the_function_counts_as_none():
+def test_loader_without_the_function_is_not_used():
     loader = SimpleNamespace(load_opengl_function=lambda name: 0)
     context = SimpleNamespace(mglo=SimpleNamespace(_context=loader), finish=lambda: None)
     assert not Waiter(context).is_free

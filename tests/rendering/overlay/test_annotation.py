@@ -1,4 +1,4 @@
-"""Labels next to points: priority where not all fit, and size."""
+"""Labels next to points: size, and priority if not all fit."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def lettering():
 
 
 def placed(lettering, points, ranks, words=None):
-    """Return the labels drawn for words at points, seen from +z, at 180 pixels per unit."""
+    """Return the labels drawn for texts at points, seen from +z with 180 pixels per unit."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     count = len(points)
     colors = np.arange(3.0 * count).reshape(count, 3) / 100
@@ -31,12 +31,13 @@ def placed(lettering, points, ranks, words=None):
 
 
 def test_letters_grow_with_the_image():
-    # 17 pixels at 720; 800 wide counts as 600 high, which gives 14.2.
+    # The size is 17 pixels at a height of 720; a width of 800 counts as a height of 600, which
+    # gives 14.2.
     assert letters_for((1280, 720)) == 17 and letters_for((2560, 1440)) == 34
     assert letters_for(SIZE) == 14
 
 
-def test_lower_rank_comes_first_then_the_nearer(lettering):
+def test_labels_are_ordered_by_rank_then_distance(lettering):
     same_place = [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0], [0, 0, 0.5]]
     assert placed(lettering, same_place, [1, 1, 0, 1]).texts == ("c", "b", "d", "a")
     assert placed(lettering, same_place, [1, 1, 1, 1]).texts == ("b", "d", "a", "c")
@@ -50,7 +51,7 @@ def test_colours_match_their_labels(lettering):
     assert (found.n_seen, found.n_left_out) == ((2,), (0,))
 
 
-def test_no_labels_give_no_text(lettering):
+def test_no_labels_have_no_text(lettering):
     found = placed(lettering, np.zeros((0, 3)), np.zeros(0, int), ())
     assert found.texts == () and found.corners.shape == (0, 2) and found.n_left_out == (0,)
 
@@ -70,16 +71,17 @@ def test_labels_of_several_annotations_are_placed_together(lettering):
     assert cover.max() == 1
 
 
-def test_lines_lead_from_next_to_the_point_to_its_label(lettering):
+def test_lines_connect_the_point_and_its_label(lettering):
     found = placed(lettering, np.zeros((3, 3)), [0, 1, 2])
     assert found.has_line.tolist() == [False, False, True]
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=2.0, orthographic=True)
     view = view_of(camera, SIZE, BOX)
     lines = leader_lines(found, view, SIZE)
-    # A dark one beneath one in the word's own colour, in the plane of the point: z = 0.
+    # A dark line is beneath one in the colour of the text, in the plane of the point at z = 0.
     assert len(lines.widths) == 2 and lines.widths[0] > lines.widths[1]
     assert_allclose(lines.colors[1], [0.06, 0.07, 0.08, 1.0])
-    # 180 pixels per unit, the centre at (400, 360). The word is three gaps of 7 * 600 / 720 above.
+    # The scale is 180 pixels per unit, the centre (400, 360). The text is three gaps of 7 * 600 /
+    # 720 above.
     assert_allclose(lines.starts[1], [0.0, 5.0 * 600 / 720 / 180, 0.0], atol=1e-12)
     end = [0.0, (360.0 - found.ends[2, 1]) / 180.0, 0.0]
     assert_allclose(lines.ends[1], end, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Rendered joints: bones through the skin, names, axes, and picking."""
+"""Rendered joints: bones seen through the skin, names, axes, and picking."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ def test_bones_are_visible_through_a_translucent_skin(offscreen):
     plain = front_view(offscreen, boned())
     xray = front_view(offscreen, boned(), xray=True)
     assert pixel(plain, 0.0, -1.0)[3] == 255
-    assert 80 < pixel(xray, 0.0, -1.0)[3] < 130  # two fifths
-    assert pixel(xray, 0.0, 0.0)[3] > 200  # the bone is solid
+    assert 80 < pixel(xray, 0.0, -1.0)[3] < 130  # two fifths of the square's colour
+    assert pixel(xray, 0.0, 0.0)[3] > 200  # the bone is opaque
     assert pixel(xray, 1.0, 0.5)[3] > 200
 
 
@@ -55,7 +55,7 @@ def test_scalar_colours_are_unchanged(offscreen):
     assert pixel(plain, -1.2, -1.2) == pixel(xray, -1.2, -1.2)
 
 
-def test_overlapping_actors_are_translucent_too(offscreen):
+def test_overlapping_actors_are_translucent(offscreen):
     figure = grid_figure()
     actors = [Actor(figure) for _ in range(9)]
     for number, actor in enumerate(actors):
@@ -70,10 +70,10 @@ def test_bones_are_not_drawn_in_bind_pose(offscreen):
     np.testing.assert_array_equal(plain, names)
 
 
-def test_axes_point_right_and_up(offscreen):
+def test_x_axis_points_right_and_y_axis_up(offscreen):
     scene = alone(Figure("bones", skeleton=skeleton([-1, 0], [[-1.5, 0, 0], [3.0, 0, 0]])))
     picture = front_view(offscreen, scene, joint_axes=True, show="skeleton")
-    # A twentieth of 3 units is 3 pixels; a dot of 5.6 pixels covers their starts.
+    # An axis is a twentieth of 3 units, 3 pixels; a dot of 5.6 pixels covers the start of the axes.
     plain = front_view(offscreen, scene, show="skeleton")
     column, row = 10, 40
     there = (picture[row - 6 : row + 6, column - 6 : column + 8].astype(int)
@@ -92,7 +92,7 @@ def test_names_are_counted_and_drawn(offscreen):
     assert offscreen.renderer.names_left_out == (0, 0)
 
 
-def test_new_names_are_added_to_those_drawn_before(offscreen):
+def test_new_names_are_added_to_the_drawn_names(offscreen):
     first = alone(Figure("a", skeleton=skeleton([-1], [[0, 0, 0]])))
     once = front_view(offscreen, first, joint_names=True)
     front_view(offscreen, boned(), joint_names=True)

@@ -20,7 +20,7 @@ from viewer.rendering.view import view_of
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 
-SIZE = (800, 800)  # a unit is 200 pixels; marks are 600 / 720 as large as usual, so 8 are 6.7
+SIZE = (800, 800)  # a unit is 200 pixels; marks are scaled by 600 / 720, so 8 pixels are 6.7
 BOX = np.array([[-2.0, -2.0, -2.0], [2.0, 2.0, 2.0]])
 
 
@@ -31,7 +31,7 @@ def view():
 
 
 def chain() -> Actor:
-    """Return joints at (0, 0, 0), (1, 0, 0) and (1, 1, 0); the last has a leaf in its own place."""
+    """Return joints at (0, 0, 0), (1, 0, 0) and (1, 1, 0), and a leaf at the last position."""
     offsets = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 0]]
     return Actor(Figure("chain", skeleton=skeleton([-1, 0, 1, 2], offsets)))
 
@@ -43,17 +43,17 @@ def test_marks_follow_pose_and_placement():
     actor.pose.figure_scale = 2.0
     actor.placement[0, 3] = 10.0
     (marks,) = marks_of([actor])
-    # (1, 1, 0) goes to (-1, 1, 0), twice as far, then by both translations.
+    # (1, 1, 0) is rotated to (-1, 1, 0), scaled by two, and moved by both translations.
     assert_allclose(marks.points[2], [10.0 - 2.0, 2.0, 5.0], atol=1e-12)
 
 
-def test_actors_that_are_not_drawn_have_no_marks():
+def test_hidden_actors_have_no_marks():
     first, second, third = chain(), chain(), chain()
     first.visible, second.is_present = False, False
     assert [marks.actor for marks in marks_of([first, second, third])] == [2]
 
 
-def test_bones_lead_from_parents_to_children_over_dark_ones():
+def test_bones_connect_parents_and_children_over_dark_borders():
     (marks,) = marks_of([chain()])
     bones = bone_segments(marks, 1, 2.0)
     assert_allclose(bones.starts[3:], [[0, 0, 0], [1, 0, 0], [1, 1, 0]], atol=1e-12)
@@ -94,7 +94,7 @@ def test_axes_of_joints_close_together_are_short():
     assert_allclose(lengths, [0.05 * size, 0.2, 0.2], atol=1e-12)
 
 
-def test_lone_joint_has_axes():
+def test_single_joint_has_axes():
     (marks,) = marks_of([Actor(Figure("one", skeleton=skeleton([-1], [[0, 0, 0]])))])
     axes = axis_segments(marks, 1.0)
     assert_allclose(np.linalg.norm(axes.ends - axes.starts, axis=1), 0.05)
@@ -111,7 +111,7 @@ def at(view, x, y, with_bones=True, actors=None):
 def test_joint_is_found_by_its_dot(view):
     assert at(view, 0.0, 0.0) == (0, 0) and at(view, 1.0, 0.0) == (0, 1)
     assert at(view, 1.0, 0.03, with_bones=False) == (0, 1)
-    assert at(view, 1.0, 0.05, with_bones=False) is None  # ten pixels away
+    assert at(view, 1.0, 0.05, with_bones=False) is None  # ten pixels away from the dot
 
 
 def test_bone_belongs_to_the_joint_that_rotates_it(view):
@@ -125,12 +125,12 @@ def test_dot_takes_precedence_over_bones(view):
     assert at(view, 1.0, 0.975) == (0, 2)
 
 
-def test_nearer_actor_wins_where_two_coincide(view):
+def test_nearer_of_two_coincident_actors_is_picked(view):
     far, near = chain(), chain()
     near.placement[2, 3] = 0.5
     assert at(view, 1.0, 0.0, actors=[far, near]) == (1, 1)
     assert at(view, 1.0, 0.0, actors=[near, far]) == (0, 1)
-    # The returned point is the joint's.
+    # The returned point is the position of the joint.
     found = joint_at(marks_of([near]), view, SIZE, (600.0, 400.0), True)
     assert_allclose(found[2], [1.0, 0.0, 0.5], atol=1e-12)
 

@@ -1,4 +1,4 @@
-"""Joint names: the selected one first, then the nearer, and the omitted count."""
+"""Joint names: the selected joint first, then the nearest, and the number of omitted names."""
 
 from __future__ import annotations
 
@@ -38,19 +38,19 @@ def test_well_separated_joints_are_all_named(lettering):
     names = placed(lettering, [[-1, 0, 0], [1, 0, 0], [0, 1, 0]])
     assert sorted(names.texts) == ["j0", "j1", "j2"]
     assert (names.n_seen, names.n_left_out) == ((3,), (0,))
-    # 180 pixels per unit: joint 0 is at (220, 360), its name right of it, at the same height.
+    # At 180 pixels per unit, joint 0 is at (220, 360); its name is to the right at the same height.
     left, top = names.corners[names.texts.index("j0")].tolist()
     assert 222 < left < 230 and 345 < top < 360
 
 
 def test_nearest_joints_are_named_if_not_all_fit(lettering):
     names = placed(lettering, [[0, 0, z] for z in (0.0, 1.0, -1.0, 0.5, -0.5)])
-    # Right and left of the position, above and below it.
+    # The names are to the right and left of the position, and above and below it.
     assert names.texts == ("j1", "j3", "j0", "j4")
     assert (names.n_seen, names.n_left_out) == ((5,), (1,))
 
 
-def test_selected_joint_comes_first_in_its_own_colour(lettering):
+def test_selected_joint_is_named_first_in_its_own_colour(lettering):
     names = placed(lettering, [[0, 0, 0.0], [0, 0, 1.0], [0, 0, -1.0]], selected=(0, 2))
     assert names.texts == ("j2", "j1", "j0")
     assert_allclose(names.colors[0], HIGHLIGHT[:3])
@@ -59,7 +59,7 @@ def test_selected_joint_comes_first_in_its_own_colour(lettering):
     assert other.texts == ("j1", "j0", "j2")
 
 
-def test_joints_outside_the_image_do_not_count(lettering):
+def test_joints_outside_the_image_are_not_counted(lettering):
     names = placed(lettering, [[0, 0, 0], [9, 0, 0], [0, -9, 0]])
     assert names.texts == ("j0",) and names.n_seen == (1,)
 

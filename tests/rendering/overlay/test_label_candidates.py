@@ -1,4 +1,4 @@
-"""Label candidates: batched results match point-by-point checks."""
+"""Label candidates, for which batched results are compared with point-by-point checks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_label_in_the_middle_has_eight_positions_at_three_distances():
     places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert places.ranks.tolist() == list(range(24))
     assert places.has_line.tolist() == [False] * 8 + [True] * 16
-    # Right, left, above and below, and the same at three times the distance.
+    # The positions are right, left, above and below, and the same at three times the distance.
     rows = [0, 1, 6, 7, 8, 9, 14, 15]
     assert places.low[rows].tolist() == [
         [158, 95], [112, 95], [135, 82], [135, 108],
@@ -33,11 +33,11 @@ def test_label_in_the_middle_has_eight_positions_at_three_distances():
 def test_positions_outside_the_image_are_excluded():
     places = places_of(np.array([(4.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     assert (places.low[:, 0] >= 0).all() and 1 not in places.ranks
-    # There is room above it, as the label may be shifted sideways.
+    # There is room above the point, because the label may be shifted sideways.
     assert places.low[places.ranks == 6].tolist() == [[0, 82]]
 
 
-def test_leader_line_starts_half_a_margin_off_and_ends_a_pixel_before_the_label():
+def test_leader_line_starts_half_a_margin_from_the_point_and_ends_a_pixel_before_the_label():
     places = places_of(np.array([(150.0, 100.0)]), np.array([(30, 10)]), PICTURE, GAP)
     pixels, are_part = line_pixels(places, GAP)
     assert not are_part[:8].any()
@@ -56,13 +56,13 @@ def scene(request):
 
 @pytest.fixture(scope="module")
 def room(scene):
-    """Return the distances of the scene's candidates and their lines from other points."""
+    """Return the distances of the scene's candidates and their lines to other points."""
     points, places, _ = scene
     return by_hand(points, places)
 
 
 def by_hand(points, places):
-    """Return the distances of candidates and their lines from distinct points: (M,)."""
+    """Return the distances of candidates and their lines to distinct points, (M,)."""
     clear, beside = np.full((2, len(places.labels)), np.inf)
     for label in np.unique(places.labels):
         rows = np.flatnonzero(places.labels == label)
@@ -78,7 +78,7 @@ def by_hand(points, places):
     return clear, beside
 
 
-def test_positions_are_clear_of_other_points_best_first(scene, room):
+def test_positions_are_sorted_by_distance_from_other_points(scene, room):
     points, places, dots = scene
     clear, beside = room
     least = 1.5 * np.where(places.has_line, GAP, places.own)

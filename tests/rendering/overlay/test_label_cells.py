@@ -1,4 +1,4 @@
-"""Label cells: contents of rectangles, compared with brute force."""
+"""Label cells: the contents of rectangles, compared with brute force."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ import pytest
 from viewer.rendering.overlay.label_cells import Cells, Dots, spread, summed, sums_within
 
 
-def test_cells_count_from_one_with_a_border_for_outside_points():
+def test_cells_are_numbered_from_one_with_a_border_for_outside_points():
     cells = Cells((10, 7), 4)  # 3 columns, 2 rows
     assert cells.shape == (4, 5)
     points = np.array([(0.0, 0.0), (3.9, 4.0), (9.0, 6.9), (-0.1, 99.0), (12.0, 3.0)])
     assert cells.of(points).tolist() == [[1, 1], [1, 2], [3, 2], [0, 3], [4, 1]]
 
 
-def test_cells_within_and_touching_a_rectangle():
+def test_cells_within_and_touching_a_rectangle_are_found():
     cells = Cells((40, 40), 4)
     low, high = np.array([[3.0, 4.0]]), np.array([[12.0, 11.9]])
     first, after = cells.within(low, high)
@@ -25,7 +25,7 @@ def test_cells_within_and_touching_a_rectangle():
     assert first.tolist() == [[1, 2]] and after.tolist() == [[5, 4]]
 
 
-def test_rectangle_smaller_than_a_cell_has_none_within():
+def test_rectangle_smaller_than_a_cell_contains_none():
     first, after = Cells((40, 40), 4).within(np.array([[5.0, 1.0]]), np.array([[7.0, 39.0]]))
     assert first[0, 0] == after[0, 0]
 
@@ -60,7 +60,7 @@ def test_counts_within_rectangles_are_bounded(scene):
     counts = within(points, low, high).sum(axis=1)
     fewest, most = dots.fewest_within(low, high), dots.most_within(low, high)
     assert (fewest <= counts).all() and (counts <= most).all()
-    # Two more cells on either side.
+    # The upper bound includes two more cells on either side.
     wider = within(points, low - 8.0, high + 8.0).sum(axis=1)
     is_inside = (low >= 8.0).all(axis=1) & (high <= (92.0, 82.0)).all(axis=1)
     assert is_inside.any() and (most <= wider)[is_inside].all()
@@ -86,7 +86,7 @@ def test_dots_within_a_quarter_of_a_pixel_count_once():
     assert dots.count_at(np.array([[10, 10], [20, 10]])).tolist() == [2, 0]
 
 
-def test_no_dots_give_empty_cells():
+def test_cells_without_dots_are_empty():
     dots = Dots(Cells((40, 40), 4), np.zeros((0, 2)))
     low, high = np.zeros((1, 2)), np.full((1, 2), 40.0)
     assert dots.fewest_within(low, high) == dots.most_within(low, high) == 0

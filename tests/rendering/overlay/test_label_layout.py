@@ -1,4 +1,4 @@
-"""Label layout: next to their own points, without overlap or ambiguity."""
+"""Layout of labels next to their points, without overlap or ambiguity."""
 
 from __future__ import annotations
 
@@ -19,23 +19,24 @@ def placed(anchors, sizes, order=None, gap=4.0):
     return dict(zip(layout.chosen.tolist(), map(tuple, layout.corners.tolist()), strict=True))
 
 
-def test_label_lies_right_of_its_point():
+def test_label_is_placed_right_of_its_point():
     assert placed([(20.0, 30.0)], [(30, 10)]) == {0: (24, 25)}
 
 
-def test_label_at_the_right_edge_lies_left_of_its_point():
+def test_label_at_the_right_edge_is_placed_left_of_its_point():
     assert placed([(80.0, 30.0)], [(30, 10)]) == {0: (46, 25)}
 
 
-def test_label_stays_within_the_picture_vertically():
+def test_label_is_within_the_picture_vertically():
     assert placed([(20.0, 2.0)], [(30, 10)]) == {0: (24, 0)}
     assert placed([(20.0, 59.0)], [(30, 10)]) == {0: (24, 50)}
 
 
-def test_labels_of_one_point_lie_right_left_and_with_lines_above_and_below():
+def test_labels_of_one_point_are_right_and_left_and_with_lines_above_and_below():
     same, sizes = np.full((5, 2), [50.0, 30.0]), np.full((5, 2), [30, 10])
     layout = lay_out(same, np.arange(5), sizes, PICTURE, 4.0)
-    # Three gaps away above and below; the places askew lie behind the first two.
+    # The other labels are three gaps above and below; the oblique positions are behind the first
+    # two.
     assert layout.corners.tolist() == [[54, 25], [16, 25], [35, 8], [35, 42]]
     assert layout.has_line.tolist() == [False, False, True, True]
     assert layout.ends.tolist() == [[54.0, 30.0], [46.0, 30.0], [50.0, 18.0], [50.0, 42.0]]
@@ -46,29 +47,29 @@ def test_first_label_has_priority():
     assert placed(same, [(30, 10)] * 3, order=[2, 0, 1]) == {2: (54, 25), 0: (16, 25), 1: (35, 8)}
 
 
-def test_half_a_margin_stays_free_next_to_a_label():
-    # The first ends at column 64. There is no room right of the second point.
+def test_half_a_margin_remains_free_next_to_a_label():
+    # The first label ends at column 64, so there is no room right of the second point.
     assert placed([(40.0, 30.0), (90.0, 30.0)], [(20, 10)] * 2) == {0: (44, 25), 1: (66, 25)}
-    # One column less: up and to the left, 4 sqrt(1/2) both ways.
+    # With one column less, the label is up and to the left, by 4 sqrt(1/2) in both directions.
     assert placed([(40.0, 30.0), (89.0, 30.0)], [(20, 10)] * 2) == {0: (44, 25), 1: (66, 17)}
 
 
-def test_label_does_not_lie_on_another_point():
+def test_label_does_not_cover_another_point():
     assert placed([(50.0, 30.0), (60.0, 30.0)], [(30, 10)] * 2) == {0: (16, 25), 1: (64, 25)}
 
 
 def test_free_position_is_preferred_to_one_near_another_point():
-    # The right position ends 7 before the other point: less than three distances of 4.
+    # The right position ends 7 pixels before the other point, less than three distances of 4.
     assert placed([(50.0, 30.0), (91.0, 30.0)], [(30, 10)] * 2)[0] == (16, 25)
     assert placed([(50.0, 30.0), (97.0, 30.0)], [(30, 10)] * 2)[0] == (54, 25)
-    # There is no room left of the point, and more above it than to its right.
+    # There is no room left of the point, and more room above it than to its right.
     assert placed([(20.0, 30.0), (61.0, 30.0)], [(30, 10)] * 2)[0] == (5, 16)
 
 
 def test_crowded_point_gets_a_leader_line():
     row = np.array([(38.0, 30.0), (50.0, 30.0), (62.0, 30.0)])
     layout = lay_out(row, np.array([1, 0, 2]), np.full((3, 2), [30, 10]), PICTURE, 4.0)
-    # All positions 4 away are closer than 6 to one of the others.
+    # All positions 4 pixels away are closer than 6 to another point.
     assert layout.chosen[0] == 1 and layout.has_line[0]
     left, top = layout.corners[0]
     for x, y in row[[0, 2]]:
@@ -103,14 +104,14 @@ def test_isolated_points_are_labelled_regardless_of_order(n_across, step):
 
 
 def test_labels_at_one_point_leave_room_for_a_neighbour():
-    # Of 2,000 labels at one position, four fit.
+    # Four of 2,000 labels at one position fit.
     anchors = np.concatenate([np.full((2000, 2), 300.0), LONELY[:1]])
     found = drawn(anchors)
     assert len(found) == 5 and found[-1] == 2000
 
 
 def test_all_points_with_space_around_them_are_labelled():
-    # 96 x 54 cells of 20 x 20 pixels with a word of 6 x 6 each: there is always room to the right.
+    # With 96 x 54 cells of 20 x 20 pixels and labels of 6 x 6, there is always room to the right.
     grid = np.stack(np.meshgrid(np.arange(96), np.arange(54)), axis=-1).reshape(-1, 2)
     assert len(drawn(grid * 20.0 + 5.0, (6, 6), 3.0)) == 96 * 54
 
@@ -127,7 +128,7 @@ def test_label_wider_than_the_picture_is_left_out():
     )
 )
 def test_labels_do_not_overlap_and_are_unambiguous(rows):
-    # Those within a quarter of a pixel count as one.
+    # Points within a quarter of a pixel count as one.
     anchors = np.array([row[:2] for row in rows], dtype=float).reshape(-1, 2) / 4.0
     sizes = np.array([row[2:] for row in rows], dtype=np.int32).reshape(-1, 2)
     layout = lay_out(anchors, np.arange(len(rows)), sizes, PICTURE, 3.0)

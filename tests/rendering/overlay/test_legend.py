@@ -1,4 +1,4 @@
-"""Legends as data: round numbers, units, entries by area, notes."""
+"""The contents of legends: round numbers, units, entries sorted by area, and notes."""
 
 from __future__ import annotations
 
@@ -103,13 +103,13 @@ def test_difference_range_is_symmetric():
     assert found.note == "from -10 to +30"
 
 
-def test_fixed_range_sets_the_bar_and_a_note_gives_the_actual_range():
+def test_fixed_range_sets_the_bar_and_a_note_states_the_actual_range():
     found = legend("pruning", [0, 0.1, 0, 0, 0, 0], scalar_range=(5.0, 10.0))
     assert [tick.text for tick in found.ticks] == ["5", "6", "7", "8", "9", "10"]
     assert found.note == "from 0 to 100"
 
 
-def test_typical_range_reports_the_extremes_too():
+def test_typical_range_also_reports_the_extremes():
     numbers = np.array([-10.0, 0, 30, 0, 0, 480])
     figure, shown_options = strip(), DisplayOptions(scalar="stretch")
     for ends, note in (
@@ -149,7 +149,8 @@ def test_uniform_count_has_one_block():
 
 
 def test_joints_are_listed_by_area():
-    # Thirds of triangles: vertex 4 has (3 + 4) / 3, vertex 3 (2 + 3) / 3, vertex 0 10 / 3.
+    # Each vertex has a third of its triangles: vertex 4 (3 + 4) / 3, vertex 3 (2 + 3) / 3, vertex 0
+    # 10 / 3.
     found = legend("dominant", [1, 2, 2, 0, -1, 2])
     # j1: 10/3; none: 7/3; j2: 1/3 + 1 + 4/3 = 8/3; j0: 5/3.
     assert [entry.text for entry in found.entries] == ["j1", "j2", "no influence", "j0"]
@@ -163,7 +164,7 @@ def test_joints_of_identical_figures_are_listed_once():
     assert [entry.text for entry in found.entries] == ["j0", "j1"]
 
 
-def test_parts_have_their_names():
+def test_parts_are_listed_by_name():
     parts = BodyParts(("head", "tail", "wing"), np.array([0, 1, 1, 1, 1, 1]))
     found = legend("parts", [0, 1, 1, 1, 1, 1], figure=strip(body_parts=parts))
     assert found.heading == "Body parts"
@@ -188,7 +189,7 @@ def test_unknown_and_missing_joints_are_reported():
 @pytest.mark.parametrize(("kept", "title"), [
     (0, "Distance to 4 influences"), (8, "Distance to 8 influences"), (1, "Distance to 1 influence")
 ])  # fmt: skip
-def test_number_of_influences_is_named(kept, title):
+def test_title_states_the_number_of_influences(kept, title):
     found = legend("pruning", [0, 0.1, 0, 0, 0, 0], skinning=Skinning(max_influences=kept))
     assert found.heading == f"{title}, mm"
     assert legend("pruning", [0] * 6, figure=replace(strip(), skin=None)).title.endswith(

@@ -1,4 +1,4 @@
-"""Legend columns: as few as possible, with overflow counted."""
+"""Columns of legends: as few as possible, with a count of omitted entries."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from viewer.rendering.overlay.legend_columns import LegendColumns, legend_columns
 
 
-def test_empty_list_needs_no_column():
+def test_empty_list_has_no_column():
     assert legend_columns([], 3, 100.0) == LegendColumns((), ())
     assert legend_columns([], 3, 100.0).rows == 0
 
@@ -22,8 +22,8 @@ def test_columns_are_balanced_and_as_wide_as_needed():
     assert found.rows == 3
 
 
-def test_full_columns_are_used_where_balanced_ones_are_too_wide():
-    # Even columns of 2 + 2 need 9 + 9; full ones of 3 + 1 need 9 + 2.
+def test_full_columns_are_used_if_balanced_columns_are_too_wide():
+    # Balanced columns of 2 + 2 entries need 9 + 9; full columns of 3 + 1 need 9 + 2.
     assert legend_columns([1.0, 9.0, 9.0, 2.0], 3, 12.0) == LegendColumns((3, 1), (9.0, 2.0))
 
 
@@ -34,7 +34,7 @@ def test_overflow_is_counted_on_a_separate_line():
 
 
 @pytest.mark.parametrize(("rows", "counts", "left_out"), [(2, (1,), 3), (1, (0,), 4)])
-def test_first_column_is_kept_however_wide(rows, counts, left_out):
+def test_first_column_is_kept_in_any_width(rows, counts, left_out):
     found = legend_columns([50.0] * 4, rows, 11.0)
     assert found == LegendColumns(counts, (50.0,), left_out)
     assert found.rows == rows

@@ -17,7 +17,7 @@ from viewer.rendering.overlay.legend_picture import legend_pixels
 from viewer.rig.scene import Actor, Scene, scene_box, scene_points
 
 SIZE = 640, 360
-CODE = np.array([1 << 16, 1 << 8, 1])  # makes a number of a colour
+CODE = np.array([1 << 16, 1 << 8, 1])  # converts a colour to a single number
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def test_bar_runs_from_the_first_to_the_last_colour():
     row = pixels[bar[len(bar) // 2], :, :3].astype(int)
     places = [int(np.abs(row - color).sum(axis=1).argmin()) for color in colors[[2, 64, 128, 253]]]
     assert places == sorted(places) and places[-1] - places[0] > 100
-    # Linearly: a quarter of the colours is a quarter of the bar.
+    # The bar is linear: a quarter of the colours is a quarter of the bar.
     assert places[1] - places[0] == pytest.approx((places[-1] - places[0]) * 62 / 251, abs=2)
 
 
@@ -51,7 +51,7 @@ def test_isolines_are_on_the_bar():
     assert np.ptp(np.diff(columns)) <= 1
 
 
-def test_swatches_are_below_each_other_in_their_order():
+def test_swatches_are_listed_downwards_in_their_order():
     entries = tuple(Entry((200, 10 * index, 40), f"joint {index}") for index in range(5))
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), SIZE)
     tops = [rows_with(pixels, entry.color)[0] for entry in entries]
@@ -60,12 +60,12 @@ def test_swatches_are_below_each_other_in_their_order():
 
 
 def joints(count, size, name="joint {}"):
-    """Return the legend of n joints, and the first columns of their swatches, None if hidden."""
+    """Return the legend of n joints, and the first pixel column of each swatch, None if hidden."""
     entries = tuple(
         Entry((200, index % 256, 40 + index // 256), name.format(index)) for index in range(count)
     )
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), size)
-    # The first of a colour, counted down the columns, is in its leftmost one.
+    # The first pixel of a colour, counted down the columns, is in its leftmost column.
     columns = np.swapaxes(pixels[..., :3], 0, 1).astype(int)
     codes, first = np.unique(columns @ CODE, return_index=True)
     lefts = dict(zip(codes.tolist(), (first // pixels.shape[0]).tolist(), strict=True))
@@ -99,12 +99,12 @@ def test_overflow_is_counted():
     shown = lefts.index(None)
     assert shown > 100 and all(left is None for left in lefts[shown:])
     assert pixels.shape[0] <= 0.9 * 720 and pixels.shape[1] <= 0.45 * 1280
-    # The line that counts the rest is the last of the last column, and has no swatch.
+    # The line with the number of omitted joints is the last of the last column and has no swatch.
     per_column = lefts.count(lefts[0])
     assert (shown + 1) % per_column == 0
 
 
-def test_low_and_narrow_image_has_fewer_swatches():
+def test_small_image_has_fewer_swatches():
     pixels, lefts = joints(37, (300, 120))
     assert pixels.shape[0] <= 0.9 * 120
     seen = [left is not None for left in lefts]
@@ -124,7 +124,7 @@ def test_letters_grow_with_the_image():
     assert heights[2] < 0.25 * 2160
 
 
-def test_names_from_files_stay_on_their_line():
+def test_names_with_line_breaks_stay_on_one_line():
     entries = (Entry((200, 0, 40), "two\nlines\t" + "x" * 500), Entry((0, 200, 40), "骨"))
     pixels = legend_pixels(Legend("Dominant joint", entries=entries), SIZE)
     assert pixels.shape[1] < 0.9 * SIZE[0]
@@ -153,7 +153,7 @@ def test_legend_is_drawn_pixel_by_pixel_into_the_corner(offscreen, samples):
     assert (rows[-1] - top + 1, columns[-1] - left + 1) == pixels.shape[:2]
     assert top == left == 5
     found = picture[top : rows[-1] + 1, left : columns[-1] + 1]
-    # There is nothing behind it: colours and opacity are exact, to rounding.
+    # There is nothing behind the legend, so colours and opacity are exact except for rounding.
     np.testing.assert_allclose(found.astype(int), pixels, atol=2)
 
 
@@ -168,12 +168,12 @@ def test_legend_covers_the_figure_and_is_drawn_last(offscreen):
     np.testing.assert_allclose(inside[solid], pixels[solid], atol=2)
 
 
-def test_other_shadings_have_no_legend(offscreen):
+def test_other_shading_modes_have_no_legend(offscreen):
     plain = draw(offscreen, shading="phong")
     np.testing.assert_array_equal(plain, draw(offscreen, shading="phong", legend=True))
 
 
-def test_image_that_is_too_small_for_a_legend_says_so(offscreen):
+def test_image_that_is_too_small_for_a_legend_is_reported(offscreen):
     plain = draw(offscreen, size=(40, 40))
     np.testing.assert_array_equal(plain, draw(offscreen, size=(40, 40), legend=True))
     assert offscreen.renderer.notes == ["an image of 40 x 40 pixels has no room for a legend"]

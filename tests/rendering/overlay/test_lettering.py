@@ -1,4 +1,4 @@
-"""Text as pixels: size, outline, and packing on shelves."""
+"""Rendering of text to pixels: size, outline, and packing on shelves."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ import numpy as np
 from viewer.rendering.overlay.lettering import Lettering, shelves
 
 
-def test_text_sizes_match_the_pixels():
+def test_text_sizes_match_the_drawn_pixels():
     letters = Lettering(13)
     words = ["hip", "left_shoulder", "", "Ärmel"]
     for word, (width, height) in zip(words, letters.sizes(words).tolist(), strict=True):
         assert letters.pixels(word).shape == (height, width, 2)
     widths = letters.sizes(words)[:, 0]
-    assert widths[2] == 4 and widths[0] < widths[1]  # empty text has only outlines, two pixels each
+    assert widths[2] == 4 and widths[0] < widths[1]  # empty text consists of outlines of two pixels
 
 
 def test_letters_are_white_within_a_dark_rim():
@@ -28,7 +28,7 @@ def test_letters_are_white_within_a_dark_rim():
         assert rim[row, : columns[0]].any() and rim[row, columns[-1] + 1 :].any()
 
 
-def test_larger_letters_are_larger():
+def test_larger_font_size_draws_larger_text():
     small, large = (Lettering(size).sizes(["pelvis"])[0] for size in (10, 30))
     assert (large > 2 * small).all()
 
@@ -38,7 +38,7 @@ def test_shelves_continue_below_when_a_row_is_full():
     assert shelves(sizes, 100, 60).tolist() == [[0, 0], [40, 0], [0, 10], [0, 20], [0, 30]]
 
 
-def test_shelves_leave_out_what_does_not_fit():
+def test_shelves_omit_texts_that_do_not_fit():
     sizes = np.array([[60, 10]] * 5)
     assert shelves(sizes, 100, 30).tolist() == [[0, 0], [0, 10], [0, 20]]
     assert shelves(sizes[:0], 100, 30).shape == (0, 2)

@@ -35,30 +35,31 @@ def points(*places, radius=4.0) -> Marks:
     return Marks(np.array(places, dtype=float), np.full(len(places), radius))
 
 
-def test_a_point_is_a_bright_disc_with_a_dark_border(offscreen):
+def test_point_is_drawn_as_a_bright_disc_with_a_dark_border(offscreen):
     picture = marked(offscreen, points((0.5, -1.0, 0.0)))
     assert pixel(picture, 0.5, -1.0) == [*COLOR, 255]
-    # A unit is 20 pixels: the border is 4.5 pixels from the centre, nothing is 8 pixels away.
+    # A unit is 20 pixels; the border is 4.5 pixels from the centre, and pixels at a distance of 8
+    # are empty.
     border = pixel(picture, 0.5 + 4.5 / 20, -1.0)
     assert max(border[:3]) < 60 and border[3] == 255
     assert pixel(picture, 0.5 + 8 / 20, -1.0)[3] == 0
-    # A disc of radius 4 and a border of 1.5 pixels.
+    # The disc has a radius of 4 and a border of 1.5 pixels.
     assert picture[..., 3].sum() / 255 == pytest.approx(math.pi * 5.5**2, rel=0.03)
 
 
-def test_a_line_goes_from_end_to_end(offscreen):
+def test_line_is_drawn_from_end_to_end(offscreen):
     line = Marks(lines=np.array([[[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]]]))
     picture = marked(offscreen, line)
     for x in (-0.9, 0.0, 0.9):
         assert pixel(picture, x, 0.0)[3] == 255
     rows = picture[:, PIXELS // 2, 3] / 255
-    assert rows.sum() == pytest.approx(2 * (1.0 + 1.5), abs=0.2)  # radius and border
+    assert rows.sum() == pytest.approx(2 * (1.0 + 1.5), abs=0.2)  # radius plus border
     columns = np.nonzero(drawn(picture).any(axis=0))[0]
     assert columns.min() == pytest.approx(20 - 2.5, abs=1)
     assert columns.max() == pytest.approx(60 + 2.5, abs=1)
 
 
-def test_hidden_marks_are_faint_and_marks_on_a_surface_are_not(offscreen):
+def test_marks_behind_a_surface_are_faint_and_marks_on_it_are_not(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     alone = marked(offscreen, None, scene)
     on_it = marked(offscreen, points((0.0, 0.0, 0.0)), scene)
@@ -94,8 +95,9 @@ def test_marks_behind_the_eye_are_not_drawn(offscreen):
     assert not drawn(perspective(offscreen, both_behind)).any()
 
 
-def test_a_line_that_passes_the_eye_is_clipped(offscreen):
-    # From the image's centre to behind the eye, to the right: only the right half shows it.
+def test_line_that_passes_the_eye_is_clipped(offscreen):
+    # The line runs from the image centre to the right and behind the eye, so only the right half
+    # shows it.
     line = Marks(lines=np.array([[[0.0, 0.0, 0.0], [3.0, 0.0, 6.0]]]))
     mask = drawn(perspective(offscreen, line))
     assert mask[PIXELS // 2, PIXELS // 2 :].all()
@@ -109,7 +111,7 @@ def test_points_are_drawn_over_lines(offscreen):
     assert found.starts.tolist() == [[-1, 0, 0], [0, 0, 0]]
     assert found.ends.tolist() == [[1, 0, 0], [0, 0, 0]]
     assert found.widths.tolist() == [2, 12]
-    # The line's dark border would be visible 3 pixels from the centre if it were over the point.
+    # If the line were over the point, its dark border would be visible 3 pixels from the centre.
     assert pixel(marked(offscreen, both), 0.0, 3 / 20) == [*COLOR, 255]
 
 

@@ -1,4 +1,4 @@
-"""Fonts for text: letters of other scripts, and letters that no font has."""
+"""Fonts for text: letters of other scripts, and letters missing in all fonts."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from PIL import Image, ImageDraw, ImageFont
 from viewer.rendering.overlay import typeface
 from viewer.rendering.overlay.typeface import Typeface, interface_font, system_fonts
 
-CJK, EMPTY = "\u95a2\u7bc0", "\U000f1234"  # two ideographs; a code point for private use
+CJK, EMPTY = "\u95a2\u7bc0", "\U000f1234"  # two ideographs, and a private-use code point
 
 
 @pytest.fixture
 def no_fonts(monkeypatch):
-    """A system without fonts."""
+    """Simulate a system without fonts."""
     monkeypatch.setattr(typeface, "system_fonts", lambda: ())
 
 
@@ -33,7 +33,7 @@ def test_ascii_is_drawn_in_the_built_in_font():
     assert Typeface(20).length("ab") == ImageFont.load_default(20).getlength("ab")
 
 
-def test_greek_and_cyrillic_come_from_the_font_of_the_panels(no_fonts):
+def test_greek_and_cyrillic_are_drawn_in_the_font_of_the_panels(no_fonts):
     font = ImageFont.truetype(str(interface_font()), 20)
     for text in ("\u03b1\u03b2", "\u041f\u0440\u0438"):
         assert Typeface(20).length(text) == font.getlength(text)
@@ -53,7 +53,7 @@ def test_installed_fonts_are_found_in_the_user_folder(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
     monkeypatch.setenv("XDG_DATA_DIRS", str(tmp_path / "none"))
     monkeypatch.setattr("sys.platform", "linux")
-    # One font of each group, the preferred one.
+    # The preferred font of each group is used.
     assert [path.name for path in system_fonts()] == ["DroidSansFallbackFull.ttf", "Loma.ttf"]
 
 

@@ -30,7 +30,7 @@ SCALES = [(1.0, 4.0, 0.5), (2.0, 2.0, 2.0), (-1.0, 1.0, 1.0), (1e-12, 3e-12, 2e-
 
 
 def ball() -> Figure:
-    """Return a sphere whose vertices each follow two of four joints at its centre."""
+    """Return a sphere in which each vertex follows two of four joints at the centre."""
     shape = sphere(rings=8)
     rng = np.random.default_rng(0)
     pairs = [
@@ -129,7 +129,7 @@ def test_faces_of_sheared_boxes_have_the_inverse_transposed_normal(ctx):
     figure = Figure("boxes", skeleton=joints)
     pose = viewer.rest_pose(joints)
     pose.scales[0] = 1.0, 4.0, -0.5
-    pose.dofs[5] = 0.7  # of the second joint, about z
+    pose.dofs[5] = 0.7  # about z of the second joint
     joint_pass = JointPass(ctx, Programs(ctx))
     joints_on_gpu = SkeletonBuffers(ctx, figure, joint_pass.cube)
     joints_on_gpu.update(pose, DisplayOptions(bones="boxes"))

@@ -1,4 +1,4 @@
-"""Rendered annotations: segments and labels of several annotations, order, and how many fit."""
+"""Rendered annotations: segments and labels of several annotations, their order, and omissions."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def test_later_annotations_are_drawn_over_earlier_ones(offscreen):
     assert pixel(found, 0.35, 0.0) == [255, 0, 0, 255]
 
 
-def test_on_top_is_visible_through_a_surface_and_others_faintly(offscreen):
+def test_segments_on_top_are_visible_through_a_surface_and_others_faint(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     through = picture(offscreen, dot((0, 0, -0.5), RED), scene=scene)
     behind = picture(offscreen, dot((0, 0, -0.5), RED, on_top=False), scene=scene)
@@ -62,13 +62,13 @@ def test_labels_are_drawn_next_to_their_point(offscreen):
     named = drawn(picture(offscreen, dot((0, 0, 0), RED, words=["ab", "cd", "ef"])))
     more = named & ~alone
     half = PIXELS // 2
-    # One word on each side, and above them the third with a leader line.
+    # One label is on each side, and the third above them with a leader line.
     assert more[half - 6 : half + 6, :half].any() and more[half - 6 : half + 6, half:].any()
     assert more[: half - 14].any() and not more[half + 12 :].any()
     assert more[half - 12 : half - 8, half - 1 : half + 1].all()
 
 
-def test_labels_of_two_annotations_are_both_kept(offscreen):
+def test_labels_of_two_annotations_are_both_drawn(offscreen):
     low, high = dot((0, -1, 0), RED, words=["ab"]), dot((0, 1, 0), RED, words=["cd"])
     once, both = drawn(picture(offscreen, low)), drawn(picture(offscreen, low, high))
     np.testing.assert_array_equal(both[PIXELS // 2 :], once[PIXELS // 2 :])

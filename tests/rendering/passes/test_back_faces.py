@@ -1,4 +1,4 @@
-"""Hidden back faces are not drawn; those that can be seen are."""
+"""Back faces, which are drawn only if they can be seen."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LIT = plain(lights=lights(ambient=0.3, key=1.0, azimuth=30.0, inclination=40.0))
 
 
 def closed(rings=24) -> Mesh:
-    """Return a sphere of radius 1 whose seam and poles have one vertex per position."""
+    """Return a sphere of radius 1 with one vertex per position at the seam and the poles."""
     mesh = sphere(rings)
     return replace(mesh, positions=np.round(mesh.positions, 9))
 
@@ -35,7 +35,7 @@ def opened(to=(0.0, 0.0, 1.0)) -> Mesh:
 
 
 def regions(offscreen, scene: Scene, camera: Camera):
-    """Return the regions where back faces are drawn; None for everywhere."""
+    """Return the regions in which back faces are drawn; None for the whole image."""
     with offscreen.context:
         mesh = offscreen.renderer.buffers.posed_mesh(scene.actors[0])
     view, projection = camera.view_matrix(), camera.projection_matrix(1.0, np.array([[-1], [1]]))
@@ -53,26 +53,26 @@ def drawn_both_ways(offscreen, monkeypatch, scene: Scene, camera: Camera):
     return picture, where, whole
 
 
-def test_a_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch) -> None:
+def test_closed_surface_looks_the_same_without_back_faces(offscreen, monkeypatch) -> None:
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), front())
     assert where == ()
     np.testing.assert_array_equal(picture, whole)
 
 
-def test_an_opening_shows_the_inside(offscreen, monkeypatch) -> None:
+def test_opening_shows_the_inside(offscreen, monkeypatch) -> None:
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(opened()), front())
     np.testing.assert_array_equal(picture, whole)
-    # 25 sin(7.5 degrees) = 3.3 pixels from the middle at 50, and a margin of two.
+    # The border is 25 sin(7.5 degrees) = 3.3 pixels from the middle at 50, with a margin of two.
     assert where == ((44, 44, 12, 12),)
 
 
-def test_an_opening_out_of_the_image_shows_nothing(offscreen) -> None:
+def test_opening_outside_the_image_draws_no_back_faces(offscreen) -> None:
     scene, camera = scene_of(opened((1.0, 0.0, 0.0))), front(target=np.array([-3.0, 0.0, 0.0]))
     draw(offscreen, scene, LIT, camera)
     assert regions(offscreen, scene, camera) == ()
 
 
-def test_a_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
+def test_camera_inside_sees_the_back_faces(offscreen, monkeypatch) -> None:
     camera = front(orthographic=False, distance=0.1)
     picture, where, whole = drawn_both_ways(offscreen, monkeypatch, scene_of(closed()), camera)
     assert where is None
@@ -91,7 +91,7 @@ def test_back_faces_are_hidden_unless_a_joint_flattens_them(offscreen, scale, is
     assert (regions(offscreen, scene, front()) == ()) is is_hidden
 
 
-def test_negative_weights_give_no_bound_so_all_back_faces_are_drawn(offscreen) -> None:
+def test_negative_weights_have_no_bound_so_all_back_faces_are_drawn(offscreen) -> None:
     mesh = closed(8)
     binding = skin_from_lists([[(0, 1.5), (0, -0.5)] for _ in mesh.positions], np.eye(4)[None])
     scene = Scene([Actor(Figure("ball", mesh, skeleton([-1], [[0.0, 0.0, 0.0]]), binding))])

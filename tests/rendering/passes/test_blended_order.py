@@ -1,4 +1,4 @@
-"""Pixels of blended triangles of one mesh, which are sorted by depth."""
+"""Pixels of blended triangles within one mesh, which are sorted by depth."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def layers(figure_of) -> Mesh:
 
 @pytest.mark.parametrize("is_turned", [False, True])
 def test_blended_triangles_of_a_mesh_are_drawn_from_far_to_near(offscreen, is_turned):
-    """Each layer covers half of what is behind it; order by depth, then as listed above."""
+    """Each layer covers half of those behind it; the order is by depth, then as listed above."""
     actor = Actor(Figure("layers", layers(square)))
     if is_turned:
         actor.placement = np.diag([-1.0, 1.0, -1.0, 1.0])
@@ -51,14 +51,14 @@ def test_blended_triangles_of_a_mesh_are_drawn_from_far_to_near(offscreen, is_tu
     by_depth = [(0, 255, 0), (255, 255, 255), (255, 0, 0), (0, 0, 255)]
     for color in reversed(by_depth) if is_turned else by_depth:
         wanted = 0.5 * wanted + 0.5 * np.array(color)
-    wanted /= 1.0 - 0.5**4  # the opacity of all layers
+    wanted /= 1.0 - 0.5**4  # opacity of all layers together
     for _ in range(2):
         shown = front_view(offscreen, Scene([actor]), lights=dark())
         assert np.allclose(pixel(shown, 0.3, 0.2)[:3], wanted, atol=2)
 
 
 def test_blended_materials_are_drawn_from_far_to_near(offscreen):
-    """Four materials, a run each, in the order of the test above."""
+    """Four materials with one run each are in the order of the test above."""
     mesh = layers(square)
     one = mesh.materials[0]
     colors = [(*mesh.colors[4 * row, :3].tolist(), 0.5) for row in range(4)]

@@ -1,4 +1,4 @@
-"""STAR, SUPR, SKEL and MHR on the GPU, alone and as instances, against the float64 reference."""
+"""STAR, SUPR, SKEL and MHR on the GPU, single and as instances, compared with the reference."""
 
 from __future__ import annotations
 
@@ -20,7 +20,8 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import Skinning
 
-TOLERANCE = 2e-5  # relative to the figure's size; the tiny correctives are larger than the figure
+# Relative to the figure's size; the synthetic correctives are larger than the figure.
+TOLERANCE = 2e-5
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +70,7 @@ def test_weights_of_instances_are_those_of_each_pose(figures):
         assert row.tolist() == pose_weights(figure.correctives, figure.skeleton, pose).tolist()
 
 
-def test_very_many_offsets_are_summed_on_the_processor(ctx, figures, monkeypatch):
+def test_large_numbers_of_offsets_are_summed_on_the_processor(ctx, figures, monkeypatch):
     monkeypatch.setattr(rest_buffers, "is_software", lambda context: False)
     mesh = MeshBuffers(ctx, figures["star"], [])
     assert rest_buffers.RestBuffers(ctx, mesh).way == "texture"

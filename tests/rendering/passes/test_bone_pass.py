@@ -1,4 +1,4 @@
-"""Skeletons as octahedra, sticks and axes: direction, roll, ends, branches, picking."""
+"""Skeletons drawn as octahedra, sticks and axes: direction, roll, ends, branches, and picking."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def offscreen():
 
 
 def scene_of(parents, offsets, *dofs, boxes=None):
-    """Return a scene of a skeleton, with the DOFs given as (row, angle)."""
+    """Return a scene of a skeleton with DOFs set by (row, angle)."""
     scene = alone(Figure("bones", skeleton=skeleton(parents, offsets, boxes)))
     for row, angle in dofs:
         scene.actors[0].pose.dofs[row] = angle
@@ -35,7 +35,7 @@ def scene_of(parents, offsets, *dofs, boxes=None):
 
 
 def draw(offscreen, scene, reach, bones="auto"):
-    """Return the unlit front view of -reach to reach in x and y, transparent where it is empty."""
+    """Return the unlit front view of -reach to reach in x and y on a transparent background."""
     camera = Camera(azimuth=0.0, inclination=0.0, fov=90.0, distance=reach, orthographic=True)
     flat = Lights(DARK, DARK, ambient=1.0, specular=0.0)
     options = DisplayOptions(background="transparent", grid=False, samples=1, lights=flat)
@@ -49,7 +49,7 @@ def at(picture, reach, x, y):
 
 
 def columns_of(picture, strongest):
-    """Return the mean column of the pixels of a pure axis colour."""
+    """Return the mean column of the pixels with a pure axis colour."""
     others = [channel for channel in range(3) if channel != strongest]
     pure = picture[..., 3] > 0
     for other in others:
@@ -60,14 +60,14 @@ def columns_of(picture, strongest):
 @pytest.mark.parametrize("style", ["octahedra", "sticks"])
 def test_ridge_rotates_with_the_roll(offscreen, style):
     chain = [-1, 0], [[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]]
-    # Red is the x axis, the first one across the bone.
+    # Red is the x axis, the first axis across the bone.
     assert columns_of(draw(offscreen, scene_of(*chain), 0.5, style), 0) > 0.8
     turned = scene_of(*chain, (1, math.pi))
     assert columns_of(draw(offscreen, turned, 0.5, style), 0) < -0.8
 
 
 @pytest.mark.parametrize("style", STYLES)
-def test_every_child_has_a_bone_and_the_gap_between_has_none(offscreen, style):
+def test_bone_is_drawn_to_every_child_and_not_between_the_children(offscreen, style):
     places = [[0.0, 0.0, 0.0], [1.5, 0.0, 0.0], [0.0, 1.5, 0.0], [-1.0, -1.0, 0.0]]
     picture = draw(offscreen, scene_of([-1, 0, 0, 0], places), 2.0, style)
     for x, y in ((0.4, 0.0), (0.0, 0.4), (-0.4, -0.4)):
@@ -77,7 +77,7 @@ def test_every_child_has_a_bone_and_the_gap_between_has_none(offscreen, style):
 
 def test_end_bone_continues_its_parent_and_rotates(offscreen):
     chain = [-1, 0], [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]]
-    # Two fifths of the bone, but at most 7 % of the figure's size, which is 1.
+    # The length is two fifths of the bone, but at most 7 % of the figure's size of 1.
     straight, turned = scene_of(*chain), scene_of(*chain, (5, -math.pi / 2))
     assert at(draw(offscreen, straight, 0.1, "octahedra"), 0.1, 0.0, 0.055)[3] > 0
     assert at(draw(offscreen, straight, 0.1, "octahedra"), 0.1, 0.055, 0.0)[3] == 0
@@ -87,7 +87,7 @@ def test_end_bone_continues_its_parent_and_rotates(offscreen):
 
 @pytest.mark.parametrize("style", STYLES)
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e4])
-def test_size_follows_the_figure_and_coincident_joints_do_not_matter(offscreen, style, scale):
+def test_size_follows_the_figure_and_ignores_coincident_joints(offscreen, style, scale):
     places = scale * np.array([[0, 0, 0], [0, 0, 0], [0, 1.0, 0], [0, 0, 0]])
     picture = draw(offscreen, scene_of([-1, 0, 1, 2], places), 2.0 * scale, style)
     assert 20 < (picture[..., 3] > 0).sum() < 0.1 * SIDE**2
@@ -108,7 +108,7 @@ def test_axes_are_red_to_the_right_and_green_upwards(offscreen):
     assert right[0] > 2 * right[1] and up[1] > 1.3 * up[0]
 
 
-def test_default_is_the_boxes_of_a_file_or_octahedra(offscreen):
+def test_default_style_is_the_boxes_of_a_file_or_octahedra(offscreen):
     chain = [-1, 0], [[0.0, 0.0, 0.0], [0.0, 1.0, 0.0]]
     boxes = np.tile([[-0.2] * 3, [0.2] * 3], (2, 1, 1))
     for given, style in ((boxes, "boxes"), (None, "octahedra")):

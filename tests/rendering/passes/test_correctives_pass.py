@@ -1,4 +1,4 @@
-"""Shape and pose correctives on the GPU, summed in the shader or before it, and uploads."""
+"""Shape and pose correctives on the GPU, summed in or before the shader, and their uploads."""
 
 from __future__ import annotations
 
@@ -18,9 +18,10 @@ from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size
-NORMAL_TOLERANCE = 1e-4  # joints rotated by up to a radian, four influences, float32
-PALETTE = 256 * 3 * 4 * 4  # bytes of one row of matrices: up to 256 joints
-WEIGHT_LIST = 1024 * 2 * 4  # bytes of one row of pairs: up to 1024 weights
+# For joints rotated by up to a radian and four influences in single precision.
+NORMAL_TOLERANCE = 1e-4
+PALETTE = 256 * 3 * 4 * 4  # bytes of one row of matrices for up to 256 joints
+WEIGHT_LIST = 1024 * 2 * 4  # bytes of one row of pairs for up to 1024 weights
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +36,7 @@ def family(tmp_path_factory):
 
 @pytest.fixture
 def posed(ctx):
-    """Return a function that makes a posed mesh; all are released at the end."""
+    """Return a function that creates a posed mesh; all are released at the end."""
     owned = []
 
     def make(figure, way="") -> PosedMesh:
@@ -51,7 +52,7 @@ def posed(ctx):
 
 @pytest.fixture
 def written(monkeypatch):
-    """Sizes of writes into buffers and textures, in bytes, in order."""
+    """The sizes of writes to buffers and textures in bytes, in their order."""
     sent: list[tuple[str, int]] = []
     for owner, kind in ((moderngl.Buffer, "buffer"), (moderngl.Texture, "texture")):
 
@@ -71,7 +72,7 @@ def shaped_pose(figure, seed, reach=1.0):
 
 
 def check(mesh, pose, how=None):
-    """Compare the GPU's output with the reference, without the figure's placement."""
+    """Compare the output of the GPU with the reference, without the figure's placement."""
     how = how or Skinning()
     mesh.update(pose, how)
     positions, normals = mesh.read()
@@ -102,7 +103,7 @@ def test_gpu_matches_the_reference_for_other_methods(family, posed, method, way)
 
 @pytest.mark.parametrize("way", WAYS)
 def test_many_vertices_fill_many_rows_of_the_texture(family, posed, way):
-    figure = family("smpl", n_vertices=1_000)  # 207,000 offsets: 51 rows of 4096
+    figure = family("smpl", n_vertices=1_000)  # 207,000 offsets are 51 rows of 4096
     check(posed(figure, way), shaped_pose(figure, 0))
 
 
@@ -135,11 +136,11 @@ def test_shape_and_pose_can_be_reset(family, posed, way):
     before = check(mesh, rest)
     check(mesh, pose)
     pose.shape_weights[:] = 0.0
-    check(mesh, pose)  # the pose alone
+    check(mesh, pose)  # only the pose
     pose.shape_weights[3] = 2.0
     check(mesh, pose)
     pose.dofs[:] = 0.0
-    check(mesh, pose)  # the shape alone
+    check(mesh, pose)  # only the shape
     assert np.array_equal(check(mesh, rest), before)
     mesh.update(None)
     wanted = figure.mesh.positions
@@ -156,7 +157,7 @@ def test_bind_pose_of_a_shaped_actor_is_the_stored_mesh(family, posed, way):
 
 
 @pytest.mark.parametrize("way", WAYS)
-def test_actors_of_one_figure_have_shapes_of_their_own(ctx, family, posed, way):
+def test_actors_of_one_figure_may_have_different_shapes(ctx, family, posed, way):
     figure = family("smpl")
     first = posed(figure, way)
     second = PosedMesh(ctx, first.programs, first.mesh, way)
@@ -170,7 +171,7 @@ def test_actors_of_one_figure_have_shapes_of_their_own(ctx, family, posed, way):
     second.release()
 
 
-def test_changed_pose_sends_matrices_and_a_weight_list_only(family, posed, written):
+def test_changed_pose_uploads_only_matrices_and_a_weight_list(family, posed, written):
     figure = family("smplx")
     mesh = posed(figure, "texture")
     pose = shaped_pose(figure, 6)
@@ -181,7 +182,7 @@ def test_changed_pose_sends_matrices_and_a_weight_list_only(family, posed, writt
     assert sorted(written) == [("texture", WEIGHT_LIST), ("texture", PALETTE)]
 
 
-def test_changed_pose_without_correctives_sends_matrices_only(family, posed, written):
+def test_changed_pose_without_correctives_uploads_only_matrices(family, posed, written):
     figure = family("smplx")
     for way in WAYS:
         mesh = posed(figure, way)
@@ -193,7 +194,7 @@ def test_changed_pose_without_correctives_sends_matrices_only(family, posed, wri
         assert written == [("texture", PALETTE)]
 
 
-def test_changed_shape_sends_positions_and_normals(family, posed, written):
+def test_changed_shape_uploads_positions_and_normals(family, posed, written):
     figure = family("smpl")
     mesh = posed(figure, "texture")
     pose = shaped_pose(figure, 8)
@@ -206,7 +207,7 @@ def test_changed_shape_sends_positions_and_normals(family, posed, written):
     assert sorted(written) == sorted(wanted)
 
 
-def test_summed_before_the_shader_a_changed_pose_sends_positions_once(family, posed, written):
+def test_changed_pose_with_sums_before_the_shader_uploads_positions_once(family, posed, written):
     figure = family("smpl")
     mesh = posed(figure, "product")
     pose = shaped_pose(figure, 9)
@@ -217,7 +218,7 @@ def test_summed_before_the_shader_a_changed_pose_sends_positions_once(family, po
     assert sorted(written) == [("buffer", 12 * mesh.mesh.n_vertices), ("texture", PALETTE)]
 
 
-def test_same_pose_sends_nothing(family, posed, written):
+def test_unchanged_pose_uploads_no_data(family, posed, written):
     figure = family("smpl")
     for way in WAYS:
         mesh = posed(figure, way)

@@ -1,4 +1,4 @@
-"""Dual quaternion skinning in the shader, also blended with LBS, against the float64 reference."""
+"""Dual quaternion skinning in the shader, alone and mixed with LBS, compared with the reference."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size, as for linear blending
-NORMAL_TOLERANCE = 5e-5  # quaternions of five influences may shorten to a fifth when added
+NORMAL_TOLERANCE = 5e-5  # the sum of five quaternions may have a fifth of their length
 METHODS = [Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 METHOD_IDS = ["dqs", "mix"]
 
@@ -67,13 +67,13 @@ def dual(how: Skinning, **changes) -> Skinning:
 def test_gpu_matches_the_reference_for_any_number_of_joints(posed, how, n_joints):
     rng = np.random.default_rng(n_joints)
     figure = random_figure(rng, n_joints, n_vertices=max(300, n_joints))
-    # The mixture shortens normals as linear blending does: nearly cancelling ones lose all digits.
+    # The mixture shortens normals like linear blending; normals that nearly cancel lose all digits.
     check(posed, figure, how, seed=1, n_poses=3, normals=how.method == "dqs")
 
 
 @pytest.mark.parametrize("n_joints", [129, 1_025])
-def test_every_joint_is_found(posed, n_joints):
-    """One vertex per joint: a wrong row of the texture would be detected."""
+def test_every_joint_is_read_from_its_row(posed, n_joints):
+    """Each joint has one vertex, so a wrong row of the texture would be detected."""
     figure = random_figure(np.random.default_rng(0), n_joints, n_joints)
     ties = [[(joint, 1.0)] for joint in range(n_joints)]
     figure = replace(figure, skin=skin_from_lists(ties, figure.skin.inverse_bind))
@@ -115,13 +115,13 @@ def test_gpu_matches_the_reference_for_skewed_bindings(posed):
 @pytest.mark.parametrize(
     "changes", [{"max_influences": 1}, {"max_influences": 3}, {"normalize": True}], ids=str
 )
-def test_gpu_matches_the_reference_for_cut_and_scaled_weights(posed, how, changes):
+def test_gpu_matches_the_reference_for_limited_and_normalised_weights(posed, how, changes):
     figure = random_figure(np.random.default_rng(6), 20, counts=(0, 9), sums=(0.5, 2.0))
     check(posed, figure, dual(how, **changes), seed=6, n_poses=3, normals=False)
 
 
 @pytest.mark.parametrize("changes", [{"max_influences": 2}, {"normalize": True}], ids=str)
-def test_linear_blending_matches_the_reference_for_cut_and_scaled_weights(posed, changes):
+def test_linear_blending_matches_the_reference_for_limited_and_normalised_weights(posed, changes):
     figure = random_figure(np.random.default_rng(7), 20, counts=(0, 9), sums=(0.5, 2.0))
     check(posed, figure, Skinning("lbs", **changes), seed=7, n_poses=3, normals=False)
 
@@ -134,26 +134,28 @@ def test_linear_blending_matches_the_reference_for_cut_and_scaled_weights(posed,
         pytest.param(1.7, (0.0, 10_000.0, 0.0), id="1.7 units high, 10,000 units away"),
     ],
 )
-def test_far_figures_keep_their_digits(posed, how, size, origin):
+def test_figures_far_away_keep_their_precision(posed, how, size, origin):
     figure = random_figure(np.random.default_rng(8), 30, size=size, origin=origin)
     check(posed, figure, how, seed=8, n_poses=4, normals=False)
 
 
-def test_far_figures_keep_their_digits_when_scaled(posed):
+def test_scaled_figures_far_away_keep_their_precision(posed):
     figure = random_figure(np.random.default_rng(9), 8, size=1.7, origin=(0.0, 10_000.0, 0.0))
     check(posed, figure, Skinning("dqs"), seed=9, n_poses=4, scales=uniform, normals=False)
 
 
 @pytest.mark.parametrize("how", METHODS, ids=METHOD_IDS)
 @pytest.mark.parametrize("origin", [(0.0, 0.0, 0.0), (100.0, 0.0, 0.0)])
-def test_vertices_without_influence_or_with_cancelling_weights(posed, how, origin):
+def test_vertices_without_influence_or_with_cancelling_weights_match_the_reference(
+    posed, how, origin
+):
     pairs = [[], [(0, 0.0)], [(1, 1.0), (2, -1.0)], [(0, 1.5), (1, -0.5)], [(2, -1.0)], [(2, 0.5)]]
     figure = random_figure(np.random.default_rng(10), 3, n_vertices=6, origin=origin)
     figure = replace(figure, skin=skin_from_lists(pairs, figure.skin.inverse_bind))
     pose = random_pose(figure.skeleton, np.random.default_rng(10))
     found, _ = posed(figure, pose, how)
     wanted, _ = viewer.deform(figure, pose, how)
-    # Linear weights that sum to 0 or -1 send a vertex to the far side of the origin.
+    # Linear weights that sum to 0 or -1 move a vertex to the opposite side of the origin.
     reach = 1.0 + np.linalg.norm(origin)
     np.testing.assert_allclose(found, wanted, rtol=0, atol=2e-6 * reach)
     if how.method == "dqs":
@@ -162,7 +164,7 @@ def test_vertices_without_influence_or_with_cancelling_weights(posed, how, origi
 
 
 def test_twist_of_180_degrees_keeps_its_radius_on_the_gpu(posed):
-    """Both quaternions are perpendicular: the sum must not vanish as the sum of matrices does."""
+    """The quaternions are perpendicular, so their sum does not vanish like that of the matrices."""
     figure = random_figure(np.random.default_rng(11), 2, n_vertices=50)
     offsets = np.zeros((2, 3))
     bones = replace(figure.skeleton, rest_translations=offsets)
@@ -179,7 +181,7 @@ def test_twist_of_180_degrees_keeps_its_radius_on_the_gpu(posed):
 
 
 def test_methods_can_be_switched_on_one_mesh(posed):
-    """Textures and programs of one method must not leak into the next."""
+    """Textures and programs of one method must not be used for the next."""
     figure = random_figure(np.random.default_rng(12), 30)
     pose = random_pose(figure.skeleton, np.random.default_rng(12))
     for name in ("lbs", "dqs", "mix", "dqs", "lbs", "mix"):
@@ -198,7 +200,7 @@ def test_mix_at_0_and_1_is_one_of_the_two_methods(posed, blend_factor):
     np.testing.assert_allclose(found, other, rtol=0, atol=1e-6)
 
 
-def test_every_skinning_setting_counts_as_a_change(ctx):
+def test_every_changed_skinning_setting_is_applied(ctx):
     figure = random_figure(np.random.default_rng(14), 5, n_vertices=30)
     mesh = PosedMesh(ctx, Programs(ctx), MeshBuffers(ctx, figure, []))
     pose = random_pose(figure.skeleton, np.random.default_rng(14))

@@ -1,4 +1,4 @@
-"""Ghosts: surfaces drawn over the scene without being part of it."""
+"""Ghosts, which are surfaces drawn over the scene without being part of it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def shown(offscreen, what, scene=None, **options):
     return front_view(offscreen, scene or Scene([]), **options)
 
 
-def test_solid_ghost_is_drawn_where_it_is_placed(offscreen):
+def test_solid_ghost_is_drawn_at_its_placement(offscreen):
     picture = shown(offscreen, ghost(away=(0.5, 0.0, 0.0)))
     at = drawn(picture).any(axis=0)
     assert drawn(picture).any()
@@ -47,12 +47,12 @@ def test_translucent_ghost_lets_the_scene_through(offscreen):
     bare = pixel(shown(offscreen, None, scene), 0.0, 0.0)
     thin = pixel(shown(offscreen, ghost("translucent"), scene), 0.0, 0.0)
     thick = pixel(shown(offscreen, ghost("solid"), scene), 0.0, 0.0)
-    assert thick[0] < thin[0] < bare[0]  # decreasing red
+    assert thick[0] < thin[0] < bare[0]  # red decreases
     mixed = np.add(np.multiply(0.6, bare[:3]), np.multiply(0.4, thick[:3]))
-    assert np.abs(np.subtract(thin[:3], mixed)).max() < 12  # blended as sRGB numbers
+    assert np.abs(np.subtract(thin[:3], mixed)).max() < 12  # blending is in sRGB
 
 
-def test_ghost_behind_a_surface_is_hidden_and_one_inside_it_visible(offscreen):
+def test_ghost_behind_a_surface_is_hidden_and_ghost_inside_it_is_visible(offscreen):
     scene = Scene([Actor(Figure("square", square()))])
     bare = shown(offscreen, None, scene)
     behind = shown(offscreen, ghost(away=(0.0, 0.0, -0.5)), scene)
@@ -61,7 +61,7 @@ def test_ghost_behind_a_surface_is_hidden_and_one_inside_it_visible(offscreen):
     assert pixel(within, 0.0, 0.0) != pixel(bare, 0.0, 0.0)
 
 
-def test_wireframe_ghost_has_edges_alone(offscreen):
+def test_wireframe_ghost_has_only_edges(offscreen):
     picture = shown(offscreen, ghost("wireframe"))
     whole = drawn(shown(offscreen, ghost("solid"))).sum()
     assert 0 < drawn(picture).sum() < 0.5 * whole

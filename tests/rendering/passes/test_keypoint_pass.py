@@ -1,4 +1,4 @@
-"""Rendered keypoints: position, visibility through the surface, only on request."""
+"""Rendered keypoints: position, visibility through the surface, and the option that shows them."""
 
 from __future__ import annotations
 
@@ -34,20 +34,20 @@ def marked(*vertices):
 
 
 def marks(offscreen, scene, **options):
-    """Return the pixels changed by the markers."""
+    """Return a mask of the pixels changed by the markers."""
     bare = front_view(offscreen, scene, **options)
     with_them = front_view(offscreen, scene, keypoints=True, **options)
     return np.abs(with_them.astype(int) - bare).max(axis=-1) > 8
 
 
 def middle(mask):
-    """Return the centre of some pixels, in units of the image plane."""
+    """Return the centre of the marked pixels in units of the image plane."""
     rows, columns = np.nonzero(mask)
     x = (columns.mean() + 0.5) * 4 / PIXELS - 2.0
     return x, 2.0 - (rows.mean() + 0.5) * 4 / PIXELS
 
 
-def test_marker_is_where_its_vertex_is(offscreen):
+def test_marker_is_at_the_position_of_its_vertex(offscreen):
     for vertex, place in ((CORNER, (1.5, 1.5)), (CENTER, (0.0, 0.0)), (4, (1.5, -1.5))):
         mask = marks(offscreen, alone(marked(vertex)))
         assert 0 < mask.sum() < 16
@@ -65,7 +65,7 @@ def test_marker_follows_pose_and_placement(offscreen):
     assert middle(marks(offscreen, scene)) == pytest.approx((0.25, -0.25), abs=0.05)
 
 
-def test_markers_show_through_the_surface(offscreen):
+def test_markers_are_visible_through_the_surface(offscreen):
     scene = alone(marked(CENTER))
     cover = Actor(grid_figure())
     cover.placement[2, 3] = 1.0
@@ -87,7 +87,7 @@ def test_keypoint_at_a_joint_is_drawn_at_the_joint(offscreen):
     assert middle(mask) == pytest.approx((1.0, -1.0), abs=0.05)
 
 
-def test_no_markers_without_keypoints(offscreen):
+def test_figure_without_keypoints_has_no_markers(offscreen):
     assert not marks(offscreen, alone(grid_figure())).any()
     assert not marks(offscreen, alone(marked(CENTER)), show="binding").any()
     scene = alone(marked(CENTER))
@@ -96,7 +96,7 @@ def test_no_markers_without_keypoints(offscreen):
     assert not marks(offscreen, alone(marked())).any()
 
 
-def test_markers_are_drawn_over_the_skeleton_alone(offscreen):
+def test_markers_are_drawn_over_a_skeleton_without_a_skin(offscreen):
     scene = alone(marked(CORNER))
     picture = front_view(offscreen, scene, show="skeleton", keypoints=True)
     found = drawn(picture).copy()
@@ -107,7 +107,8 @@ def test_markers_are_drawn_over_the_skeleton_alone(offscreen):
 def test_marker_size_depends_on_the_figure_not_on_the_image(offscreen):
     small, large = alone(marked(CENTER)), alone(marked(CENTER))
     large.actors[0].placement[:3, :3] *= 4.0
-    # Cubes of 1.2 % of the figure's diagonal of 3 sqrt 2, seen from the front: 1.02 pixels a side.
+    # Cubes of 1.2 % of the figure's diagonal of 3 sqrt 2, seen from the front, have sides of 1.02
+    # pixels.
     assert 1 <= marks(offscreen, small).sum() <= 4
     assert 16 <= marks(offscreen, large).sum() <= 25
 

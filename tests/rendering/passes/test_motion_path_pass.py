@@ -41,9 +41,9 @@ def walker(*places, rows=None, rate=1.0) -> Actor:
 ACROSS = [(-1.5, 0.0, 0.0), (0.0, 0.0, 0.0), (1.5, 0.0, 0.0)]
 
 
-def test_a_path_is_a_line_a_few_pixels_wide(offscreen):
+def test_path_is_a_line_a_few_pixels_wide(offscreen):
     mask = drawn(front_view(offscreen, Scene([walker(*ACROSS)]), path_joints=PATH))
-    # From -1.5 to 1.5 of +-2: columns 10 to 69; 2.5 pixels wide.
+    # The path is from -1.5 to 1.5 of +-2, columns 10 to 69, and 2.5 pixels wide.
     assert mask[:, 12:68].sum(axis=0).min() >= 2 and mask[:, 12:68].sum(axis=0).max() <= 3
     assert not mask[:, :9].any() and not mask[:, 71:].any()
     assert not mask[:37].any() and not mask[43:].any()
@@ -74,15 +74,15 @@ def test_paths_fade_into_past_and_future(offscreen):
     scene = Scene([walker(*ACROSS)], time=1.0)
     picture = front_view(offscreen, scene, path_joints=PATH, path_seconds=0.5)
     alpha = [pixel(picture, x, 0.01)[3] for x in (-1.2, -0.375, 0.0, 0.375, 1.2)]
-    # A second is 1.5 units: halfway through half a second half of the opacity is left; beyond,
-    # none.
+    # A second is 1.5 units. At a quarter of a second, half of the opacity remains; beyond half a
+    # second, none.
     assert alpha == pytest.approx([0, 128, 255, 128, 0], abs=12)
-    scene.actors[0].offset = -1.0  # its clip runs a second early: now it is at its end
+    scene.actors[0].offset = -1.0  # the clip is a second ahead, so the actor is at its end
     picture = front_view(offscreen, scene, path_joints=PATH, path_seconds=0.5)
     assert pixel(picture, 1.45, 0.01)[3] > 200 and pixel(picture, 0.0, 0.01)[3] == 0
 
 
-def test_the_whole_path_is_drawn_evenly(offscreen):
+def test_whole_path_is_drawn_with_equal_opacity(offscreen):
     scene = Scene([walker(*ACROSS)], time=0.0)
     picture = front_view(offscreen, scene, path_joints=PATH)
     assert {pixel(picture, x, 0.01)[3] for x in (-1.2, 0.0, 1.2)} == {255}
@@ -115,7 +115,7 @@ def test_joint_paths_follow_placement(offscreen):
 
 
 def replace_mesh(actor: Actor) -> Actor:
-    """Return the actor without a mesh, its boxes far out of view."""
+    """Return the actor without a mesh, with boxes far out of view."""
     skeleton = replace(actor.figure.skeleton, boxes=np.full((2, 2, 3), -50.0))
     actor.figure = replace(actor.figure, mesh=None, skin=None, skeleton=skeleton)
     return actor
@@ -143,7 +143,7 @@ def test_paths_are_computed_once(offscreen, monkeypatch):
     assert len(calls) == 3
 
 
-def test_a_path_follows_dofs_without_channels(offscreen, monkeypatch):
+def test_path_follows_dofs_without_channels(offscreen, monkeypatch):
     calls = []
     original = motion_path_pass.motion_path
     monkeypatch.setattr(
@@ -165,7 +165,7 @@ def test_a_path_follows_dofs_without_channels(offscreen, monkeypatch):
 
 
 def test_lines_that_pass_the_camera_are_clipped(offscreen):
-    """From behind the eye to the centre of the image; nothing may smear over the rest."""
+    """The line from behind the eye to the image centre must not cover other pixels."""
     scene = Scene([walker((0.0, 0.5, 9.0), (0.0, 0.0, -3.0))])
     camera = Camera(azimuth=0.0, inclination=0.0, fov=60.0, distance=2.0)
     options = DisplayOptions(background="transparent", grid=False, samples=1, path_joints=PATH)

@@ -14,7 +14,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 
-RADIUS = 0.2  # radius of the balls drawn here, 4 pixels
+RADIUS = 0.2  # radius of the drawn balls, 4 pixels
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def offscreen():
 
 
 def dots(*places, limbs=(), sides=None, confidence=None, radius=RADIUS) -> Actor:
-    """Return an actor of points, whose size depends on its clip."""
+    """Return an actor of points; the clip determines their size."""
     count = len(places)
     layout = PointLayout(
         "dots",
@@ -32,7 +32,8 @@ def dots(*places, limbs=(), sides=None, confidence=None, radius=RADIUS) -> Actor
         np.array(limbs, dtype=np.int32).reshape(-1, 2),
         np.zeros(count, dtype=np.int32) if sides is None else sides,
     )
-    # Two corners of a cube whose diagonal is radius / 0.012; the others lie far apart too.
+    # Two points are corners of a cube with a diagonal of radius / 0.012; the others are far apart
+    # too.
     size = radius / 0.012
     spread = np.zeros((1, count, 4))
     spread[0, :, 0] = np.linspace(0.0, size, count) if count > 1 else 0.0
@@ -56,7 +57,7 @@ def test_points_are_drawn_as_balls_at_their_positions(offscreen):
     for half, row, column in ((left, 20, 20), (right, 60, 20)):
         rows, columns = np.nonzero(half)
         assert (rows.mean() + 0.5, columns.mean() + 0.5) == pytest.approx((row, column), abs=0.3)
-        # A disc of 4 pixels radius, reduced by the polygonal outline of the ball.
+        # The disc has a radius of 4 pixels, reduced by the polygonal outline of the ball.
         assert 0.8 * 50 < half.sum() < 1.1 * 50
 
 
@@ -64,10 +65,10 @@ def test_limbs_are_half_as_wide_as_their_points(offscreen):
     picture = front_view(offscreen, Scene([dots((-1.5, 0, 0), (1.5, 0, 0), limbs=[(0, 1)])]))
     mask = drawn(picture)
     assert mask[:, 40].sum() == 4  # 2 pixels up and down
-    assert width(mask) == pytest.approx(68, abs=1)  # 60, and a radius at both ends
+    assert width(mask) == pytest.approx(68, abs=1)  # 60 plus a radius at both ends
 
 
-def test_a_limb_needs_no_direction(offscreen):
+def test_limb_without_length_is_drawn(offscreen):
     for end in ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)):
         actor = dots((0.0, 0.0, 0.0), end, limbs=[(0, 1)])
         assert drawn(front_view(offscreen, Scene([actor]))).any()
@@ -78,7 +79,7 @@ def test_colours_distinguish_sides(offscreen):
     limbs = [(0, 1), (1, 2), (1, 3)]
     scene = Scene([dots(*places, limbs=limbs, sides=[-1, 0, 1, 0])])
     picture = front_view(offscreen, scene)
-    for x in (-1.5, -0.7):  # right is red, and so is a limb from the centre line to it
+    for x in (-1.5, -0.7):  # right points and limbs from the centre line to them are red
         red, green, blue, _ = pixel(picture, x, 0.0)
         assert red > 2 * max(green, blue)
     for x in (0.7, 1.5):
@@ -91,7 +92,7 @@ def test_colours_distinguish_sides(offscreen):
     assert green > 1.5 * max(red, blue)
 
 
-def test_a_limb_between_sides_belongs_to_neither(offscreen):
+def test_limb_between_sides_has_the_colour_of_neither_side(offscreen):
     scene = Scene([dots((-1.5, 0, 0), (1.5, 0, 0), limbs=[(0, 1)], sides=[-1, 1])])
     red, green, blue, _ = pixel(front_view(offscreen, scene), 0.0, 0.0)
     assert max(red, green, blue) < 1.6 * min(red, green, blue)
@@ -105,7 +106,7 @@ def test_confidence_is_opacity(offscreen):
         assert pixel(picture, x, 0.0)[3] == pytest.approx(alpha, abs=1)
 
 
-def test_uncertain_or_unseen_points_are_left_out_with_their_limbs(offscreen):
+def test_uncertain_or_undetected_points_are_omitted_with_their_limbs(offscreen):
     places = [(-1.5, 0.0, 0), (0.0, 0.0, 0), (1.5, 0.0, 0)]
     for confidence, shown in ((0.0, {0.0: False}), (0.05, {0.0: False}), (0.1, {0.0: True})):
         actor = dots(*places, limbs=[(0, 1), (1, 2)], confidence=[1.0, confidence, 1.0])
@@ -136,7 +137,7 @@ def test_points_behind_a_surface_are_faintly_visible(offscreen):
     covered = pixel(front_view(offscreen, Scene([wall, actor])), 0.0, 0.0)
     free = pixel(front_view(offscreen, Scene([actor])), 0.0, 0.0)
     for surface, seen, point in zip(bare[:3], covered[:3], free[:3], strict=True):
-        # The default opacity of a skeleton over a skin.
+        # This is the default opacity of a skeleton over a skin.
         assert seen == pytest.approx(0.65 * surface + 0.35 * point, abs=2)
 
 
@@ -151,7 +152,7 @@ def test_placement_is_applied_and_reflection_keeps_balls_outward(offscreen):
 
 
 def test_translucent_points_are_sorted_as_the_camera_orbits(offscreen):
-    """A red ball in front of a blue one, and vice versa: the nearer one covers more."""
+    """A red ball is in front of a blue one, and vice versa; the nearer ball covers more."""
     near, far = (0.0, 0.0, 0.5), (0.0, 0.0, -0.5)
     for places in ((near, far), (far, near)):
         actor = dots(*places, (1.9, 1.9, 0.0), sides=[-1, 1, 0], confidence=[0.6, 0.6, 1.0])
@@ -160,7 +161,7 @@ def test_translucent_points_are_sorted_as_the_camera_orbits(offscreen):
         assert alpha == pytest.approx(255 * (1 - 0.4 * 0.4), abs=2)
 
 
-def test_still_points_are_uploaded_once(offscreen, monkeypatch):
+def test_unchanged_points_are_uploaded_once(offscreen, monkeypatch):
     actor = dots((0.5, 0.0, 0.0), (0.5, 0.5, 0.0))
     scene = Scene([actor])
     front_view(offscreen, scene)
@@ -184,24 +185,24 @@ def frames(*places):
     return np.concatenate([points, np.ones((*points.shape[:2], 1))], axis=2)
 
 
-def test_radii_follow_the_size_of_the_whole():
-    """0.012 of the diagonal 5 of a 3 x 4 rectangle; scaled accordingly in other units."""
+def test_radii_follow_the_size_of_the_whole_figure():
+    """The radius is 0.012 of the diagonal 5 of a 3 x 4 rectangle, and scales with the unit."""
     corners = [(0, 0, 0), (3, 0, 0), (0, 4, 0), (3, 4, 0)]
     assert point_radii(frames(corners)) == pytest.approx([0.06] * 4)
     assert point_radii(1000.0 * frames(corners)) == pytest.approx([60.0] * 4)
 
 
-def test_radii_are_smaller_where_points_are_close():
-    """0.3 of the distance 0.1, and at least 0.0015 of the size 10 for coincident points."""
+def test_radii_are_smaller_for_close_points():
+    """The radius is 0.3 of the distance 0.1; coincident points have 0.0015 of the size 10."""
     points = frames([(0, 0, 0), (10, 0, 0), (5, 0, 0), (5.1, 0, 0), (2, 0, 0), (2, 0, 0)])
     assert point_radii(points) == pytest.approx([0.12, 0.12, 0.03, 0.03, 0.12, 0.12])
     close = frames([(0, 0, 0), (10, 0, 0), (2, 0, 0), (2.001, 0, 0)])
     assert point_radii(close)[2:] == pytest.approx([0.015, 0.015])
 
 
-def test_radii_are_medians_of_the_frames_that_see_a_point():
+def test_radii_are_medians_over_the_frames_with_a_point():
     sizes = np.stack([frames([(0, 0, 0), (size, 0, 0), (size / 2, 0, 0)])[0] for size in (1, 2, 9)])
-    sizes[2, 1, 3] = 0.0  # the third frame is then 4.5 long, the median is 2
+    sizes[2, 1, 3] = 0.0  # the third frame then has length 4.5, and the median is 2
     assert point_radii(sizes) == pytest.approx([0.024] * 3)
     sizes[..., 3] = 0.0
     assert point_radii(sizes).tolist() == [0.0, 0.0, 0.0]
@@ -212,6 +213,6 @@ def test_radii_of_many_points_follow_their_density() -> None:
     side = np.arange(40) / 39
     plane = np.stack([*np.meshgrid(side, side), np.zeros((40, 40))], axis=-1).reshape(-1, 3)
     points = np.concatenate([plane, np.ones((1600, 1))], axis=1)
-    # A grid's cell has one point or two, so gaps are 1/48 or 1/48 divided by the root of 2.
+    # A cell of the grid has one or two points, so gaps are 1/48 or 1/48 divided by sqrt 2.
     radii = point_radii(points[None])
     assert 0.3 / 48 / 2 <= radii.min() <= radii.max() <= 0.3 / 48

@@ -36,7 +36,7 @@ def fewest(request, monkeypatch):
 
 
 def painted(mode="opaque", left=255, right=255, **changes) -> Figure:
-    """Return the grid from -1.5 to 1.5, white, with these alphas left and right of x = 0."""
+    """Return the white grid from -1.5 to 1.5 with these alphas left and right of x = 0."""
     image = np.full((1, 2, 4), 255, np.uint8)
     image[0, :, 3] = left, right
     material = Material("", Texture("", image, is_smooth=False), alpha_mode=mode, **changes)
@@ -51,7 +51,7 @@ def painted(mode="opaque", left=255, right=255, **changes) -> Figure:
 
 
 def right_half() -> Figure:
-    """Return the grid with the triangles at x > 0 only, as a mask would leave them."""
+    """Return only the grid's triangles at x > 0, like a mask of the left half."""
     figure = painted("mask")
     mesh = figure.require_mesh()
     kept = mesh.positions[mesh.triangles, 0].mean(axis=1) > 0.0
@@ -61,7 +61,7 @@ def right_half() -> Figure:
 
 
 def behind() -> Figure:
-    """Return a wall behind the grid that shadows fall on."""
+    """Return a wall behind the grid on which shadows fall."""
     return Figure("wall", square(-0.4, half=1.9))
 
 
@@ -71,8 +71,10 @@ def lit(**changes) -> DisplayOptions:
 
 
 @pytest.mark.parametrize("quality", ["normal", "final"])
-def test_masks_cut_shadows_contact_and_occlusion_like_missing_triangles(offscreen, quality, fewest):
-    """A mask of the left half draws the picture of a mesh without the left half."""
+def test_masked_areas_affect_shadows_and_occlusion_like_missing_triangles(
+    offscreen, quality, fewest
+):
+    """A mask of the left half draws the same picture as a mesh without the left half."""
     camera = front(inclination=35.0, azimuth=20.0)
     masked, cut, whole = (
         offscreen.render(
@@ -89,13 +91,13 @@ def test_masks_cut_shadows_contact_and_occlusion_like_missing_triangles(offscree
 
 
 def shadow_on_wall(offscreen, figure, **changes) -> np.ndarray:
-    """Return how dark the light from the left makes the wall to the right of the grid: x > 1.5."""
+    """Return the darkness of the shadow by the left light right of the grid, at x > 1.5."""
     light = lights(0.0, 1.0, azimuth=-60.0, follow_camera=False)
     wall = Figure("wall", square(-0.4, half=2.5))
     scene = Scene([Actor(figure, rest_pose(figure.skeleton)), Actor(wall)])
     options = plain(lights=light, quality="normal", **changes)
     pixels = offscreen.render(scene, (N, N), front(), options, GROUND)
-    # The shadow reaches 0.4 tan 60 = 0.69 further than the grid: to 2.19. A unit is 25 pixels.
+    # The shadow extends 0.4 tan 60 = 0.69 beyond the grid, to 2.19. A unit is 25 pixels.
     return 1.0 - (pixels[40:60, 92:98, 0].mean() / pixels[5:8, 92:98, 0].mean()) ** 2.2
 
 
@@ -107,7 +109,7 @@ def test_blended_surfaces_cast_shadows_in_proportion_to_their_alpha(offscreen, a
     assert thin / solid == pytest.approx(alpha / 255, abs=0.08)
 
 
-def test_blended_surfaces_occlude_nothing(offscreen):
+def test_blended_surfaces_cause_no_ambient_occlusion(offscreen):
     options = lit(quality="final", shadows=False, lights=lights(0.5))
     glass = painted("blend", 0, 0)
     wall = behind()
@@ -126,15 +128,15 @@ def click(offscreen, scene, x, y=0.3, **options):
         return offscreen.renderer.pick(scene, camera, shown, size, *at, scene_box(scene))
 
 
-def test_picking_passes_through_what_is_cut_out_or_invisible(offscreen, fewest):
-    """Far behind the grid is a square; triangle 12 of the grid is at x = 0.2, y = 0.3."""
+def test_picking_passes_through_masked_and_invisible_areas(offscreen, fewest):
+    """A square is far behind the grid; triangle 12 of the grid is at x = 0.2, y = 0.3."""
     far = Actor(Figure("far", square(-1.0, half=1.9)))
     for mode, left, hit in (("mask", 100, 1), ("blend", 5, 1), ("blend", 60, 0), ("opaque", 0, 0)):
         figure = painted(mode, left)
         scene = Scene([Actor(figure, rest_pose(figure.skeleton)), far])
         assert click(offscreen, scene, -0.6).actor == hit
         found = click(offscreen, scene, 0.6)
-        # Cells of 0.75, row by row from the lower left corner, two triangles each.
+        # Cells of 0.75 have two triangles each, row by row from the lower left corner.
         assert (found.actor, found.triangle // 2) == (0, 4 * 2 + 2)
 
 
@@ -169,7 +171,7 @@ def test_outlines_follow_masks(offscreen):
 
 
 def mirrored(pose=None, placement=(1.0, 1.0, 1.0), scale=1.0, joints=(1.0, 1.0, 1.0)) -> Scene:
-    """Return the grid, which faces +z with one side, reflected in one of three ways."""
+    """Return the single-sided grid that faces +z, reflected in one of three ways."""
     figure = painted(double_sided=False)
     actor = Actor(figure, rest_pose(figure.skeleton), placement=np.diag([*placement, 1.0]))
     actor.pose.figure_scale = scale
@@ -191,7 +193,7 @@ def mirrored(pose=None, placement=(1.0, 1.0, 1.0), scale=1.0, joints=(1.0, 1.0, 
         ({"joints": (-1.0, 1.0, 1.0), "placement": (-1.0, 1.0, 1.0)}, True),
     ],
 )
-def test_single_sides_stay_outside_under_reflections(offscreen, reflection, is_seen, fewest):
+def test_single_sides_remain_outside_under_reflections(offscreen, reflection, is_seen, fewest):
     """A reflection keeps the side that the transformed normal points to."""
     scene = mirrored(**reflection)
     assert drawn(front_view(offscreen, scene)).any() == is_seen
@@ -202,7 +204,7 @@ def test_single_sides_stay_outside_under_reflections(offscreen, reflection, is_s
     assert (click(offscreen, scene, 0.6, cull=True) is not None) == is_seen
 
 
-def test_mirrored_and_other_actors_of_one_figure_are_drawn_together(offscreen, monkeypatch):
+def test_mirrored_and_plain_actors_of_one_figure_are_drawn_together(offscreen, monkeypatch):
     monkeypatch.setattr(instance_pass, "FEWEST", 2)
     figure = painted(double_sided=False)
     actors = [Actor(figure, rest_pose(figure.skeleton)) for _ in range(4)]

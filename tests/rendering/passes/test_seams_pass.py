@@ -1,4 +1,4 @@
-"""Seams on the GPU: a row for every split vertex, all copies of one posed identically."""
+"""Seams on the GPU, with a row for every split vertex and identically posed copies."""
 
 from __future__ import annotations
 
@@ -34,9 +34,8 @@ def posed(ctx):
 
 
 def ribbon() -> Figure:
-    """Return two squares that share an edge, in two places of the texture, and a lone vertex.
-
-    Vertices 1 and 2 lie on the seam and count twice: 4 + 4 split vertices and the lone one.
+    """Return two squares that share an edge but not their texture area, and a lone vertex. Vertices
+    1 and 2 are on the seam and count twice: 4 + 4 split vertices and the lone vertex.
     """
     points = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0], [5, 5, 5]]
     triangles = [[0, 1, 2], [0, 2, 3], [1, 4, 5], [1, 5, 2]]
@@ -89,7 +88,7 @@ def test_copies_of_one_vertex_are_posed_identically(posed, tmp_path):
         mesh.update(pose, how)
         rows = rows_of(mesh.posed, 6)
         assert len(rows) == mesh.mesh.n_vertices > figure.mesh.n_vertices
-        # Bit-identical values, so that no crack opens along a seam.
+        # The values are bit-identical, so that no crack opens along a seam.
         assert np.array_equal(rows, rows[mesh.mesh.copies][mesh.mesh.sources])
 
 

@@ -1,4 +1,4 @@
-"""Output of the skinning shader against the float64 reference, and when it runs."""
+"""Output of the skinning shader, compared with the float64 reference, and its number of runs."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from viewer.rig.skin import has_influence, skin_from_lists
 from viewer.rig.skinning.lbs import blended_matrices
 
 POSITION_TOLERANCE = 1e-5  # relative to the figure's size
-NORMAL_TOLERANCE = 1e-5  # relative to a unit normal, times its shortening by blending
+NORMAL_TOLERANCE = 1e-5  # relative to a unit normal, multiplied by its shortening in blending
 
 
 def posed_mesh(ctx, figure: Figure) -> PosedMesh:
@@ -40,7 +40,7 @@ def release(mesh: PosedMesh) -> None:
 
 
 def shortening(figure: Figure, pose) -> np.ndarray:
-    """Return by how much the blend of each vertex cancels: sum of |w| |M n| over |sum w M n|."""
+    """Return the cancellation in the blend of each vertex: sum of |w| |M n| over |sum w M n|."""
     skin = figure.skin
     palette = skinning_matrices(world_matrices(figure.skeleton, pose), skin.inverse_bind)
     owners = np.repeat(np.arange(skin.n_vertices), np.diff(skin.starts))
@@ -76,7 +76,7 @@ def test_gpu_matches_the_reference_for_the_bundled_figure(ctx):
 
 
 @pytest.mark.parametrize("name", ["wasp", "tube"])
-def test_gpu_matches_the_reference_for_shared_figures(ctx, shared, name):
+def test_gpu_matches_the_reference_for_real_figures(ctx, shared, name):
     scene = viewer.load(shared / f"{name}.skel", shared / f"{name}.skin")
     check(ctx, scene.actors[0].figure, seed=2, n_poses=40)
 
@@ -87,8 +87,8 @@ def test_gpu_matches_the_reference_for_any_number_of_joints(ctx, n_joints):
     check(ctx, figure, seed=3, n_poses=10)
 
 
-def test_every_joint_of_5000_is_found(ctx):
-    """One vertex per joint: a wrong row of the palette's texture would be detected."""
+def test_each_of_5000_joints_is_read_from_its_row(ctx):
+    """Each joint has one vertex, so a wrong row of the palette's texture would be detected."""
     rng = np.random.default_rng(0)
     figure = random_figure(rng, 5_000, 5_000)
     skin = skin_from_lists([[(joint, 1.0)] for joint in range(5_000)], figure.skin.inverse_bind)
@@ -130,14 +130,14 @@ def test_weights_of_both_signs_are_used_as_stored(ctx):
     release(mesh)
 
 
-def test_vertices_without_influence_stay_where_they_were_bound(ctx):
+def test_vertices_without_influence_stay_at_their_bind_position(ctx):
     figure = random_figure(np.random.default_rng(9), 20, empty=0.3)
     check(ctx, figure, seed=9)
     mesh = posed_mesh(ctx, figure)
     mesh.update(random_pose(figure.skeleton, np.random.default_rng(10)))
     still = np.diff(figure.skin.starts) == 0
     assert still.any()
-    # float32 of a figure of size 1: 6e-8 per rounding.
+    # In float32, a figure of size 1 has an error of 6e-8 per rounding.
     np.testing.assert_allclose(
         mesh.read()[0][still], figure.mesh.positions[still], rtol=0, atol=1e-6
     )
@@ -152,14 +152,16 @@ FAR = [
 
 
 @pytest.mark.parametrize(("size", "origin"), FAR)
-def test_far_figures_keep_their_digits(ctx, size, origin):
+def test_figures_far_away_keep_their_precision(ctx, size, origin):
     figure = random_figure(np.random.default_rng(11), 30, size=size, origin=origin)
     check(ctx, figure, seed=11)
 
 
 @pytest.mark.parametrize(("size", "origin"), FAR)
-def test_far_figures_keep_their_digits_when_rotated_about_the_world_origin(ctx, size, origin):
-    """The root stands at the origin, so the whole figure swings around it."""
+def test_figures_far_away_keep_their_precision_when_rotated_about_the_world_origin(
+    ctx, size, origin
+):
+    """The root is at the origin, so the whole figure swings around it."""
     figure = random_figure(np.random.default_rng(12), 30, size=size, origin=origin)
     offsets = figure.skeleton.rest_translations
     parents = figure.skeleton.parents
@@ -183,8 +185,8 @@ def test_far_figures_keep_their_digits_when_rotated_about_the_world_origin(ctx, 
     check(ctx, replace(figure, skeleton=wide, skin=skin), seed=12)
 
 
-def test_rounded_weights_do_not_move_a_far_figure(ctx):
-    """In float32 three weights of 1/3 do not sum to 1; 10,000 units away that must not show."""
+def test_rounded_weights_do_not_move_figures_far_away(ctx):
+    """In float32 three weights of 1/3 do not sum to 1, which must not show 10,000 units away."""
     rng = np.random.default_rng(13)
     figure = random_figure(rng, 30, n_vertices=200, size=0.017, origin=(0.0, 10_000.0, 0.0))
     pairs = [[(int(joint), 1.0 / 7) for joint in rng.integers(0, 30, 7)] for _ in range(200)]
@@ -208,7 +210,7 @@ def test_bind_pose_is_the_stored_mesh(ctx):
     release(mesh)
 
 
-def test_a_mesh_without_a_skin_is_drawn_as_stored(ctx):
+def test_mesh_without_a_skin_is_drawn_as_stored(ctx):
     figure = Figure("square", square())
     mesh = posed_mesh(ctx, figure)
     mesh.update(None)
@@ -216,7 +218,7 @@ def test_a_mesh_without_a_skin_is_drawn_as_stored(ctx):
     release(mesh)
 
 
-def test_a_normal_of_length_zero_stays_zero(ctx):
+def test_normal_of_length_zero_stays_zero(ctx):
     figure = arm(2)
     normals = figure.mesh.normals.copy()
     normals[5] = 0.0
@@ -228,7 +230,7 @@ def test_a_normal_of_length_zero_stays_zero(ctx):
 
 
 class Drawing:
-    """A renderer with its target and everything a draw needs; changes are made in between."""
+    """A renderer with target and arguments of a draw, which tests change between draws."""
 
     def __init__(self, ctx, *figures: Figure) -> None:
         self.scene = Scene([Actor(figure) for figure in figures])
@@ -238,7 +240,7 @@ class Drawing:
         self.draw()
 
     def draw(self) -> int:
-        """Draw, and return how often the first actor has been skinned so far."""
+        """Draw; return the number of times the first actor has been skinned so far."""
         self.renderer.draw(self.scene, self.camera, self.options, self.target, self.box)
         return self.renderer.posed_mesh(self.scene.actors[0]).n_updates
 
@@ -255,14 +257,14 @@ def drawing(ctx):
     result.release()
 
 
-def test_a_camera_that_moves_skins_nothing(drawing):
+def test_moving_the_camera_skins_no_actor(drawing):
     before = drawing.draw()
     for _ in range(5):
         orbit(drawing.camera, 20.0, 3.0)
         assert drawing.draw() == before
 
 
-def test_display_options_skin_nothing(drawing):
+def test_changing_display_options_skins_no_actor(drawing):
     before = drawing.draw()
     for change in (
         {"wireframe": True},
@@ -278,14 +280,14 @@ def test_display_options_skin_nothing(drawing):
         assert drawing.draw() == before
 
 
-def test_a_changed_pose_is_skinned_once(drawing):
+def test_changed_pose_is_skinned_once(drawing):
     before = drawing.draw()
     drawing.scene.actors[0].pose.dofs[4] = 0.5
     assert drawing.draw() == before + 1
     assert drawing.draw() == before + 1
 
 
-def test_every_part_of_a_pose_counts_as_a_change(drawing):
+def test_change_of_any_part_of_a_pose_is_skinned(drawing):
     pose = drawing.scene.actors[0].pose
     before = drawing.draw()
     for array, value in (
@@ -299,13 +301,13 @@ def test_every_part_of_a_pose_counts_as_a_change(drawing):
         assert drawing.draw() == before
 
 
-def test_placement_skins_nothing(drawing):
+def test_changing_the_placement_skins_no_actor(drawing):
     before = drawing.draw()
     drawing.scene.actors[0].placement[0, 3] = 1.0
     assert drawing.draw() == before
 
 
-def test_bind_pose_is_skinned_once_and_left_again(drawing):
+def test_bind_pose_is_skinned_once_and_can_be_left(drawing):
     before = drawing.draw()
     drawing.options = DisplayOptions(show="binding")
     assert drawing.draw() == before + 1
@@ -317,7 +319,7 @@ def test_bind_pose_is_skinned_once_and_left_again(drawing):
 
 @pytest.fixture
 def uploads(monkeypatch):
-    """Bytes uploaded to the GPU, by kind."""
+    """The number of bytes uploaded to the GPU, by kind."""
     sent: list[tuple[str, int]] = []
 
     def count(owner, name, kind):
@@ -343,16 +345,16 @@ def uploads(monkeypatch):
     return sent
 
 
-def test_a_changed_pose_sends_one_palette_and_no_vertex(drawing, uploads):
+def test_changed_pose_uploads_one_palette_and_no_vertices(drawing, uploads):
     drawing.draw()
     uploads.clear()
     drawing.scene.actors[0].pose.dofs[4] = 0.5
     drawing.draw()
-    # One row of 256 matrices of three float32 texels of four: the size of a palette of 3 joints.
+    # A palette of 3 joints is one row of 256 matrices of three texels with four floats.
     assert uploads == [("texture", 256 * 3 * 4 * 4)]
 
 
-def test_a_camera_that_moves_sends_nothing(drawing, uploads):
+def test_moving_the_camera_uploads_no_data(drawing, uploads):
     drawing.draw()  # the second image of a size stores its background
     uploads.clear()
     orbit(drawing.camera, 30.0, 5.0)
@@ -360,7 +362,7 @@ def test_a_camera_that_moves_sends_nothing(drawing, uploads):
     assert uploads == []
 
 
-def test_actors_of_one_figure_share_its_mesh_but_not_its_pose(ctx):
+def test_actors_of_one_figure_share_its_mesh_but_not_their_poses(ctx):
     figure = arm(3)
     drawing = Drawing(ctx, figure, figure)
     first, second = (drawing.renderer.posed_mesh(actor) for actor in drawing.scene.actors)

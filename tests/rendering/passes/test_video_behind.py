@@ -1,4 +1,4 @@
-"""A video behind the scene, seen through a moving camera: its markers cover the scene's points."""
+"""A video behind the scene, seen through a moving camera, with markers at the scene's points."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BOX = np.array([[-1.0, -1.0, -1.0], [1.0, 1.0, 1.0]])
 
 @pytest.fixture(scope="module")
 def path(tmp_path_factory):
-    """A video of the camera with a white disc where each point is, on black."""
+    """Write a black video of the camera with a white disc at each point."""
     path, view = tmp_path_factory.mktemp("video") / "film.mp4", moving_camera()
     sink = VideoSink(path, SIZE, RATE, quality=100.0)
     y, x = np.mgrid[: SIZE[1], : SIZE[0]]
@@ -64,13 +64,13 @@ def test_points_are_drawn_over_their_markers_in_the_video(path, offscreen, frame
     options = DisplayOptions(grid=False, image_brightness=1.0, quality="draft", samples=1)
     drawn = offscreen.render(scene, SIZE, camera, options, BOX)[..., :3].astype(int)
     image = scene.images.at("video", scene.time).pixels[..., :3].astype(int)
-    # Exactly the frame of that time is behind; only the pixels of the points differ.
+    # The background is exactly the frame of that time; only the pixels of the points differ.
     y, x = np.nonzero(np.abs(drawn - image).max(axis=2) > 25)
-    assert image[y, x].min() > 200  # all of them over a white disc
+    assert image[y, x].min() > 200  # all are over a white disc
     expected = np.array([pixel(scene.views[0], frame, place) for place in PLACES])
     nearest = np.hypot(*(np.stack([x, y], axis=1) - expected[:, None]).T).argmin(axis=1)
     for point in (0, 1):
         of_point = nearest == point
         assert of_point.any()
         found = [x[of_point].mean(), y[of_point].mean()]
-        np.testing.assert_allclose(found, expected[point], atol=0.8)  # a few whole pixels
+        np.testing.assert_allclose(found, expected[point], atol=0.8)  # a few full pixels

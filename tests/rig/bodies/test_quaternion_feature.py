@@ -1,4 +1,4 @@
-"""Features of STAR and SUPR: quaternions of joints, against half-angle formulas."""
+"""Quaternion features of STAR and SUPR, compared with half-angle formulas."""
 
 import numpy as np
 import pytest
@@ -35,13 +35,13 @@ def test_weights_are_half_angle_sines_and_cosines():
     assert len(root) == QuaternionFeature(3, has_root=True).n_weights == 12
 
 
-def test_rest_has_no_weights_and_missing_shapes_count_as_zero():
+def test_rest_pose_has_zero_weights_and_missing_shapes_are_zero():
     bones = chain()
     found = QuaternionFeature(3, has_root=False, shape=1).weights(bones, rest_pose(bones))
     assert_allclose(found, np.zeros(9), atol=ROUNDING)
 
 
-def test_correctives_of_a_feature_move_the_rest_mesh():
+def test_feature_correctives_move_the_rest_mesh():
     bones = chain()
     offsets = np.zeros((9, 3, 3))
     offsets[1, 0] = 1.0, 2.0, 3.0  # sine of the second joint about y
@@ -60,6 +60,6 @@ def test_correctives_of_a_feature_move_the_rest_mesh():
     assert_allclose(moved, [[0.5, 1.0, 1.5], [0, 0, 0], [0, 0, 10]], atol=ROUNDING)
 
 
-def test_correctives_need_a_row_for_each_weight_of_their_feature():
+def test_correctives_without_a_row_per_feature_weight_are_refused():
     with pytest.raises(RigError, match=r"\(8, 3, 3\)"):
         Correctives(np.zeros((9, 3, 3)), QuaternionFeature(3, has_root=False))

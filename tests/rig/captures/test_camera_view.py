@@ -24,20 +24,20 @@ def moving(rows: list[int]) -> CameraView:
     return CameraView("video", np.eye(3), ROTATIONS[0], translations[0], motion=motion)
 
 
-def test_a_fixed_camera_is_the_same_at_all_times() -> None:
+def test_fixed_camera_is_the_same_at_all_times() -> None:
     view = CameraView("1", np.eye(3), np.eye(3), np.zeros(3))
     assert view_at(view, 5.0) is view
 
 
 @pytest.mark.parametrize(("seconds", "row"), [(0.0, 0), (0.1, 1), (-3.0, 0), (9.0, 1)])
-def test_a_moving_camera_stands_where_its_frame_says(seconds: float, row: int) -> None:
+def test_moving_camera_has_the_placement_of_its_frame(seconds: float, row: int) -> None:
     view = view_at(moving([0, 1]), seconds)
     assert_allclose(view.rotation, ROTATIONS[row], atol=1e-12)
     assert_allclose(-view.rotation.T @ view.translation, CENTERS[row], atol=1e-12)
 
 
 @pytest.mark.parametrize(("rows", "seconds"), [([0, 1], 0.05), ([0, -1, 1], 0.1)])
-def test_halfway_between_frames_it_is_rotated_by_half_and_its_centre_is_the_mean(
+def test_halfway_between_frames_rotation_and_centre_are_interpolated(
     rows: list[int], seconds: float
 ) -> None:
     view = view_at(moving(rows), seconds)
@@ -46,7 +46,7 @@ def test_halfway_between_frames_it_is_rotated_by_half_and_its_centre_is_the_mean
     assert view.motion is None
 
 
-def test_a_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
+def test_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
     placement = np.eye(4)
     placement[:3, :3] = axis_rotations(0, np.array(np.pi)) @ axis_rotations(2, np.array(0.3))
     placement[:3, 3] = 4.0, -1.0, 2.5
@@ -61,7 +61,7 @@ def test_a_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
     assert_allclose(after.rotation, view_at(after, 0.0).rotation)
 
 
-def test_times_of_a_motion_skip_gaps_and_include_both_ends() -> None:
+def test_motion_times_skip_gaps_and_include_both_ends() -> None:
     assert_allclose(motion_times(moving([-1, 0, -1, 1]), 5), [0.1, 0.3])
     rotations = np.tile(np.eye(3), (11, 1, 1))
     motion = CameraMotion(Timing(10.0, np.arange(11)), rotations, np.zeros((11, 3)))

@@ -1,4 +1,4 @@
-"""Keypoints against fitted bodies: assignment of bodies, and distances computed by hand."""
+"""Distances of keypoints to fitted bodies, computed by hand, and assignment of the bodies."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from viewer.rig.skeleton import ball_skeleton
 
 
 def pointed(person):
-    """Return keypoints of body25 at (1, 2, 3), of which only right elbow and nose are seen."""
+    """Return keypoints of body25 at (1, 2, 3), of which only right elbow and nose are detected."""
     layout = keypoint_layout(25)
     points = np.zeros((25, 4))
     points[:, :3] = 1.0, 2.0, 3.0
@@ -36,20 +36,21 @@ def test_body_of_the_same_person_is_matched():
 
 
 @pytest.mark.parametrize("person", [None, -1, -2])
-def test_untracked_keypoints_have_no_body(person):
+def test_untracked_keypoints_match_no_body(person):
     assert fitted_body(pointed(person), [body(person)]) is None
 
 
-def test_skeleton_alone_is_not_a_body():
+def test_skeleton_without_a_mesh_is_not_a_body():
     assert (
         fitted_body(pointed(1), [Actor(Figure("bones", skeleton=skeleton((-1,))), person=1)])
         is None
     )
 
 
-def test_distances_cover_only_seen_keypoints():
+def test_distances_cover_only_detected_keypoints():
     seen, fitted = pointed(1), body(1)
-    fitted.placement[:3, 3] = 0.0, 0.0, -1.0  # the elbow is then at (1, 2, -1), 4 from the point
+    # The elbow is at (1, 2, -1), at distance 4 from the point.
+    fitted.placement[:3, 3] = 0.0, 0.0, -1.0
     found = keypoint_distances(seen, fitted)
     assert list(found) == ["right_elbow"]
     assert_allclose(found["right_elbow"], 4.0, atol=1e-12)

@@ -14,7 +14,7 @@ from viewer.rig.smpl_family import FAMILY
 
 
 def limbs(layout):
-    """Return limbs by the names of their ends."""
+    """Return the limbs as pairs of keypoint names."""
     return {(layout.names[a], layout.names[b]) for a, b in layout.limbs.tolist()}
 
 
@@ -38,14 +38,14 @@ def limbs(layout):
         (543, "mediapipe_total", 35 + 40),
     ],
 )
-def test_count_determines_the_layout(count, title, n_limbs):
+def test_number_of_keypoints_determines_the_layout(count, title, n_limbs):
     layout = keypoint_layout(count)
     assert (layout.title, len(layout.names), len(layout.limbs)) == (title, count, n_limbs)
     assert len(set(layout.names)) == count
 
 
 @pytest.mark.parametrize("title", [title for titles in TITLES.values() for title in titles])
-def test_sides_match_the_names_and_mirror(title):
+def test_sides_match_the_names_and_mirror_each_other(title):
     count = next(count for count, titles in TITLES.items() if title in titles)
     layout = keypoint_layout(count, title)
     for name, side in zip(layout.names, layout.sides.tolist(), strict=True):
@@ -64,7 +64,7 @@ def test_sides_match_the_names_and_mirror(title):
         )
 
     found = {frozenset(pair) for pair in limbs(layout)}
-    # Lines of the face start somewhere.
+    # Polylines of the face start on one side, so they are not symmetric.
     if not title.startswith("face") and count not in (118, 137):
         assert {mirrored(pair) for pair in limbs(layout)} == found
 
@@ -102,7 +102,7 @@ def test_fingers_attach_to_the_wrists_of_the_body():
     assert ("left_ring3", "left_ring_tip") in limbs(layout)
 
 
-def test_face_without_contour_omits_the_contour_only():
+def test_face_without_contour_omits_only_the_contour():
     whole, part = keypoint_layout(70), keypoint_layout(51)
     assert part.names == whole.names[17:68]
     kept = whole.limbs[(whole.limbs >= 17).all(axis=1)] - 17
@@ -111,7 +111,7 @@ def test_face_without_contour_omits_the_contour_only():
     assert whole.names[68:] == ("right_pupil", "left_pupil")
 
 
-def test_other_counts_have_no_limbs():
+def test_unknown_counts_have_no_limbs():
     layout = keypoint_layout(7)
     assert (layout.title, layout.names[6], len(layout.limbs)) == ("points", "point6", 0)
 
@@ -123,7 +123,7 @@ def test_other_counts_have_no_limbs():
         ("dog", "keypoints: expected one of body25, body15, body19, panoptic, coco, h36m, "),
     ],
 )
-def test_wrong_names_are_refused(title, message):
+def test_layouts_of_another_size_or_unknown_name_are_refused(title, message):
     with pytest.raises(RigError) as caught:
         keypoint_layout(25, title)
     assert str(caught.value).startswith(message)
@@ -138,9 +138,9 @@ def test_equivalent_joints_are_matched():
     }  # fmt: skip
 
 
-def test_finger_joints_match_by_number_though_the_order_differs():
+def test_finger_joints_match_by_number_in_spite_of_a_different_order():
     matches = matching_joints(keypoint_layout(67))
-    # Ring before pinky in keypoints; the second point of the wrist and the tips are not joints.
+    # In keypoints, ring precedes pinky; the second point of the wrist and the tips are not joints.
     assert (matches[25 + 1], matches[25 + 13], matches[25 + 17]) == (
         "left_thumb1", "left_ring1", "left_pinky1",
     )  # fmt: skip
@@ -149,12 +149,12 @@ def test_finger_joints_match_by_number_though_the_order_differs():
     assert len(matches) == 14 + 30
 
 
-def test_layouts_of_the_family_match_themselves():
+def test_joint_layouts_of_the_smpl_family_match_themselves():
     for count in (24, 52, 55):
         assert matching_joints(keypoint_layout(count)) == dict(enumerate(FAMILY[count].names))
 
 
-def test_joined_layouts_keep_the_order():
+def test_joint_layouts_keep_their_order_when_joined():
     hands = keypoint_layout(42)
     layout = joined_layout("both", [keypoint_layout(7), hands])
     assert layout.names[7:] == hands.names

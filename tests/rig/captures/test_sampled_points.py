@@ -1,4 +1,4 @@
-"""Captured points at a fixed rate: frames, gaps, and worlds that are upside down."""
+"""Captured points at a fixed rate: frames, gaps, and upside-down worlds."""
 
 import numpy as np
 import pytest
@@ -44,13 +44,14 @@ def test_frames_are_returned_as_captured():
     assert_array_equal(animation.points, expected)
 
 
-def test_range_and_bridged_gaps():
+def test_range_is_cut_and_gaps_are_interpolated():
     animation, _ = sample_upright_points(*scene_of(), frames=(1, 3), interpolate=True)
     assert (animation.first_frame, animation.present.tolist()) == (8, [True, True])
-    assert_array_equal(animation.points[0], [[2, 2, 3], [NAN] * 3])  # b is seen in one of the two
+    # Point b is detected in only one of the adjacent frames.
+    assert_array_equal(animation.points[0], [[2, 2, 3], [NAN] * 3])
 
 
-def test_another_rate_counts_from_zero():
+def test_frames_at_another_rate_are_numbered_from_zero():
     animation, _ = sample_upright_points(*scene_of(rows=(0, 1)), rate=20.0)
     assert (animation.first_frame, animation.frame_rate) == (0, 20.0)
     assert animation.points[:, 0, 0].tolist() == [1.0, 2.0, 3.0]
@@ -62,7 +63,7 @@ def test_upside_down_world_is_rotated_upright():
     assert_array_equal(animation.points[2], [[3, -2, -3], [4, -5, -6]])
 
 
-def test_placement_between_axes_is_left_out():
+def test_rotation_between_up_axes_is_left_out():
     quarter = rotation_transform(0, -np.pi / 2)  # z in the capture is y in the scene
     animation, up = sample_upright_points(*scene_of("y", placement=quarter))
     assert up == "z"

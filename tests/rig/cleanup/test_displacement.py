@@ -1,4 +1,4 @@
-"""Displacement of joints and points by known motions."""
+"""Displacement of joints and points between known motions."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ POLE = Figure(
         dof_limits=np.zeros((0, 2)),
     ),
 )
-"""Two joints, the second one 2 above the first."""
+"""Two joints, the second at height 2 above the first."""
 
 
 def _clip(angle: float, rows) -> SampledClip:
@@ -38,7 +38,7 @@ def _clip(angle: float, rows) -> SampledClip:
     )
 
 
-def test_a_rotation_of_the_root_moves_the_joint_above_it_along_its_chord():
+def test_root_rotation_displaces_the_joint_above_by_the_chord():
     # The joint at height 2 moves along the chord 4 sin(angle / 2) in one of three frames.
     still, bent = _clip(0.0, [0, 1, 2]), _clip(0.6, [0, 1, 2])
     found = joint_displacement(POLE, still, bent)
@@ -47,13 +47,13 @@ def test_a_rotation_of_the_root_moves_the_joint_above_it_along_its_chord():
     assert np.isclose(found.mean, chord / 6.0) and found.n_frames == 3
 
 
-def test_frames_missing_from_either_motion_do_not_count():
+def test_frames_missing_in_either_motion_are_ignored():
     still, bent = _clip(0.0, [0, 1, 2]), _clip(0.6, [0, -1, 2])
     found = joint_displacement(POLE, still, bent)
     assert found.largest == 0.0 and found.n_frames == 2
 
 
-def test_points_count_only_while_visible_in_both():
+def test_points_are_compared_only_if_visible_in_both_motions():
     points = np.ones((3, 2, 4))
     moved = points.copy()
     moved[1, 0, 0] += 3.0

@@ -1,4 +1,4 @@
-"""Contacts of feet, legs that reach a target, and feet that are held."""
+"""Foot contacts, legs that reach a target, and feet held in place."""
 
 from __future__ import annotations
 
@@ -35,33 +35,33 @@ def places(clip) -> np.ndarray:
 
 
 @pytest.mark.parametrize("target", [(0, 0, 0), (0.1, 0.05, 0.2), (-0.2, 0.3, -0.1), (0, 0.01, 0)])
-def test_the_ankle_is_at_its_target_and_bones_keep_their_lengths(target) -> None:
+def test_ankle_reaches_its_target_and_bones_keep_their_lengths(target) -> None:
     knee, ankle = bent(target)
     assert_allclose(ankle, target, atol=1e-12)
     assert np.linalg.norm(knee - HIP) == pytest.approx(np.linalg.norm(KNEE - HIP), abs=1e-12)
     if target == (0, 0, 0):
         assert_allclose(knee, KNEE[0], atol=1e-12)
     if target[0] == 0:
-        assert abs(knee[0]) < 1e-12  # the leg stays in its plane
+        assert abs(knee[0]) < 1e-12  # the knee stays in the plane of the leg
 
 
-def test_a_target_out_of_reach_is_approached() -> None:
+def test_leg_points_at_a_target_out_of_reach() -> None:
     _, ankle = bent((0.0, -1.0, 0.0))
     away = ankle - HIP[0]
     assert_allclose(away / np.linalg.norm(away), [0.0, -1.0, 0.0], atol=1e-9)
     assert np.linalg.norm(away) == pytest.approx(reach(HIP, KNEE, ANKLE)[0], abs=1e-9)
 
 
-def test_a_straight_leg_bends_its_knee_forwards() -> None:
+def test_straight_leg_bends_its_knee_forwards() -> None:
     hip, knee, ankle = (np.array([[0.0, y, 0.0]]) for y in (0.9, 0.5, 0.1))
     # The axis from right to left is +x, forwards is +z.
     thigh, _ = bend(hip, knee, ankle, np.array([[0.0, 0.3, 0.0]]), SIDE)
     moved = hip + (knee - hip) @ quaternion_to_matrix(thigh)[0].T
-    # Two sides of 0.4 over a base of 0.6.
+    # The triangle has two sides of 0.4 and a base of 0.6.
     assert_allclose(moved, [[0.0, 0.6, np.sqrt(0.4**2 - 0.3**2)]], atol=1e-9)
 
 
-def test_contacts_are_low_and_slow_with_hysteresis() -> None:
+def test_contacts_start_and_end_with_hysteresis_of_height_and_speed() -> None:
     step = np.zeros((FRAMES, 3))
     step[20:30, 1] = 0.1
     assert contacts(step, THERE, RATE, 1.0, 1).tolist() == [not 20 <= k < 30 for k in range(60)]
@@ -72,7 +72,7 @@ def test_contacts_are_low_and_slow_with_hysteresis() -> None:
     assert not contacts(step, THERE, RATE, 1.0, 1).any()
 
 
-def test_contacts_end_at_gaps_and_are_not_shorter_than_a_tenth_of_a_second() -> None:
+def test_contacts_end_at_gaps_and_last_at_least_a_tenth_of_a_second() -> None:
     there = THERE.copy()
     there[[10, 13]] = False
     found = contacts(np.zeros((FRAMES, 3)), there, RATE, 1.0, 1)
@@ -84,7 +84,7 @@ def test_legs_are_found_by_name() -> None:
 
 
 @pytest.mark.parametrize("up_down", [1.0, -1.0])
-def test_a_sliding_body_keeps_its_feet_and_is_lowered_where_legs_are_too_short(up_down) -> None:
+def test_sliding_body_keeps_its_feet_and_is_lowered_if_its_legs_are_too_short(up_down) -> None:
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 0.2 * np.linspace(-0.5, 0.5, FRAMES)  # 0.1 m/s
     clip = standing(FIGURE, translations=moved)
@@ -98,14 +98,14 @@ def test_a_sliding_body_keeps_its_feet_and_is_lowered_where_legs_are_too_short(u
     for ankle in (3, 6):
         assert_allclose(after[:, ankle], np.tile(before[:, ankle].mean(axis=0), (60, 1)), atol=1e-9)
     assert lock.after < 1e-9
-    # At the ends, the ankles are 0.1 behind legs of 0.8.
+    # At the first and last frame, the ankles are 0.1 behind the hips; the legs are 0.8 long.
     needed = 0.8 - np.sqrt((0.9999 * 0.8) ** 2 - 0.1**2)
     assert needed <= lock.lowered < needed + 1e-6
     lowest = before[:, 0, 1] - up_down * lock.lowered
     assert (up_down * (after[:, 0, 1] - lowest) > -1e-9).all()
 
 
-def test_feet_keep_their_orientation_and_other_joints_their_rotations() -> None:
+def test_feet_keep_their_orientation_and_root_its_rotation() -> None:
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 0.002 * np.arange(FRAMES)
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (FRAMES, 7, 1))
@@ -121,7 +121,7 @@ def test_feet_keep_their_orientation_and_other_joints_their_rotations() -> None:
     assert lock.lowered == 0.0 and lock.after < 1e-9 < lock.before
 
 
-def test_feet_in_the_air_are_left_alone() -> None:
+def test_feet_in_the_air_are_unchanged() -> None:
     moved = np.zeros((FRAMES, 7, 3))
     moved[:, 0, 2] = 3.0 * np.arange(FRAMES) / RATE
     clip = standing(FIGURE, translations=moved)
@@ -139,6 +139,6 @@ def test_corrections_fade_after_the_contact() -> None:
     clip = standing(FIGURE, translations=moved)
     found, _ = lock_feet(FIGURE, clip, 1)
     shift = places(found)[:, 3, 2] - places(clip)[:, 3, 2]
-    assert abs(shift[30]) > 0.02  # held up to here
+    assert abs(shift[30]) > 0.02  # the foot is held up to this frame
     assert_allclose(shift[45:], 0.0, atol=1e-9)
-    assert np.abs(np.diff(shift[32:])).max() < 0.02  # no jump on the way
+    assert np.abs(np.diff(shift[32:])).max() < 0.02  # no jump while the correction fades

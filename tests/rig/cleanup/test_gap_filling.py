@@ -1,4 +1,4 @@
-"""Interpolation of gaps: closed forms, limits, keypoints."""
+"""Interpolation of gaps: closed forms, length limits, and keypoints."""
 
 import numpy as np
 from numpy.testing import assert_allclose
@@ -8,7 +8,7 @@ from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.gap_filling import Gaps, inner_gaps, interpolate_gaps
 
 
-def test_a_uniform_rotation_is_completed_exactly():
+def test_uniform_rotation_is_interpolated_exactly():
     rows = [-1, 0, 1, -1, -1, 2, -1, 3, -1]
     places = np.array([[1.0], [2], [5], [7]]) * [1.0, 0.0, -2.0]
     clip = turning(0.3 * np.array([1, 2, 5, 7]), rows=rows, places=places)
@@ -21,7 +21,7 @@ def test_a_uniform_rotation_is_completed_exactly():
     assert_allclose(found.figure_translations[inner, 2], -2.0 * np.arange(1, 8), atol=1e-12)
 
 
-def test_longer_gaps_stay():
+def test_gaps_above_the_length_limit_are_not_interpolated():
     clip = turning(np.arange(3.0), rows=[0, -1, -1, -1, 1, -1, 2])
     found, gaps = interpolate_gaps(clip, longest=2)
     assert gaps == Gaps(((5, 6),), ((1, 4),))
@@ -29,7 +29,7 @@ def test_longer_gaps_stay():
     assert inner_gaps(interpolate_gaps(clip, longest=3)[0]) == []
 
 
-def test_points_seen_on_both_sides_are_interpolated_and_others_stay_unseen():
+def test_only_points_detected_on_both_sides_are_interpolated():
     points = np.zeros((2, 2, 4))
     points[0, :, 0], points[1, :, 0] = 1.0, 4.0
     points[:, 0, 3] = 0.8
@@ -40,6 +40,6 @@ def test_points_seen_on_both_sides_are_interpolated_and_others_stay_unseen():
     assert_allclose(found.points[found.timing.rows[1:3], 1, 3], 0.0)
 
 
-def test_a_clip_without_gaps_is_returned_as_it_is():
+def test_clip_without_gaps_is_returned_unchanged():
     clip = turning(np.zeros(4))
     assert interpolate_gaps(clip)[0] is clip

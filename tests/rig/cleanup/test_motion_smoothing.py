@@ -1,4 +1,4 @@
-"""Filters against their closed forms: constants, uniform rotation, sines, gaps."""
+"""Filters compared with closed forms: constants, uniform rotation, sines, and gaps."""
 
 from dataclasses import replace
 
@@ -27,14 +27,14 @@ def test_constant_motion_is_unchanged(chosen):
 
 @pytest.mark.parametrize("chosen", FILTERS[1:], ids=str)
 def test_savgol_keeps_uniform_rotation_about_any_axis_through_many_revolutions(chosen):
-    # 0.9 radians per frame: 3 revolutions, and quaternions change their sign on the way.
+    # 0.9 radians per frame give 3 revolutions, in which the quaternions change their sign.
     clip = turning(0.9 * np.arange(21), axis=(1, -2, 0.5))
     found = smoothed(clip, chosen)
     same = np.abs(np.einsum("nja,nja->nj", found.rotations, clip.rotations))
     assert_allclose(same, 1.0, atol=EXACT)
 
 
-def test_savgol_keeps_a_parabola_of_positions_at_the_ends_too():
+def test_savgol_keeps_a_parabola_of_positions_also_at_the_ends():
     t = np.arange(25.0)
     places = np.stack([t**2, 3.0 - t, 0.1 * t**2 - t], axis=1)
     found = smoothed(turning(0.0 * t, places=places), SavitzkyGolay(window=7, order=2))
@@ -58,7 +58,7 @@ def test_one_euro_without_beta_attenuates_a_sine_by_its_transfer_function_withou
     wave = 0.3 * np.sin(w * n)
     places = np.stack([wave, 0.0 * wave, -wave], axis=1)
     found = smoothed(turning(wave, places=places), OneEuro(cutoff=cutoff, beta=0.0))
-    middle = slice(60, 140)  # the ends, where the filter settles, are (1 - a)^60 = 1e-9 away
+    middle = slice(60, 140)  # 60 frames from the ends, the filter has settled to (1 - a)^60 = 1e-9
     assert_allclose(angles_of(found)[middle], factor * wave[middle], atol=1e-8)
     assert_allclose(found.figure_translations[middle], factor * places[middle], atol=1e-8)
 
@@ -70,7 +70,7 @@ def test_one_euro_keeps_uniform_motion_up_to_its_ends(chosen, count):
     n = np.arange(float(count))
     clip = turning(0.2 * n, axis=(1, 2, -1), places=np.outer(n, [0.1, -0.2, 0.3]))
     found = smoothed(clip, chosen)
-    lag = 1e-3  # frames; a pass has settled to 1e-4
+    lag = 1e-3  # in frames; a pass settles to 1e-4
     assert_allclose(found.figure_translations, clip.figure_translations, atol=0.3 * lag)
     same = np.abs(np.einsum("nja,nja->nj", found.rotations, clip.rotations))
     assert (2.0 * np.arccos(np.minimum(same, 1.0)) < 0.2 * lag).all()
@@ -86,7 +86,7 @@ def test_one_euro_follows_fast_motion_more_closely():
     assert errors[0] > errors[1] > errors[2]
 
 
-def test_speed_of_positions_counts_in_metres():
+def test_speed_of_positions_is_measured_in_metres():
     t = np.arange(30.0)
     places = np.stack([np.where(t < 15, 0.0, 1.0), t, 0 * t], axis=1)
     metres = smoothed(turning(0 * t, places=places), OneEuro())
@@ -106,7 +106,7 @@ def test_filters_do_not_depend_on_signs_of_quaternions(chosen):
 
 
 @pytest.mark.parametrize("chosen", FILTERS, ids=str)
-def test_a_rotated_world_gives_the_rotated_result(chosen):
+def test_rotating_the_world_rotates_the_result(chosen):
     rng = np.random.default_rng(1)
     clip = turning(0.3 * rng.normal(size=20), axis=(1, 1, 0))
     turn = rotation_vector_to_quaternion(np.array([0.4, -0.2, 1.0]))
@@ -117,7 +117,7 @@ def test_a_rotated_world_gives_the_rotated_result(chosen):
 
 @pytest.mark.parametrize("chosen", FILTERS, ids=str)
 def test_runs_between_gaps_are_filtered_separately(chosen):
-    # The rows are stored in reverse, and a jump of 2 radians is in the gap.
+    # The rows are stored in reverse order, and the motion jumps by 2 radians in the gap.
     angles = np.concatenate([np.full(8, 2.0), np.full(8, 0.5)])
     rows = np.concatenate([np.arange(15, 7, -1), [-1, -1, -1], np.arange(7, -1, -1)])
     found = smoothed(turning(angles, rows=rows), chosen)
@@ -143,7 +143,7 @@ def test_short_runs_are_unchanged_if_no_polynomial_can_be_fitted(count):
     assert found.n_rows == count
 
 
-def test_a_point_is_filtered_only_while_it_is_visible():
+def test_point_is_filtered_only_while_it_is_visible():
     points = np.zeros((12, 1, 4))
     points[:, 0, 0] = [0] * 6 + [5] * 6
     points[:, 0, 3] = [1] * 5 + [0] * 2 + [1] * 5

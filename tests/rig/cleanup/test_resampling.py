@@ -1,4 +1,4 @@
-"""Resampling and trimming: times, numbers, exact frames, gaps."""
+"""Resampling and trimming: times, frame numbers, exact frames, and gaps."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from viewer.rig.cleanup.resampling import resampled
 from viewer.rig.cleanup.trimming import trimmed
 
 
-def test_original_frames_are_exact_and_new_ones_lie_on_the_arc():
+def test_original_frames_are_exact_and_new_ones_are_on_the_arc():
     rng = np.random.default_rng(2)
     clip = turning(rng.uniform(-1, 1, 7), places=rng.normal(size=(7, 3)))
     found = resampled(clip, 90.0)
@@ -22,25 +22,25 @@ def test_original_frames_are_exact_and_new_ones_lie_on_the_arc():
     assert_allclose(angles_of(found)[1::3], (2 * before + after) / 3, atol=1e-12)
 
 
-def test_a_uniform_rotation_is_exact_at_any_rate():
+def test_uniform_rotation_is_exact_at_any_rate():
     found = resampled(turning(0.1 * np.arange(31)), 23.976)
     times = np.arange(found.timing.n_frames) / 23.976
     assert found.timing.n_frames == 24  # the last frame is at 23 / 23.976 s, before 1 s
     assert_allclose(angles_of(found), 3.0 * times, atol=1e-12)
 
 
-def test_a_rate_that_gives_millions_of_frames_is_refused():
+def test_rate_that_results_in_millions_of_frames_is_refused():
     with pytest.raises(RigError, match="at most 1,000,000 frames, found 3,000,001"):
         resampled(turning(0.1 * np.arange(91)), 1e6)
 
 
-def test_frames_beside_a_gap_are_not_invented():
+def test_no_frames_are_interpolated_in_gaps():
     clip = turning(np.arange(4.0), rows=[0, 1, -1, 2, 3])
     found = resampled(clip, 60.0)
     assert_array_equal(found.timing.present, [1, 1, 1, 0, 0, 0, 1, 1, 1])
 
 
-def test_points_are_interpolated_where_they_are_visible_on_both_sides():
+def test_points_are_interpolated_if_visible_on_both_sides():
     points = np.zeros((3, 1, 4))
     points[:, 0, 0], points[:, 0, 3] = [0, 2, 8], [1, 1, 0]
     clip = PointClip("points", turning(np.zeros(3)).timing, points)

@@ -1,4 +1,4 @@
-"""Hand-made clips of one or two joints, for tests of clean-up."""
+"""Small synthetic clips of one or two joints for tests of clean-up."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ def measures(difference):
     return {measure.name: measure for measure in difference.measures}
 
 
-def test_figure_equals_itself() -> None:
+def test_figure_has_no_differences_from_itself() -> None:
     found = compare(Actor(figure()), Actor(figure()))
     assert found.mismatches == () and found.notes == ()
     assert [(m.name, m.maximum) for m in found.measures] == [
@@ -57,11 +57,11 @@ def test_figure_equals_itself() -> None:
     assert_allclose(found.size, np.sqrt(2.0))
 
 
-def test_moved_joint_is_named_with_its_distance() -> None:
+def test_moved_joint_is_reported_with_its_distance() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
     places = measures(found)["joint positions"]
     assert_allclose(places.maximum, 0.05)
-    assert_allclose(places.mean, 0.025)  # two joints, one in place
+    assert_allclose(places.mean, 0.025)  # two joints, one of which is unchanged
     assert (places.item, places.step) == ("tip", "own pose")
     assert_allclose(places.item_maxima, [0.0, 0.05])
     assert found.exceeds(0.03) and not found.exceeds(0.05 / np.sqrt(2) + 1e-9)
@@ -76,20 +76,20 @@ def test_moved_vertex_is_reported_by_index() -> None:
     assert vertices.item == "vertex 3"
 
 
-def test_weights_differ_by_the_l1_distance_of_rows_however_they_are_listed() -> None:
+def test_weights_differ_by_the_l1_distance_of_rows_in_any_order() -> None:
     # Vertex 0: the same weight split into two entries. Vertex 1: 0.5/0.5 against 0.2/0.8, so 0.6.
     other = [[(0, 0.4), (0, 0.6)], [(1, 0.8), (0, 0.2)], [(1, 1.0)], [(1, 1.0)]]
     found = compare(Actor(figure()), Actor(figure(influences=other)), n_poses=0)
     weights = measures(found)["weights"]
     assert_allclose(weights.item_maxima, [0.0, 0.6, 0.0, 2.0], atol=1e-12)
-    assert (weights.item, weights.step) == ("vertex 3", "")  # they are the same in every pose
+    assert (weights.item, weights.step) == ("vertex 3", "")  # weights are the same in every pose
     assert measures(found)["vertices"].maximum == 0.0  # no difference at rest
 
 
-def test_weights_that_are_the_same_at_rest_show_in_test_poses() -> None:
+def test_weights_without_effect_at_rest_differ_in_test_poses() -> None:
     other = [[(0, 1.0)], [(1, 1.0)], [(1, 1.0)], [(0, 1.0)]]
     vertices = measures(compare(Actor(figure()), Actor(figure(influences=other))))["vertices"]
-    # Vertex 1 is at the joint and stays there; another vertex with different weights moves.
+    # Vertex 1 is at the joint and does not move; another vertex with different weights does.
     assert vertices.maximum < 1e-12
     other = [[(0, 1.0)], [(0, 0.5), (1, 0.5)], [(0, 1.0)], [(0, 1.0)]]
     moved = measures(compare(Actor(figure()), Actor(figure(influences=other)), n_poses=20))
@@ -99,7 +99,9 @@ def test_weights_that_are_the_same_at_rest_show_in_test_poses() -> None:
     assert moved["vertices"].item == "vertex 2"
 
 
-def test_meshes_with_other_triangles_are_compared_by_closest_points_both_ways() -> None:
+def test_meshes_with_different_triangles_are_compared_by_closest_points_in_both_directions() -> (
+    None
+):
     # The same square as four triangles around its centre, raised by 0.1, with interpolated weights.
     positions = np.array([*CORNERS, [0.5, 0.5, 0.0]]) + np.array([0.0, 0.0, 0.1])
     fan = [[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]
@@ -139,7 +141,7 @@ def test_unnamed_joints_are_reported_by_index() -> None:
     assert measures(found)["joint positions"].items == ("base", "joint 1 (no name)")
 
 
-def test_joints_in_another_order_are_reported() -> None:
+def test_joints_in_a_different_order_are_reported() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 0, 0], names=("a", "b", "c", "d")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "d", "b")))
     found = compare(Actor(one), Actor(other))
@@ -148,7 +150,7 @@ def test_joints_in_another_order_are_reported() -> None:
     assert compare(Actor(one), Actor(less)).notes == ()
 
 
-def test_joint_with_another_parent_is_a_mismatch() -> None:
+def test_joint_with_a_different_parent_is_a_mismatch() -> None:
     one = Figure("a", skeleton=skeleton([-1, 0, 1], names=("a", "b", "c")))
     other = Figure("b", skeleton=skeleton([-1, 0, 0], names=("a", "b", "c")))
     found = compare(Actor(one), Actor(other))
@@ -161,7 +163,7 @@ def test_joints_without_common_names_are_compared_by_index() -> None:
     assert told(compare(Actor(one), Actor(other)).notes) == [("D002.joints-by-index", {})]
 
 
-def test_differing_limits_are_reported_with_both() -> None:
+def test_differing_limits_are_reported_with_both_values() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm(low=-0.5))))
     limits = {"low": -1.0, "high": 1.0, "other_low": -0.5, "other_high": 1.0}
     assert told(found.mismatches) == [("D001.limits", {"n": 1, "dof": "tip.z", **limits})]
@@ -182,7 +184,7 @@ def bare() -> Figure:
     )
 
 
-def test_motions_are_compared_frame_by_frame_and_the_worst_is_named() -> None:
+def test_motions_are_compared_frame_by_frame_and_the_worst_frame_is_reported() -> None:
     first = Actor(bare(), clip=walk([0.0, 0.1, 0.2, 0.3]))
     second = Actor(bare(), clip=walk([0.0, 0.1, 0.25, 0.3]))
     found = compare(first, second)
@@ -193,7 +195,7 @@ def test_motions_are_compared_frame_by_frame_and_the_worst_is_named() -> None:
     assert measures(only)["joint positions"].maximum < 1e-12
 
 
-def test_motions_of_other_length_are_a_mismatch_and_the_common_part_is_compared() -> None:
+def test_motions_of_different_length_are_a_mismatch_and_compared_in_the_common_range() -> None:
     found = compare(Actor(bare(), clip=walk([0.0] * 4)), Actor(bare(), clip=walk([0.0] * 6)))
     assert [one.key for one in found.mismatches] == ["D001.durations"]
     assert_allclose([*found.mismatches[0].values.values()], [0.3, 0.5])
@@ -206,7 +208,7 @@ def test_range_without_frames_is_refused() -> None:
         compare(*actors, frames=(9, 12))
 
 
-def test_rotation_distance_is_exact_for_small_and_half_turns() -> None:
+def test_rotation_distance_is_exact_for_small_angles_and_180_degrees() -> None:
     angles = np.array([1e-9, 1e-4, 1.0, np.pi])
     found = rotation_distance(axis_rotations(1, angles), np.eye(3))
     assert_allclose(found, angles, rtol=1e-6)
@@ -218,7 +220,7 @@ def test_nan_is_never_within_a_tolerance() -> None:
     assert replace(found, measures=(broken,)).exceeds(1e9)
 
 
-def test_actors_are_left_in_the_worst_pose_even_if_it_is_their_own() -> None:
+def test_actors_report_the_worst_pose_even_if_it_is_their_own() -> None:
     # The vertex differs equally at rest and rotated, so the first pose is reported as the worst.
     moved = CORNERS.copy()
     moved[0] += [0.0, 0.0, 0.2]

@@ -28,7 +28,7 @@ def figure(*materials: Material, parts=("coat", "hat"), **more) -> Figure:
     return Figure("a", mesh, **more)
 
 
-def test_changed_materials_and_lone_names_are_noted() -> None:
+def test_changed_materials_and_unmatched_names_are_noted() -> None:
     first = figure(Material("skin"), Material("cloth"))
     skin = Material("skin", base_color=(1.0, 0.0, 0.0, 1.0), roughness=0.2)
     second = figure(skin, Material("metal"), parts=("coat", "belt"))
@@ -41,7 +41,7 @@ def test_changed_materials_and_lone_names_are_noted() -> None:
         'material "skin" differs: base color, roughness',
     ]
     assert content_notes(first, first) == []
-    # Formats without materials or parts are no difference.
+    # Missing materials or parts in a format are not a difference.
     assert content_notes(first, figure(parts=())) == []
 
 

@@ -1,4 +1,4 @@
-"""Constraints: joints that follow others, by hand and in all ways of posing."""
+"""Constraints, compared with hand calculations and between all ways of posing."""
 
 from __future__ import annotations
 
@@ -30,13 +30,13 @@ def about(axis: tuple[float, float, float], degrees: float) -> np.ndarray:
 
 
 def skeleton(*constraints: Constraint) -> Skeleton:
-    """Return joint 0, 1 above it, and 2 and 3 on 1, at x and z."""
+    """Return four joints: hips, spine, and on the spine the arm at +x and the twist at +z."""
     names = ("hips", "spine", "arm", "twist")
     return replace(ball_skeleton(names, PARENTS, PLACES), constraints=constraints)
 
 
 def evaluated(rig: Skeleton, **rotations: np.ndarray) -> np.ndarray:
-    """Return the rotation of the last joint when others, by name, have been rotated."""
+    """Return the rotation of the last joint for given rotations of named joints."""
     local = rig.rest_rotations.copy()
     for name, rotation in rotations.items():
         local[rig.names.index(name)] = rotation
@@ -47,7 +47,7 @@ def assert_same_rotation(found: np.ndarray, expected: np.ndarray) -> None:
     assert_allclose(found * np.sign(found @ expected), expected, atol=1e-12)
 
 
-def test_rotation_is_taken_over_from_rest_to_rest() -> None:
+def test_rotation_constraint_copies_the_rotation_relative_to_rest() -> None:
     rig = skeleton(Constraint(3, 2, "rotation", weight=0.5))
     assert_same_rotation(evaluated(rig, arm=about(Z, 90)), about(Z, 45))
     rests = rig.rest_rotations.copy()
@@ -58,7 +58,7 @@ def test_rotation_is_taken_over_from_rest_to_rest() -> None:
     assert_same_rotation(found, multiply(about(Y, 30), about(Z, 40)))
 
 
-def test_roll_is_the_part_of_a_rotation_about_an_axis() -> None:
+def test_roll_constraint_copies_the_rotation_about_an_axis() -> None:
     rig = skeleton(Constraint(3, 2, "roll", X))
     swung = multiply(about(Z, 40), about(X, 60))
     assert_same_rotation(evaluated(rig, arm=swung), about(X, 60))
@@ -70,7 +70,7 @@ def test_roll_is_the_part_of_a_rotation_about_an_axis() -> None:
     assert_same_rotation(found, multiply(about(Y, -90), about(X, 50)))
 
 
-def test_aim_points_an_axis_at_the_source() -> None:
+def test_aim_constraint_points_an_axis_at_the_source() -> None:
     # The twist joint is at (0, 2, 2), the arm at (1, 2, 0).
     rig = skeleton(Constraint(3, 2, "aim", (0.0, 0.0, -1.0)))
     angle = np.degrees(np.arctan2(1.0, 2.0))
@@ -79,13 +79,13 @@ def test_aim_points_an_axis_at_the_source() -> None:
     assert_same_rotation(evaluated(rig, hips=about(Z, 70), spine=about(X, 20)), about(Y, -angle))
     half = skeleton(Constraint(3, 2, "aim", (0.0, 0.0, -1.0), 0.5))
     assert_same_rotation(evaluated(half), about(Y, -angle / 2))
-    # Half a rotation about any axis across.
+    # A half rotation about any perpendicular axis is valid.
     behind = skeleton(Constraint(3, 1, "aim", Z))
     found = evaluated(behind)
     assert_allclose([found[2], found[3]], 0.0, atol=1e-12)
 
 
-def test_poses_frames_and_instances_agree_and_ignore_the_joint_itself() -> None:
+def test_poses_frames_and_instances_agree_and_ignore_own_rotation_of_the_joint() -> None:
     rig = skeleton(Constraint(2, 0, "rotation"), Constraint(3, 2, "aim", Y, 0.7))
     figure, rng = Figure("rig", skeleton=rig), np.random.default_rng(1)
     poses = [rest_pose(rig) for _ in range(3)]
@@ -102,6 +102,6 @@ def test_poses_frames_and_instances_agree_and_ignore_the_joint_itself() -> None:
     clip = SampledClip("walk", Timing(30.0, np.arange(5)), rotations)
     frames = frames_of(figure, clip, np.arange(5) / 30.0)
     assert_same_rotation(frames.rotations[2, 2], rotations[2, 0])
-    # Exporters write the frames' rotations: nothing is left to apply.
+    # Exporters write the rotations of the frames, in which the constraints are already applied.
     bare = world_frames(replace(figure, skeleton=free), frames)
     assert_allclose(world_frames(figure, frames), bare, atol=1e-12)

@@ -1,4 +1,4 @@
-"""Products of rotations about axes, compared with multiplying them one by one."""
+"""Products of rotations about axes, compared with one-by-one multiplication."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from viewer.rig.geometry.closest_point import Surface, SurfacePoints, interpolat
 
 sparse = pytest.importorskip("scipy.sparse")
 
-# Distances are of order 1: rounding of a few operations, and of squares near 0.
+# Distances are of order 1; this allows for rounding of a few operations and of squares near 0.
 ROUNDING = 1e-12
 
 
@@ -95,7 +95,7 @@ def test_closest_treats_zero_area_triangles_as_segments_and_points():
     positions, triangles = soup(rng, 40, 0.05)
     positions[0:3] = positions[0]  # a point
     positions[3:6] = [[0, 0, 0], [1, 1, 0], [0.25, 0.25, 0]]  # a segment
-    positions[6:9] = [[0, 1, 0], [0, 1, 0], [0, 1, 1]]  # a segment with a repeated end
+    positions[6:9] = [[0, 1, 0], [0, 1, 0], [0, 1, 1]]  # a segment with a repeated end point
     check(rng.uniform(-1, 1, (60, 3)), positions, triangles)
 
 
@@ -119,7 +119,7 @@ def test_closest_point_in_each_of_the_seven_regions_of_a_triangle():
     np.testing.assert_allclose(found.barycentric[0], [0.5, 0.25, 0.25], atol=ROUNDING)
 
 
-def test_closest_is_equally_exact_far_from_the_origin():
+def test_closest_is_as_exact_far_from_the_origin():
     rng = np.random.default_rng(4)
     positions, triangles = soup(rng, 50, 0.1)
     points = rng.uniform(-1, 1, (20, 3))
@@ -163,7 +163,7 @@ def test_closest_without_points_is_empty():
         (np.eye(3), [[-1, 1, 2]], "triangles: expected vertex indices 0 to 2, found -1 to 2"),
     ],
 )
-def test_surface_refuses_unsearchable_meshes(positions, triangles, message):
+def test_surface_refuses_meshes_that_cannot_be_searched(positions, triangles, message):
     with pytest.raises(RigError) as caught:
         Surface(positions, np.asarray(triangles))
     assert str(caught.value) == message
@@ -176,7 +176,7 @@ def test_closest_refuses_points_that_are_not_finite():
     assert str(caught.value) == "points: expected finite numbers, found nan at index 0, 1"
 
 
-def test_surface_says_how_to_get_scipy(monkeypatch):
+def test_missing_scipy_is_reported_with_the_install_command(monkeypatch):
     def missing(name):
         raise ModuleNotFoundError(name)
 
@@ -190,9 +190,9 @@ TWO = SurfacePoints([1, 0], [[0.5, 0.25, 0.25], [0, 1, 0]], np.zeros((2, 3)), np
 TRIANGLES = np.array([[0, 1, 2], [2, 1, 3]])
 
 
-def test_interpolate_blends_the_corner_values():
+def test_interpolate_blends_corner_values_by_barycentric_weights():
     values = np.array([[0.0, 1.0], [2.0, 0.0], [4.0, 0.0], [8.0, 4.0]])
-    # 4/2 + 2/4 + 8/4 = 4.5 and 4/4 = 1; then vertex 1 alone.
+    # 4/2 + 2/4 + 8/4 = 4.5 and 4/4 = 1; then only vertex 1.
     assert interpolate(TWO, TRIANGLES, values).tolist() == [[4.5, 1.0], [2.0, 0.0]]
     assert interpolate(TWO, TRIANGLES, values[:, 0]).tolist() == [4.5, 2.0]
     nested = values.reshape(4, 1, 2)

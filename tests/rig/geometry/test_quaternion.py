@@ -1,4 +1,4 @@
-"""Quaternions against rotation matrices and closed forms."""
+"""Quaternions, compared with rotation matrices and closed forms."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def test_product_is_the_product_of_matrices():
         (0, 90, 0.5, 45),
         (0, 90, 0.1, 9),
         (10, 170, 0.25, 50),
-        (0, 200, 0.5, -80),  # the shorter arc goes the other way: 160 degrees back
+        (0, 200, 0.5, -80),  # the shorter arc is 160 degrees in the opposite direction
         (350, 10, 0.5, 360),
         (20, 20 + 1e-7, 0.5, 20 + 5e-8),
         (20, 20, 0.7, 20),
@@ -54,7 +54,7 @@ def test_slerp_takes_the_shorter_arc_at_constant_speed(start, end, fraction, exp
     )
 
 
-def test_slerp_ends_are_the_ends():
+def test_slerp_returns_its_ends_exactly():
     first, second = RANDOM.normal(size=(2, 50, 4))
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     second /= np.linalg.norm(second, axis=1, keepdims=True)
@@ -65,7 +65,7 @@ def test_slerp_ends_are_the_ends():
 
 
 def test_slerp_agrees_with_the_power_of_the_relative_rotation():
-    # Independent: R(u) = R0 exp(u log(R0^T R1)), the angle from the trace.
+    # An independent formula: R(u) = R0 exp(u log(R0^T R1)), with the angle from the trace.
     for _ in range(20):
         a, b = rotation_vector_to_matrix(RANDOM.uniform(-1.2, 1.2, (2, 3)))
         between = a.T @ b

@@ -1,4 +1,4 @@
-"""Rays and surfaces: the nearest triangle is hit, from either side."""
+"""Intersections of rays with triangles, which are hit from either side."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TRIANGLES = np.array([[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6]])
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
-def test_nearest_triangle_is_hit_whichever_way_it_faces():
+def test_nearest_triangle_is_hit_from_either_side():
     hit = first_hit(POSITIONS, TRIANGLES, np.array([0.75, 0.25, 3.0]), DOWN)
     assert (hit.triangle, hit.distance) == (2, 2.0)
     again = first_hit(POSITIONS, TRIANGLES, np.array([0.25, 0.75, -5.0]), -DOWN)
@@ -31,22 +31,22 @@ def test_point_follows_the_vertices():
     assert_allclose(surface_point(moved, TRIANGLES, hit), [1.5, 0.75, 7.0], atol=1e-15)
 
 
-def test_distance_is_in_lengths_of_the_direction():
+def test_distance_is_in_units_of_the_direction_vector():
     slanted = np.array([0.2, 0.2, -0.4])
     hit = first_hit(POSITIONS, TRIANGLES, np.array([0.1, 0.1, 0.8]), slanted)
-    assert hit.distance == pytest.approx(2.0)  # 0.8 down, 0.4 per direction vector
+    assert hit.distance == pytest.approx(2.0)  # a descent of 0.8, at 0.4 per direction vector
 
 
 @pytest.mark.parametrize(
     ("origin", "direction"),
     [
-        ((2.0, 0.5, 3.0), (0.0, 0.0, -1.0)),  # beside
+        ((2.0, 0.5, 3.0), (0.0, 0.0, -1.0)),  # next to the squares
         ((0.5, 0.5, 3.0), (0.0, 0.0, 1.0)),  # behind the eye
         ((-1.0, 0.5, 0.5), (1.0, 0.0, 0.0)),  # between both squares
-        ((-1.0, 0.5, 0.0), (1.0, 0.0, 0.0)),  # within the plane of one
+        ((-1.0, 0.5, 0.0), (1.0, 0.0, 0.0)),  # in the plane of one square
     ],
 )
-def test_triangles_behind_the_ray_are_not_hit(origin, direction):
+def test_rays_next_to_behind_and_between_triangles_have_no_hit(origin, direction):
     assert first_hit(POSITIONS, TRIANGLES, np.array(origin), np.array(direction)) is None
     assert first_hit(POSITIONS, TRIANGLES[:0], np.array(origin), np.array(direction)) is None
 

@@ -28,7 +28,7 @@ def test_axis_rotations_keep_the_batch_shape():
     assert axis_rotations(0, np.zeros(0)).shape == (0, 3, 3)
 
 
-def test_identity_quaternion_gives_the_identity():
+def test_identity_quaternion_is_the_identity_matrix():
     assert quaternion_to_matrix(np.array([0.0, 0, 0, 1])).tolist() == np.eye(3).tolist()
 
 
@@ -39,7 +39,7 @@ def test_quaternion_is_half_the_angle_about_its_axis(axis, plain):
     assert_allclose(quaternion_to_matrix(quaternion), plain(0.7), atol=ROUNDING)
 
 
-def test_quaternion_of_any_length_gives_the_same_rotation():
+def test_length_of_a_quaternion_does_not_change_the_rotation():
     # (1, 2, 3, 4) and ten times it: the same axis and angle.
     one, ten = quaternion_to_matrix(np.array([[1.0, 2, 3, 4], [10, 20, 30, 40]]))
     assert_allclose(one, ten, atol=ROUNDING)

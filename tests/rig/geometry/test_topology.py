@@ -1,4 +1,4 @@
-"""Components and orientation, compared with plain graph traversals."""
+"""Connected components and orientation, compared with simple graph traversals."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ def test_components_match_a_graph_traversal(seed: int) -> None:
     assert components(200, pairs).tolist() == walked(200, pairs)
 
 
-def test_components_of_a_long_chain() -> None:
+def test_long_chain_is_one_component() -> None:
     order = np.random.default_rng(0).permutation(50_000)
     pairs = np.stack([order[:-1], order[1:]], axis=1)
     assert (components(50_000, pairs) == 0).all()
 
 
-def test_components_without_pairs() -> None:
+def test_nodes_without_pairs_are_separate_components() -> None:
     assert components(3, np.zeros((0, 2), np.int64)).tolist() == [0, 1, 2]
 
 
-def test_welding_joins_equal_positions_to_the_first() -> None:
+def test_welding_maps_equal_positions_to_the_first_one() -> None:
     positions = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 0], [1, 0, 1e-12], [1, 0, 0]])
     corners = welded(positions, np.array([[2, 4, 3], [0, 1, 2]], dtype=np.int32))
     assert corners.tolist() == [[0, 1, 3], [0, 1, 0]]

@@ -35,13 +35,13 @@ def bent(figure, elbow=np.pi / 2, shoulder=0.0, twist=0.0):
     return pose
 
 
-def test_every_term_of_linear_blending():
+def test_terms_of_linear_blending_match_hand_calculation():
     figure = arm()
     one = explain(figure, bent(figure), Skinning(), 1)
     assert one.names == ("elbow", "shoulder") and one.joints.tolist() == [1, 0]
     assert one.weights.tolist() == [0.75, 0.25]
-    # The elbow's joint rotates (2, 1, 0) about (2, 0, 0) by 90 degrees, to (1, 0, 0); the
-    # shoulder leaves it where it is.
+    # The elbow rotates (2, 1, 0) about (2, 0, 0) by 90 degrees to (1, 0, 0); the shoulder does not
+    # move it.
     expected = ELBOW @ matrix(turn_z(np.pi / 2)) @ np.linalg.inv(ELBOW)
     assert_allclose(one.matrices, [expected, np.eye(4)], atol=1e-15)
     assert_allclose(one.rest, [2, 1, 0])
@@ -55,12 +55,12 @@ def test_every_term_of_linear_blending():
 def test_matrices_follow_the_parents():
     figure = arm()
     one = explain(figure, bent(figure, 0.0, np.pi / 2), Skinning(), 0)
-    # The whole arm points up: (3, 0, 0) goes to (0, 3, 0).
+    # The whole arm points up, so (3, 0, 0) moves to (0, 3, 0).
     assert_allclose(one.matrices, [matrix(turn_z(np.pi / 2))], atol=1e-15)
     assert_allclose(one.position, [0, 3, 0], atol=1e-15)
 
 
-def test_every_term_of_dual_quaternions():
+def test_terms_of_dual_quaternions_match_hand_calculation():
     figure = arm()
     one = explain(figure, bent(figure), Skinning("dqs"), 1)
     dual, half = one.dual, np.pi / 4
@@ -74,7 +74,7 @@ def test_every_term_of_dual_quaternions():
     blended = 0.75 * dual.duals[0] + 0.25 * dual.duals[1]
     assert_allclose(dual.blended, blended, atol=1e-15)
     assert dual.length == pytest.approx(np.hypot(0.75 * s, 0.75 * c + 0.25))
-    # The motions of all joints fix (2, 0, 0), so the blend rotates about it by twice this angle.
+    # (2, 0, 0) is fixed for all joints, so the blend rotates about it by twice this angle.
     angle = 2 * np.arctan2(0.75 * s, 0.75 * c + 0.25)
     assert_allclose(one.position, [2 - np.sin(angle), np.cos(angle), 0], atol=1e-15)
     assert_allclose(dual.stretched, [2, 1, 0])
@@ -83,8 +83,8 @@ def test_every_term_of_dual_quaternions():
 
 def test_quaternion_in_the_other_hemisphere_is_negated():
     figure = arm([[(0, 0.6), (1, 0.4)]] * 4)
-    # The shoulder rotates by 200 degrees: either its quaternion's w or the other's sign is
-    # negative.
+    # The shoulder rotates by 200 degrees, so either its quaternion has a negative w or the other
+    # quaternion is negated.
     pose = bent(figure, np.deg2rad(-80), np.deg2rad(200))
     one = explain(figure, pose, Skinning("dqs"), 0)
     first, second = one.dual.duals[:, :4]
@@ -98,7 +98,7 @@ def test_quaternion_in_the_other_hemisphere_is_negated():
     assert set(found) == {1.0, -1.0}
 
 
-def test_blend_lies_between_the_two():
+def test_blend_is_between_both_methods():
     figure = arm()
     pose = bent(figure, 1.0)
     ends = [explain(figure, pose, Skinning(method), 1).position for method in ("lbs", "dqs")]
@@ -107,7 +107,7 @@ def test_blend_lies_between_the_two():
     assert_allclose(mixed.linear, ends[0])
 
 
-def test_weights_that_do_not_add_up_to_one_are_as_stored():
+def test_weights_that_do_not_sum_to_one_are_used_as_stored():
     figure = arm([[(0, 0.5)]] * 4)
     one = explain(figure, bent(figure, shoulder=np.pi / 2), Skinning(), 0)
     assert_allclose(one.images, [[0, 3, 0]], atol=1e-15)
@@ -125,7 +125,7 @@ def test_pruned_influences_are_not_listed():
 
 
 @pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
-def test_vertex_without_influence_stays(method):
+def test_vertex_without_influence_does_not_move(method):
     figure = arm()
     one = explain(figure, bent(figure, 1.0, 1.0), Skinning(method), 3)
     assert one.is_free and one.names == ()
@@ -154,7 +154,7 @@ def test_shape_correctives_and_placement_are_separate_steps():
 
 
 @pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
-def test_explanation_ends_where_the_vertex_is_drawn(method):
+def test_explanation_ends_at_the_drawn_position(method):
     figure = arm()
     pose = bent(figure, 1.1, -2.0, 0.7)
     pose.scales[1] = 1.5, 0.8, 1.0
@@ -164,12 +164,12 @@ def test_explanation_ends_where_the_vertex_is_drawn(method):
         assert_allclose(explain(figure, pose, how, vertex).position, drawn[vertex], atol=1e-14)
 
 
-def test_stretch_of_a_joint_that_scales_comes_first():
+def test_stretch_of_a_scaled_joint_is_the_first_step():
     figure = arm([[(1, 1.0)]] * 4)
     pose = bent(figure, np.pi / 2)
     pose.scales[1] = 3.0, 1.0, 1.0
     one = explain(figure, pose, Skinning("dqs"), 0)
-    # (3, 0, 0) is one unit beyond the elbow: three units, then rotated upwards.
+    # (3, 0, 0) is one unit beyond the elbow; that unit is scaled to three, then rotated upwards.
     assert_allclose(one.dual.stretched, [5, 0, 0], atol=1e-14)
     assert_allclose(one.position, [2, 3, 0], atol=1e-14)
 
@@ -186,14 +186,14 @@ def test_stretch_of_a_joint_that_scales_comes_first():
         ),
     ],
 )
-def test_unexplainable_vertices_are_refused(make, vertex, message):
+def test_invalid_vertices_and_figures_without_skin_are_refused(make, vertex, message):
     figure = make()
     with pytest.raises(RigError) as caught:
         explain(figure, bent(arm()), Skinning(), vertex)
     assert str(caught.value) == message
 
 
-def test_linear_blending_text():
+def test_text_explains_linear_blending():
     figure = arm()
     text = explanation_text(explain(figure, bent(figure), Skinning(), 1), digits=2)
     assert text == [
@@ -220,12 +220,12 @@ def test_linear_blending_text():
     ]
 
 
-def test_dual_quaternion_and_placement_text():
+def test_text_explains_dual_quaternions_and_placement():
     figure = arm([[(1, 1.0)]] * 4)
     pose = bent(figure)
     pose.figure_scale, pose.figure_translation[:] = 2.0, (0, 1, 0)
     lines = explanation_text(explain(figure, pose, Skinning("dqs"), 0), digits=2)
-    # Real (0, 0, sin 45, cos 45), dual (0, -2 sin 45, 0, 0): see the test of every term.
+    # Real (0, 0, sin 45, cos 45), dual (0, -2 sin 45, 0, 0): see the test of all terms.
     assert lines[lines.index("sum w = 1.00") :] == [
         "sum w = 1.00",
         "sum w M p           (  2.00   1.00   0.00 )",

@@ -1,4 +1,4 @@
-"""The front of a figure, estimated from names, feet, faces, ends, soles and travel."""
+"""The front of a figure, estimated from names, feet, faces, end joints, soles and travel."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import ball_skeleton
 
-# A rotation by 90 degrees maps each axis to the next: about y, +z to +x; about z, -y to +x.
+# A rotation by 90 degrees maps each axis to the next: +z to +x about y, and -y to +x about z.
 CYCLES = {"y": ("+z", "+x", "-z", "-x"), "z": ("-y", "+x", "+y", "-x")}
 TURNS = {"y": turn_y, "z": turn_z}
 
@@ -45,7 +45,7 @@ def cycle(up: str, front: str) -> list[str]:
 
 
 def figure(joints: dict[str, tuple[int, tuple[float, float, float]]], up: str = "y") -> Figure:
-    """Build a figure from names, each with its parent and position."""
+    """Build a figure from joint names, each with its parent and position."""
     parents = np.array([parent for parent, _ in joints.values()], dtype=np.int32)
     places = np.array([place for _, place in joints.values()], dtype=float)
     return Figure("made", skeleton=ball_skeleton(tuple(joints), parents, places), up=up)
@@ -56,7 +56,7 @@ def scene(*figures: Figure) -> Scene:
 
 
 BODY = {"hips": (-1, (0, 1, 0)), "LeftUpLeg": (0, (0.1, 1, 0)), "RightUpLeg": (0, (-0.1, 1, 0))}
-"""Faces +z: its left is +x."""
+"""A body that faces +z; its left is +x."""
 
 
 @pytest.mark.parametrize(("files", "front"), [((), "+z"), ((bundled_body(),), "+z")])
@@ -78,17 +78,17 @@ def test_real_figures_have_a_front_also_when_rotated(shared_data, names, front):
     assert fronts(found) == cycle(found.up, front)
 
 
-def test_people_facing_each_other_give_the_default_front(shared_data):
+def test_people_facing_each_other_have_the_default_front(shared_data):
     found = viewer.load(shared_data / "smpl_synthetic" / "easymocap")
     assert guess_front(found) == "-y"
 
 
-def test_tube_has_no_front(shared):
+def test_tube_gets_the_default_front(shared):
     tube = viewer.load(shared / "tube.skel", shared / "tube.skin")
     assert fronts(tube) == ["+z"] * 4
 
 
-def test_left_and_right_determine_the_front():
+def test_left_and_right_joints_determine_the_front():
     assert fronts(scene(figure(BODY))) == cycle("y", "+z")
     # With z up and the left at +y a figure faces +x.
     lying = {name: (p, (0.0, place[0], place[1])) for name, (p, place) in BODY.items()}
@@ -139,8 +139,8 @@ def _walk(way, n_frames=11):
 
 def test_travel_direction_determines_the_front_without_other_evidence():
     assert fronts(Scene([_walk((-3.0, 0.0, 0.2))])) == cycle("y", "-x")
-    assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # upward motion is no evidence
-    assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # swaying is no evidence either
+    assert guess_front(Scene([_walk((0.0, 5.0, 0.0))])) == "+z"  # upward motion is not evidence
+    assert guess_front(Scene([_walk((-0.1, 0.0, 0.0))])) == "+z"  # swaying is not evidence either
 
 
 def test_travel_does_not_outvote_names():
@@ -158,7 +158,7 @@ def test_sides_of_captured_points_determine_the_front():
     points = np.array([[0.0, -0.1, 1.0, 0.9], [0.0, 0.1, 1.0, 0.9]])  # the left is -y
     actor = Actor(Figure("points", points=layout, up="z"), points=points)
     assert guess_front(Scene([actor], world_up="z")) == "-x"
-    points[0, 3] = 0.0  # not seen
+    points[0, 3] = 0.0  # not detected
     assert guess_front(Scene([actor], world_up="z")) == "-y"
 
 
@@ -189,7 +189,7 @@ def test_feet_of_a_mesh_determine_the_front():
     ],
     ids=["cube", "box", "point", "flat"],
 )
-def test_shapes_without_a_front_get_the_default(positions):
+def test_shapes_without_a_front_get_the_default_front(positions):
     assert fronts(scene(Figure("shape", mesh=mesh(positions)))) == ["+z"] * 4
 
 
@@ -204,14 +204,14 @@ def test_only_agreeing_actors_override_the_default_front():
     assert guess_front(Scene([])) == "+z"
 
 
-def test_guessing_the_front_changes_no_pose():
+def test_estimating_the_front_does_not_change_poses():
     actor = _walk((-3.0, 0.0, 0.0))
     before = actor.pose.figure_translation.copy()
     guess_front(Scene([actor]))
     assert (actor.pose.figure_translation == before).all()
 
 
-def test_fronts_are_the_horizontal_axes():
+def test_possible_fronts_are_the_horizontal_axes():
     assert front_axes("y") == ("+x", "-x", "+z", "-z")
     assert front_axes("z") == ("+x", "-x", "+y", "-y")
     assert usual_front("y") == "+z" and usual_front("z") == "-y"

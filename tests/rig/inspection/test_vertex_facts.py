@@ -1,4 +1,4 @@
-"""Properties of a vertex: figures of a few points, values calculated by hand."""
+"""Properties of a vertex in figures of a few points, calculated by hand."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def posed(one, slide=0.0, turn=0.0):
     return pose
 
 
-def test_influences_are_sorted_by_weight_each_joint_once():
+def test_influences_are_sorted_by_weight_and_merged_by_joint():
     one = figure()
     facts = vertex_facts(one, posed(one), Skinning(), 0)
     assert facts.names == ("knee", "hip", "#3")
@@ -46,7 +46,7 @@ def test_influences_are_sorted_by_weight_each_joint_once():
     assert_allclose(facts.weights, [0.5, 0.3, 0.2])
 
 
-def test_influences_are_those_in_use():
+def test_influences_follow_the_skinning_settings():
     one = figure()
     facts = vertex_facts(one, posed(one), Skinning(max_influences=1), 0)
     assert facts.names == ("knee",) and facts.weights.tolist() == [1.0]
@@ -62,19 +62,19 @@ def test_position_and_normal_match_the_posed_figure():
     assert_allclose(facts.normal, [0, 0, 1])
 
 
-def test_figure_without_a_skin_still_has_a_position():
+def test_figure_without_a_skin_has_a_position():
     bare = Figure("bare", mesh(POINTS))
     facts = vertex_facts(bare, None, Skinning(), 3)
     assert facts.position.tolist() == [0, 0, 1]
     assert facts.names == () and facts.uvs.shape == (0, 2) and facts.body_part == ""
 
 
-def test_body_part_has_a_name():
+def test_body_part_is_named():
     one = figure(body_parts=BodyParts(("leg", "arm"), np.array([0, 0, 1, 1])))
     assert vertex_facts(one, posed(one), Skinning(), 2).body_part == "arm"
 
 
-def test_texture_coordinates_are_all_of_a_seam_the_triangles_own_first():
+def test_texture_coordinates_of_a_seam_start_with_those_of_the_triangle():
     uvs = np.array([[0.0, 0], [0.1, 0], [0.2, 0], [0.3, 0], [0.4, 0], [0.5, 0]])
     surface = Mesh(
         np.array(POINTS),
@@ -91,7 +91,7 @@ def test_texture_coordinates_are_all_of_a_seam_the_triangles_own_first():
         (0, 1, [0.5, 0.0]),
         (2, 1, [0.2]),
         (3, -1, [0.4]),
-        (1, 1, [0.1]),  # not a corner of it
+        (1, 1, [0.1]),  # the vertex is not a corner of the triangle
     ):
         facts = vertex_facts(one, pose, Skinning(), vertex, triangle)
         assert facts.uvs[:, 0].tolist() == found
@@ -120,7 +120,7 @@ def test_figure_without_a_mesh_has_no_vertices():
         vertex_facts(bones, None, Skinning(), 0)
 
 
-def test_nearest_corner_of_a_triangle():
+def test_nearest_corner_of_a_triangle_is_found():
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
     triangle = np.array([7, 8, 9])
     assert nearest_corner(corners, triangle, np.array([0.6, 0.1, 0])) == 8
@@ -128,7 +128,7 @@ def test_nearest_corner_of_a_triangle():
     assert nearest_corner(corners, triangle, np.array([0.3, 0.3, 0])) == 7
 
 
-def test_facts_text():
+def test_text_lists_all_facts():
     one = figure(body_parts=BodyParts(("leg",), np.zeros(4, dtype=int)))
     assert facts_text(vertex_facts(one, posed(one, 0.5), Skinning(), 0, 1)) == [
         "vertex 0, triangle 1, leg",
@@ -141,7 +141,7 @@ def test_facts_text():
     assert facts_text(vertex_facts(one, posed(one), Skinning(), 2))[-1] == "no influence"
 
 
-def test_long_influence_text_counts_the_remainder():
+def test_text_of_many_influences_counts_the_remainder():
     count = 12
     bones = skeleton([-1] * count)
     rows = [[(joint, 1 / count) for joint in range(count)]] * 4
@@ -153,7 +153,7 @@ def test_long_influence_text_counts_the_remainder():
 
 @pytest.mark.parametrize("method", ["lbs", "dqs", "mix"])
 @pytest.mark.parametrize("count", [0, 2])
-def test_subset_of_vertices_is_deformed_as_in_the_whole(method, count):
+def test_subset_of_vertices_is_deformed_as_in_the_whole_mesh(method, count):
     rng = np.random.default_rng(1)
     one = figure(
         blend_shapes=BlendShapes(("a", "b"), rng.normal(size=(2, 4, 3))),

@@ -1,4 +1,4 @@
-"""Choice of an animation by name and number, and the pose in which it begins."""
+"""Choice of an animation by name or number, and its initial pose."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.scene import Actor, figure_pose
 
 
-def test_names_numbers_and_none_choose():
+def test_animation_is_chosen_by_name_number_or_none():
     figure = animated_leg(wave(), bow(), replace(bow(), name="2"))
     one, two, three = figure.animations
     for text, wanted in {
@@ -31,7 +31,7 @@ def test_names_numbers_and_none_choose():
 
 
 @pytest.mark.parametrize("text", ["wavy", "0", "4", "-1"])
-def test_an_unknown_name_is_answered_by_the_nearest(text):
+def test_unknown_name_is_refused_with_the_nearest_names(text):
     figure = animated_leg(wave(), bow())
     with pytest.raises(RigError) as refused:
         chosen_animation([figure], text)
@@ -42,7 +42,7 @@ def test_an_unknown_name_is_answered_by_the_nearest(text):
     )
 
 
-def test_labels_tell_equal_and_empty_names_apart():
+def test_labels_distinguish_equal_and_empty_names():
     figure = animated_leg(wave(), replace(bow(), name=""), wave())
     assert animation_labels(figure) == ("wave", "animation 2", "wave (2)")
     assert chosen_animation([figure], "Wave (2)") is figure.animations[2]
@@ -52,14 +52,14 @@ def test_labels_tell_equal_and_empty_names_apart():
 def test_figures_of_a_file_play_the_same_animation():
     short = clip_of(channel(0, "scale", [0.0, 1.0], np.ones((2, 3))), name="wave")
     hero, hat = animated_leg(wave(), bow(), short), animated_leg(short)
-    # The second figure has only the shorter of two waves, and no bow.
+    # The second figure has only the shorter of the two waves, and no bow.
     assert [counterpart(hat, one) for one in hero.animations] == [0, -1, 0]
     assert [counterpart(hero, one) for one in hat.animations] == [2]
-    # Numbers count the animations of the figure that has the most.
+    # Numbers refer to the animations of the figure that has the most.
     assert chosen_animation([hat, hero], "2") is hero.animations[1]
 
 
-def test_what_the_next_animation_does_not_move_returns_to_the_file():
+def test_values_not_animated_by_the_next_animation_are_reset_to_the_file():
     figure = animated_leg(wave(), bow())
     actor = Actor(figure)
     play_animation(actor, 0)
@@ -77,7 +77,7 @@ def test_what_the_next_animation_does_not_move_returns_to_the_file():
     assert actor.clip is None and actor.animation == -1
 
 
-def test_invalid_keys_leave_the_actor_as_it_was(tmp_path):
+def test_invalid_keys_leave_the_actor_unchanged(tmp_path):
     from viewer.diagnostics import Diagnostic
 
     def refuse():

@@ -1,4 +1,4 @@
-"""Body motions on figures: vertices follow the formula for every centre of rotation."""
+"""Body motions on figures, compared with the formula for every centre of rotation."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.skinning import deform
 from viewer.rig.smpl_family import FAMILY
 
-ATOL = 1e-12  # metres; some hundred rounding errors of values near 1
+ATOL = 1e-12  # metres; a hundred rounding errors of values near 1
 TURN, MOVE = np.array([0.7, -1.9, 0.4]), np.array([0.5, 2.0, -1.0])
 
 
@@ -40,7 +40,7 @@ def family(tmp_path_factory):
 
 
 def motion(names, vectors, **words):
-    """Return a motion of one frame or several."""
+    """Return a motion of one or several frames."""
     vectors = np.reshape(vectors, (-1, len(names), 3))
     words = {"translations": np.tile(MOVE, (len(vectors), 1)), **words}
     return BodyMotion("a", Timing(30.0, np.arange(len(vectors))), names, vectors, **words)
@@ -54,7 +54,7 @@ def posed(figure, given, frame=0):
 
 
 def without_root(kind, vectors, shape=(), columns=None):
-    """Return X: the body posed with the root at rest, as in the paper."""
+    """Return X of the paper: the vertices of the body posed with the root at rest."""
     pose = np.array(vectors)
     pose[0] = 0.0
     return smpl_forward(model(kind), shape, pose, columns)[0]
@@ -88,7 +88,7 @@ def test_world_rotates_the_posed_body_about_the_origin(family):
     vectors, shape, world = waves(24, 3), waves(10, seed=3.0), np.array([[1.5, 0.2, -0.6]])
     given = motion(FAMILY[24].names, vectors, shape=shape[None], world_rotations=world)
     found, _ = posed(family("smpl"), given)
-    # The root's own rotation is part of X here.
+    # Here, X includes the rotation of the root.
     body = smpl_forward(model("smpl"), shape, vectors)[0]
     assert_allclose(found, body @ rotation(world[0]).T + MOVE, rtol=0, atol=ATOL)
 
@@ -175,7 +175,7 @@ def test_missing_joints_of_the_figure_are_reported(family):
     ]
 
 
-def test_other_skeletons_are_refused():
+def test_motions_of_other_skeletons_are_refused():
     figure = Figure("box", skeleton=skeleton([-1]))
     with pytest.raises(RigError) as caught:
         body_clip(motion(("pelvis",), TURN), figure)

@@ -1,4 +1,4 @@
-"""Curves of keys: tangent rules, extrapolation, and the check values of the real walk."""
+"""Curves of keys: tangent rules, extrapolation, and the check values of the real file of a walk."""
 
 import itertools
 from pathlib import Path
@@ -32,7 +32,7 @@ def channel(keys: list[tuple[float, float, object, object]], before="constant", 
     return Channel(0, np.array(times), np.array(values), tangents, (before, after))
 
 
-# Three keys whose spans have slopes 2 and -1, and 1 from first to last.
+# Three keys; the two spans have slopes 2 and -1, and the slope from first to last key is 1.
 KEYS = [(1.0, 0.0), (2.0, 2.0), (4.0, 0.0)]
 
 
@@ -44,18 +44,18 @@ KEYS = [(1.0, 0.0), (2.0, 2.0), (4.0, 0.0)]
         ("smooth", [[2, 2], [0, 0], [-1, -1]]),
     ],
 )
-def test_slopes_follow_the_rule(rule: str, expected: list[list[float]]) -> None:
+def test_slopes_follow_the_tangent_rule(rule: str, expected: list[list[float]]) -> None:
     curve = channel([(t, v, rule, rule) for t, v in KEYS])
     np.testing.assert_allclose(slopes(curve), expected, atol=1e-15)
 
 
-def test_slopes_accept_values_per_side() -> None:
+def test_slopes_accept_a_value_on_each_side() -> None:
     curve = channel([(0, 0, 13.7, -0.22), (1, 5, "flat", "linear")])
     np.testing.assert_allclose(slopes(curve), [[13.7, -0.22], [0, 5]])
 
 
 def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
-    """Against the textbook basis h00, h10, h01, h11, which the code does not use."""
+    """The expected values use the textbook basis h00, h10, h01, h11, unlike the code."""
     rng = np.random.default_rng(3)
     times = np.cumsum(rng.uniform(0.1, 2.0, 6))
     values = rng.normal(size=6)
@@ -74,7 +74,7 @@ def test_evaluate_equals_the_hermite_basis_inside_the_keys() -> None:
             assert found == pytest.approx(wanted, abs=1e-12)
 
 
-# A straight line from (1, 10) to (3, 14) as keys; every mode is worked out by hand.
+# The keys are on a straight line from (1, 10) to (3, 14); every mode is computed by hand.
 @pytest.mark.parametrize(
     ("mode", "time", "expected"),
     [
@@ -105,7 +105,7 @@ def test_linear_extrapolation_uses_the_outer_slopes() -> None:
 
 
 @pytest.mark.parametrize(("before", "after"), [*itertools.product(EXTRAPOLATIONS, repeat=2)])
-def test_sides_are_independent(before: str, after: str) -> None:
+def test_extrapolation_before_and_after_is_independent(before: str, after: str) -> None:
     keys = [(0, 1, "smooth", "smooth"), (1, 3, "smooth", "smooth"), (3, 2, "smooth", "smooth")]
     times = np.linspace(-7, 9, 161)
     both = evaluate(channel(keys, before, after), times)
@@ -117,7 +117,7 @@ def test_sides_are_independent(before: str, after: str) -> None:
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("keys", [[(2.0, 5.0)], [(2.0, 4.0), (2.0, 5.0)]])
-def test_one_time_is_that_value_everywhere(mode: str, keys: list[tuple[float, float]]) -> None:
+def test_keys_at_a_single_time_are_constant(mode: str, keys: list[tuple[float, float]]) -> None:
     curve = channel([(t, v, "smooth", "linear") for t, v in keys], mode, mode)
     np.testing.assert_array_equal(evaluate(curve, np.array([-9.0, 2.0, 9.0])), 5.0)
 
@@ -127,7 +127,7 @@ def test_channel_without_keys_is_zero() -> None:
     np.testing.assert_array_equal(evaluate(empty, np.array([-1.0, 0.0, 5.0])), 0.0)
 
 
-def test_equal_times_jump_without_dividing_by_zero() -> None:
+def test_keys_at_equal_times_are_a_jump_without_dividing_by_zero() -> None:
     keys = [(0, 0), (1, 1), (1, 5), (2, 6)]
     for rule in TANGENT_RULES:
         values = evaluate(channel([(t, v, rule, rule) for t, v in keys]), np.array([1.0, 1.5]))
@@ -139,7 +139,7 @@ def test_decreasing_times_are_refused() -> None:
         channel([(1, 0, "flat", "flat"), (0, 0, "flat", "flat")])
 
 
-def test_check_fit_names_both_counts() -> None:
+def test_check_fit_reports_both_counts() -> None:
     skeleton = viewer.load().actors[0].figure.skeleton
     assert skeleton is not None
     with pytest.raises(RigError, match=rf"has 0 channels, the skeleton needs {skeleton.n_dofs} "):
@@ -182,7 +182,7 @@ def test_misfit_names_incompatible_joints(rows, reason) -> None:
     assert found == Phrase("not-course-rig", reason=reason)
 
 
-def test_misfit_is_empty_where_a_clip_fits() -> None:
+def test_misfit_is_empty_if_a_clip_fits() -> None:
     skeleton = hand_made.skeleton([-1], [(0, kind, 0.0) for kind in DOF_KINDS])
     still = [Channel(dof, [0.0], [0.0], (("flat", "flat"),)) for dof in range(6)]
     assert misfit(Clip("still", tuple(still), 0.0, 1.0), skeleton) is None
@@ -219,8 +219,8 @@ def test_clip_refuses_an_invalid_range(start, end) -> None:
 
 
 @pytest.mark.skipif(not SHARED.exists(), reason="needs the shared data")
-def test_walk_has_the_published_values() -> None:
-    """Section 10 of the format's specification."""
+def test_real_walk_has_the_published_values() -> None:
+    """The values are in section 10 of the format's specification."""
     scene = viewer.load(*(SHARED / f"wasp{end}" for end in (".skel", ".skin", "_walk.anim")))
     clip = scene.actors[0].clip
     assert clip is not None

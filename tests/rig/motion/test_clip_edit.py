@@ -1,4 +1,4 @@
-"""Editing of keys: which keys move, which stay, and that the old channel is unchanged."""
+"""Editing of keys: moved and unmoved keys, and the unchanged old channel."""
 
 import numpy as np
 import pytest
@@ -63,14 +63,14 @@ def test_key_added_on_the_curve_does_not_change_it(rule, time, modes) -> None:
 
 
 def test_key_added_on_the_curve_has_its_slope() -> None:
-    # 3 u^2 - 2 u^3 over 2 s, from 0 to 4: at the middle 2, rising by 4 * 1.5 / 2 a second.
+    # 3 u^2 - 2 u^3 over 2 s from 0 to 4: the middle is 2, and its slope is 4 * 1.5 / 2 per second.
     curve = channel((0.0, 2.0), (0.0, 4.0), "flat")
     longer, index = add_key(curve, 1.0)
     assert index == 1 and longer.values.tolist() == [0, 2, 4]
     assert longer.tangents == (("flat", "flat"), (3.0, 3.0), ("flat", "flat"))
 
 
-def test_key_added_with_a_value_is_smooth_and_changes_no_rule() -> None:
+def test_key_added_with_a_value_is_smooth_and_keeps_other_tangent_rules() -> None:
     longer, index = add_key(channel(), 2.0, 7.0)
     assert index == 2
     same_but(
@@ -85,8 +85,8 @@ def test_key_added_with_a_value_is_smooth_and_changes_no_rule() -> None:
 
 
 @pytest.mark.parametrize(("time", "index", "value"), [(-1.0, 0, -2.0), (3.5, 3, -4.0)])
-def test_key_added_outside_lies_on_the_extrapolation(time, index, value) -> None:
-    # Straight on with the spans' slopes, 2 before and -2 * 2 / 2 after: -2 and -4 a second.
+def test_key_added_outside_is_on_the_extrapolation(time, index, value) -> None:
+    # Linear extrapolation with the slopes at the ends: -2 and -4 per second.
     longer, found = add_key(channel((0, 1, 2), (0, 2, -2), "linear", ("linear",) * 2), time)
     assert found == index
     if time < 0:
@@ -106,13 +106,13 @@ def test_key_added_at_an_existing_time_replaces_the_value() -> None:
     assert changed.tangents[1] == ("flat", 3.0) and changed.values[1] == 2.0
 
 
-def test_first_key_of_a_channel_without_any() -> None:
+def test_first_key_of_an_empty_channel_is_added() -> None:
     empty = Channel(2, np.zeros(0), np.zeros(0), ())
     first, index = add_key(empty, 1.5)
     assert (index, first.times.tolist(), first.values.tolist()) == (0, [1.5], [0.0])
 
 
-def test_slope_between_and_outside_of_the_keys() -> None:
+def test_slope_is_evaluated_between_and_outside_of_the_keys() -> None:
     curve = channel((0.0, 2.0), (0.0, 4.0), "flat")
     # d/dt of 4 (3 u^2 - 2 u^3), u = t / 2, is 12 (u - u^2).
     for time in (0.0, 0.5, 1.0, 2.0):
@@ -151,7 +151,7 @@ def test_moved_keys_stop_at_unselected_keys(keys, dt, times) -> None:
     assert move_keys(channel(), keys, dt, 0.0).times.tolist() == times
 
 
-def test_moved_keys_leave_a_gap_where_there_is_room() -> None:
+def test_moved_keys_keep_a_minimum_gap_if_possible() -> None:
     assert move_keys(channel(), [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 2.75, 3]
     close = channel((0.0, 1.0, 1.1))
     assert move_keys(close, [1], 5.0, 0.0, gap=0.25).times.tolist() == [0, 1, 1.1]
@@ -172,17 +172,17 @@ def test_set_key_stores_time_and_value_exactly() -> None:
     assert set_key(channel(), 1, 9.0).times.tolist() == [0, 3, 3]
 
 
-def test_deleted_keys_go_with_their_tangents() -> None:
+def test_deleted_keys_lose_their_tangents() -> None:
     curve = set_tangent(channel(), 1, 0, 5.0)
     same_but(delete_keys(curve, [0, 2]), curve, times=[1], values=[2], tangents=((5.0, "smooth"),))
     assert len(delete_keys(curve, range(3)).times) == 0
     assert len(curve.times) == 3
 
 
-# Tangents, extrapolation, range
+# Tangents, extrapolation and range
 
 
-def test_tangents_change_per_side() -> None:
+def test_tangents_change_on_one_side() -> None:
     changed = set_tangent(set_tangent(channel(), 1, 0, "flat"), 1, 1, -3.0)
     assert changed.tangents == (("smooth", "smooth"), ("flat", -3.0), ("smooth", "smooth"))
     assert slopes(changed)[1].tolist() == [0.0, -3.0]
@@ -191,7 +191,7 @@ def test_tangents_change_per_side() -> None:
             set_tangent(channel(), 1, 0, wrong)
 
 
-def test_extrapolation_changes_per_side() -> None:
+def test_extrapolation_changes_at_one_end() -> None:
     same_but(
         set_extrapolation(channel(), 0, "bounce"), channel(), extrapolation=("bounce", "cycle")
     )
@@ -200,13 +200,13 @@ def test_extrapolation_changes_per_side() -> None:
     )
 
 
-def test_range_is_put_in_order_and_channels_stay() -> None:
+def test_range_is_ordered_and_channels_are_unchanged() -> None:
     clip = Clip("c", (channel(),), 0.0, 1.0)
     changed = set_range(clip, 5.0, 2.0)
     assert (changed.start, changed.end) == (2.0, 5.0) and changed.channels is clip.channels
 
 
-def test_replacing_one_channel_keeps_the_other_objects() -> None:
+def test_replacing_one_channel_keeps_other_channel_objects() -> None:
     other = Channel(1, np.zeros(1), np.ones(1), (("flat", "flat"),))
     clip = Clip("c", (other, channel()), 0.0, 1.0)
     changed = with_channel(clip, 4, lambda old: delete_keys(old, [0]))
@@ -217,10 +217,10 @@ def test_replacing_one_channel_keeps_the_other_objects() -> None:
     assert more.channels[1].values.tolist() == [1.5]
 
 
-# Whole poses
+# Keys of whole poses
 
 
-def test_clip_of_a_pose_holds_it_forever() -> None:
+def test_clip_of_a_pose_is_constant() -> None:
     pose = rest_pose(rig())
     pose.dofs[:] = [1, 2, 3, 0.1, 0.2, 0.3]
     clip = clip_from_pose(rig(), pose, "new", 2.0, 5.0)
@@ -247,7 +247,7 @@ def test_keyed_pose_is_reproduced_exactly_and_extends_the_range() -> None:
     assert [len(one.times) for one in longer.channels] == [2] * 6
 
 
-def test_only_changed_dofs_get_keys_if_asked() -> None:
+def test_only_changed_dofs_get_keys_if_requested() -> None:
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new")
     pose.dofs[3] = 0.25
@@ -265,7 +265,7 @@ def test_clamping_is_not_a_change() -> None:
     assert [one.target for one in changed.channels] == [5] and len(changed.channels[0].times) == 1
 
 
-def test_keying_again_at_the_same_time_replaces() -> None:
+def test_keying_again_at_the_same_time_replaces_keys() -> None:
     pose = rest_pose(rig())
     clip = clip_from_pose(rig(), pose, "new")
     pose.dofs[:] = 0.5
@@ -276,7 +276,7 @@ def test_keying_again_at_the_same_time_replaces() -> None:
 # Frames
 
 
-def test_frames_become_keys_and_still_dofs_one_key() -> None:
+def test_frames_are_converted_to_keys_and_constant_dofs_to_one_key() -> None:
     times = np.array([0.5, 0.75, 1.0])
     dofs = np.array([[1.0, 7.0], [2.0, 7.0], [4.0, 7.0]])
     clip = clip_from_frames("walk", dofs, times)
@@ -284,7 +284,7 @@ def test_frames_become_keys_and_still_dofs_one_key() -> None:
     assert clip.channels[0].times.tolist() == [0.5, 0.75, 1.0]
     assert clip.channels[1].times.tolist() == [0.5] and clip.channels[1].values.tolist() == [7.0]
     assert_array_equal(evaluate_all(clip, times)[1], dofs)
-    # Linear between the frames, or smooth, with the slope from 1 to 4 in 0.5 s.
+    # Frames are interpolated linearly, or smoothly with the slope from 1 to 4 in 0.5 s.
     middle = np.array([0.625])
     assert evaluate(clip.channels[0], middle) == 1.5
     smooth = clip_from_frames("walk", dofs, times, "smooth")
@@ -292,7 +292,7 @@ def test_frames_become_keys_and_still_dofs_one_key() -> None:
     assert evaluate(smooth.channels[0], middle) == pytest.approx(1.5 + 0.25 * (4 - 6) / 8)
 
 
-def test_missing_frames_get_no_keys_and_the_range_stays() -> None:
+def test_missing_frames_get_no_keys_and_the_range_is_unchanged() -> None:
     times, dofs = np.arange(4.0), np.array([[0.0], [1.0], [9.0], [3.0]])
     clip = clip_from_frames("gap", dofs, times, present=np.array([False, True, False, True]))
     assert clip.channels[0].times.tolist() == [1.0, 3.0]

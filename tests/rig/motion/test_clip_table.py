@@ -1,4 +1,4 @@
-"""Many curves at many times at once, against a plain implementation of the format."""
+"""Evaluation of many curves at many times, compared with a simple implementation of the format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MODE_PAIRS = tuple(itertools.product(EXTRAPOLATIONS, repeat=2))
 
 
 class PlainCurve:
-    """One curve at one time: a Bezier curve by de Casteljau's construction."""
+    """Evaluate one curve at one time, as a Bezier curve by de Casteljau's construction."""
 
     def __init__(self, channel: Channel) -> None:
         self.times, self.values = channel.times.tolist(), channel.values.tolist()
@@ -103,14 +103,14 @@ def assert_is_the_plain_curve(channels, times):
     assert targets.tolist() == [channel.target for channel in channels]
     wanted = np.array([[PlainCurve(channel)(time) for channel in channels] for time in times])
     wanted = wanted.reshape(len(times), len(channels))
-    # Such distant times have rounding errors of 1e-13 s; slopes are below 100 per second.
+    # Times an hour away have rounding errors of 1e-13 s; slopes are below 100 per second.
     np.testing.assert_allclose(values, wanted, atol=1e-10, rtol=1e-11)
     for column, channel in enumerate(channels):
         np.testing.assert_array_equal(evaluate(channel, times), values[:, column])
 
 
 @pytest.mark.parametrize("modes", MODE_PAIRS, ids="-".join)
-def test_every_pair_of_tangents_and_of_extrapolations(modes) -> None:
+def test_every_pair_of_tangents_and_extrapolations_agrees(modes) -> None:
     rng = np.random.default_rng(11)
     channels = [
         random_channel(rng, 3 * number, 4, [pair, TANGENT_PAIRS[-number], pair, pair], modes)
@@ -120,7 +120,7 @@ def test_every_pair_of_tangents_and_of_extrapolations(modes) -> None:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_random_clips_with_few_and_many_keys(seed) -> None:
+def test_random_clips_with_few_and_many_keys_agree(seed) -> None:
     rng = np.random.default_rng(seed)
     counts = [0, 1, 2, 3, 30, *rng.integers(0, 9, 12).tolist()]
     channels = [random_channel(rng, row, count) for row, count in enumerate(counts)]
@@ -129,8 +129,8 @@ def test_random_clips_with_few_and_many_keys(seed) -> None:
     assert_is_the_plain_curve(channels, rng.uniform(-3700, 3700, 60))
 
 
-def test_batch_of_times_gives_the_same_values_as_single_times() -> None:
-    """Long lists of times are searched channel by channel, short ones all at once."""
+def test_batch_of_times_has_the_same_values_as_single_times() -> None:
+    """Long lists of times are searched channel by channel, short lists for all channels at once."""
     rng = np.random.default_rng(5)
     clip = Clip("two ways", tuple(random_channel(rng, row, 7) for row in range(5)), 0.0, 1.0)
     times = rng.uniform(-30, 30, 5000)
@@ -151,7 +151,7 @@ def test_keys_are_reproduced_exactly(mode, rule) -> None:
 
 
 def test_ends_repeat_after_whole_periods() -> None:
-    """At first + k T: a power of two as the period, so that the times are exact."""
+    """The times are first + k T; the period T is a power of two, so that they are exact."""
     turns = np.arange(-5, 6)
     times, values = np.array([0.5, 1.0, 2.5]), np.array([3.0, -1.0, 4.0])
 
@@ -159,7 +159,7 @@ def test_ends_repeat_after_whole_periods() -> None:
         curve = Channel(0, times, values, (("smooth", "smooth"),) * 3, (mode, mode))
         return evaluate(curve, 0.5 + 2.0 * turns)
 
-    # k = 0 and 1 are the first and the last key themselves.
+    # For k = 0 and 1, the times are those of the first and last key.
     cycle = at("cycle")
     assert np.isin(cycle, (3.0, 4.0)).all() and cycle[5] == 3.0 and cycle[6] == 4.0
     np.testing.assert_array_equal(at("cycle_offset"), 3.0 + turns)
@@ -168,18 +168,18 @@ def test_ends_repeat_after_whole_periods() -> None:
 
 @pytest.mark.parametrize("start", [3600.0, -36000.0, 1e6])
 def test_hours_of_playback_do_not_drift(start) -> None:
-    """A period of 0.1 s, which no float holds exactly, many thousand times over."""
+    """A period of 0.1 s, which is not exact in floating point, is repeated many thousand times."""
     times = np.array([0.0, 0.04, 0.1])
     curve = Channel(0, times, np.array([0.0, 1.0, 0.0]), (("smooth", 0.0),) * 3, ("cycle", "cycle"))
     periods = round(start / 0.1)
     for phase in (0.01, 0.03, 0.07):
         far = evaluate(curve, np.array(periods * 0.1 + phase))
-        # Half a unit in the last place of the time, times the steepest slope of 40 a second.
+        # Half a unit in the last place of the time, times the steepest slope of 40 per second.
         assert far == pytest.approx(float(evaluate(curve, np.array(phase))), abs=40 * 2e-10)
 
 
 def test_times_an_hour_away_exceed_float32_precision() -> None:
-    """After an hour one frame at 1000 per second still changes the value, unlike in float32."""
+    """After an hour, a frame of 1/1000 s changes the value, which it would not in float32."""
     curve = Channel(
         0, np.array([0.0, 1.0]), np.array([0.0, 1.0]), (("linear",) * 2,) * 2, ("cycle",) * 2
     )
@@ -197,14 +197,14 @@ def test_outermost_of_coincident_keys_are_the_ends() -> None:
 
 @pytest.mark.parametrize("mode", EXTRAPOLATIONS)
 @pytest.mark.parametrize("gap", [1e-300, 5e-324, 1e-12])
-def test_keys_closer_than_a_nanosecond_count_as_one_time(mode, gap) -> None:
+def test_keys_closer_than_a_nanosecond_are_at_one_time(mode, gap) -> None:
     curve = Channel(
         0, np.array([0.0, gap]), np.array([1.0, 3e38]), (("linear", "smooth"),) * 2, (mode, mode)
     )
     np.testing.assert_array_equal(evaluate(curve, np.array([-1e30, 0.0, 1e38])), 3e38)
 
 
-def test_largest_numbers_of_files_stay_finite() -> None:
+def test_largest_numbers_in_files_have_finite_results() -> None:
     big = 3.4e38
     for mode in EXTRAPOLATIONS:
         curve = Channel(
@@ -217,7 +217,7 @@ def test_largest_numbers_of_files_stay_finite() -> None:
         assert np.isfinite(evaluate(curve, np.array([-big, -1.0, 0.5e-8, 1.0, big]))).all()
 
 
-def test_clip_without_channels_and_non_finite_times() -> None:
+def test_empty_clips_and_non_finite_times_are_supported() -> None:
     targets, values = evaluate_all(Clip("none", (), 0.0, 1.0), np.array([0.0, 1.0]))
     assert targets.shape == (0,) and values.shape == (2, 0)
     one = Channel(4, np.array([0.0, 1.0]), np.array([1.0, 2.0]), (("flat", "flat"),) * 2)

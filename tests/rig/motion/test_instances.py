@@ -1,4 +1,4 @@
-"""Many actors at once: the same results as one by one."""
+"""Batched posing of many actors, compared with posing them one by one."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 
-EXACT = 1e-13  # the same products, summed in another order
+EXACT = 1e-13  # the same products, summed in a different order
 
 
 def moving_skeleton() -> Skeleton:
-    """Two roots, DOFs of all kinds in any order, limits, and a joint without DOFs."""
+    """Return two roots with unordered DOFs of all kinds, limits, and a joint without DOFs."""
     dofs = [(0, "tx", 0.3), (0, "z", 0.1), (0, "x", 0.0), (1, "y", 0.2, -0.5, 0.5)]
     dofs += [(2, "tz", 0.0), (2, "tz", 0.1), (2, "x", 0.4), (2, "y", -0.3), (2, "z", 0.0)]
     return skeleton([-1, 0, 1, -1], dofs, offsets=np.arange(12.0).reshape(4, 3))
@@ -62,7 +62,7 @@ def test_batched_matrices_match_each_pose():
     assert np.array_equal(worlds(joints, poses, rotations), found)
 
 
-def test_palettes_follow_the_shape():
+def test_palettes_depend_on_the_shape():
     figure = viewer.load(bundled_body()).actors[0].figure
     poses = []
     rng = np.random.default_rng(1)
@@ -89,7 +89,7 @@ def same(first: Actor, second: Actor) -> None:
 
 
 def both_ways(make, time: float, interpolate: bool = False) -> list[Actor]:
-    """Return actors posed together, after comparing them with actors posed one by one."""
+    """Pose actors together, compare them with actors posed one by one, and return them."""
     together, alone = make(), make()
     pose_actors(together, time, interpolate)
     for first, second in zip(together, alone, strict=True):
@@ -107,13 +107,13 @@ def keyed(joints: Skeleton) -> Clip:
 
 
 @pytest.mark.parametrize("time", [-0.5, 0.0, 0.4, 2.0])
-def test_curves_pose_actors_together(time):
+def test_actors_with_keyed_curves_are_posed_together(time):
     joints = moving_skeleton()
     figure, clip = Figure("f", skeleton=joints), keyed(joints)
     actors = both_ways(
         lambda: [Actor(figure, clip=clip, offset=0.1 * number) for number in range(5)], time
     )
-    # Joint 1's angle is limited to half a radian, and its neighbours differ in time.
+    # The angle of joint 1 is limited to half a radian, and neighbouring actors differ in time.
     assert max(actor.pose.dofs[3] for actor in actors) <= 0.5
     if time == 0.4:
         assert len({actor.pose.dofs[2] for actor in actors}) > 1
@@ -129,7 +129,7 @@ def captured(n_joints: int, rows=(0, 1, -1, 2), **parts) -> SampledClip:
 @pytest.mark.parametrize("interpolate", [False, True])
 @pytest.mark.parametrize("time", [-1.0, 0.0, 0.3, 0.5, 1.2, 1.5, 3.0])
 @pytest.mark.parametrize("kind", ["balls", "others"])
-def test_frames_pose_actors_together(kind, time, interpolate):
+def test_actors_with_frames_are_posed_together(kind, time, interpolate):
     rng = np.random.default_rng(3)
     if kind == "balls":
         dofs = [(joint, axis, 0.0) for joint in range(3) for axis in "xyz"]
@@ -149,11 +149,11 @@ def test_frames_pose_actors_together(kind, time, interpolate):
         time,
         interpolate,
     )
-    if time == 1.2 and not interpolate:  # some actors are in the gap, others are not
+    if time == 1.2 and not interpolate:  # some actors are in the gap
         assert {actor.is_present for actor in actors} == {True, False}
 
 
-def test_mixed_actors_are_all_posed():
+def test_actors_with_different_motions_are_all_posed():
     joints = moving_skeleton()
     first, second = Figure("a", skeleton=joints), Figure("b", skeleton=joints)
     layout = PointLayout("one", ("p",), np.zeros((0, 2)), [0])

@@ -1,4 +1,4 @@
-"""Motions as arrays: people of a capture with frames, rotations and positions of joints."""
+"""Motions of captured people as arrays of frames, rotations and joint positions."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def scenes(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Scene]:
 
 
 def joints(row: int, pose: str, trans: str) -> Any:
-    """Joints of the second person, by the published equations."""
+    """Return the joints of the second person by the published equations."""
     found = wham()[4]
     turned = matrices(found[pose][row].reshape(24, 3))
     return vertices("smpl", model("smpl"), found["betas"][row], turned, found[trans][row])[1]
 
 
-def test_frames_and_presence(scenes: dict[str, Scene]) -> None:
+def test_arrays_have_all_frames_and_their_presence(scenes: dict[str, Scene]) -> None:
     motion = viewer.motion(scenes["world"].actors[1])
     assert (motion.name, motion.frame_rate) == ("wham_output 4", 30.0)
     assert motion.frames.tolist() == [*range(8)]
@@ -50,7 +50,7 @@ def test_rotations_and_translations_are_those_of_the_file(scenes: dict[str, Scen
         assert_allclose(motion.shape_weights[frame], found["betas"][row], atol=1e-9)
 
 
-def test_joints_in_the_space_of_the_file_and_upright(scenes: dict[str, Scene]) -> None:
+def test_joints_are_returned_in_the_space_of_the_file_and_upright(scenes: dict[str, Scene]) -> None:
     motion = viewer.motion(scenes["camera"].actors[1])
     wanted = joints(1, "pose", "trans")
     assert_allclose(motion.joints("figure")[4], wanted, atol=1e-6)
@@ -64,6 +64,6 @@ def test_gaps_may_be_interpolated(scenes: dict[str, Scene]) -> None:
     assert_allclose(motion.translations[5], motion.translations[[4, 6]].mean(axis=0), atol=1e-9)
 
 
-def test_other_spaces_are_refused(scenes: dict[str, Scene]) -> None:
+def test_unknown_spaces_are_refused(scenes: dict[str, Scene]) -> None:
     with pytest.raises(RigError, match='no space "camera"'):
         viewer.motion(scenes["world"].actors[0]).joints("camera")

@@ -20,7 +20,7 @@ QUARTER = [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]  # about z
 
 
 def two_joints() -> Figure:
-    """Joint 1 is at x = 2 from joint 0, which rotates about z."""
+    """Return two joints; joint 1 is at x = 2 from joint 0, which rotates about z."""
     return Figure("f", skeleton=skeleton([-1, 0], [(0, "z", 0.0)], offsets=[[0, 0, 0], [2, 0, 0]]))
 
 
@@ -29,21 +29,21 @@ def capture(rows=(0, 1), **parts) -> SampledClip:
     return SampledClip("c", Timing(10.0, rows), turns, **parts)
 
 
-def test_a_joint_path_follows_its_parent():
+def test_joint_path_follows_the_rotation_of_its_parent():
     path = motion_path(two_joints(), capture(), [1, 0])
     assert path.times.tolist() == [0.0, 0.1]
     assert path.present.all()
     assert np.allclose(path.points, [[[2, 0, 0], [0, 0, 0]], [[0, 2, 0], [0, 0, 0]]], atol=1e-12)
 
 
-def test_path_between_frames_with_placement():
+def test_path_includes_placement_and_interpolates_between_frames():
     clip = capture(figure_translations=[[0, 0, 0], [0, 0, 3.0]], figure_scales=[1.0, 2.0])
     path = motion_path(two_joints(), clip, [1], times=[0.05, 0.1])
     half = np.sqrt(0.5)
     assert np.allclose(path.points[:, 0], [[3 * half, 3 * half, 1.5], [0, 4, 3]], atol=1e-12)
 
 
-def test_the_pose_supplies_missing_dofs():
+def test_base_pose_supplies_values_that_the_clip_lacks():
     figure = two_joints()
     base = figure_pose(figure)
     base.figure_translation[:] = 5.0, 0.0, 0.0
@@ -51,7 +51,7 @@ def test_the_pose_supplies_missing_dofs():
     assert np.allclose(path.points[:, 0], [[7, 0, 0], [5, 2, 0]], atol=1e-12)
 
 
-def test_gaps_break_the_line():
+def test_gaps_split_the_path():
     path = motion_path(two_joints(), capture(rows=(0, 1, -1, 0, 1, 0)), [0, 1])
     assert path.present[:, 0].tolist() == [True, True, False, True, True, True]
     points, times, which = segments(path)
@@ -84,8 +84,8 @@ def test_capture_paths_have_a_point_per_frame():
     assert path_times(clip) == pytest.approx([2.0, 2.04, 2.08])
 
 
-def test_long_captures_give_the_same_path_in_chunks():
-    count = 9000  # more than one batch
+def test_long_captures_have_the_same_path_in_chunks():
+    count = 9000  # more frames than one batch
     angles = np.linspace(0.0, 20.0, count)
     turns = np.tile(STILL, (count, 2, 1))
     turns[:, 0, 2], turns[:, 0, 3] = np.sin(angles / 2), np.cos(angles / 2)
@@ -104,7 +104,7 @@ def points_clip() -> tuple[Figure, PointClip]:
     return Figure("p", points=layout), PointClip("p", Timing(1.0, [0, 1, 2, 3, -1, 3]), points)
 
 
-def test_captured_points_have_paths_where_seen():
+def test_captured_points_have_paths_where_detected():
     figure, clip = points_clip()
     path = motion_path(figure, clip, [1, 0], min_confidence=0.1)
     assert path.present[:, 0].tolist() == [True, False, True, True, False, True]
@@ -112,11 +112,11 @@ def test_captured_points_have_paths_where_seen():
     points, _, which = segments(path)
     assert which.tolist() == [0, 1]
     assert points.tolist() == [[[0, 2, 0], [0, 3, 0]], [[0, 0, 0], [1, 0, 0]]]
-    # Unseen points are absent for any minimum confidence.
+    # Undetected points are absent for any minimum confidence.
     assert motion_path(figure, clip, [0]).present[2, 0] == np.False_
 
 
-def test_a_clip_without_frames_has_no_path():
+def test_clip_without_frames_has_no_path():
     figure, _ = points_clip()
     clip = PointClip("p", Timing(1.0, [-1, -1]), np.zeros((0, 2, 4)))
     path = motion_path(figure, clip, [0])
@@ -124,7 +124,7 @@ def test_a_clip_without_frames_has_no_path():
     assert [len(part) for part in segments(path)] == [0, 0, 0]
 
 
-def test_a_motion_of_another_skeleton_is_refused():
+def test_motion_of_another_skeleton_is_refused():
     clip = SampledClip("c", Timing(1.0, [0]), np.tile(STILL, (1, 5, 1)))
     with pytest.raises(RigError) as caught:
         motion_path(two_joints(), clip, [0])

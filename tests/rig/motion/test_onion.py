@@ -15,7 +15,7 @@ def test_onion_has_poses_at_even_times_with_rising_opacity():
     scene = Scene([moving_arm(), Actor(moving_arm().figure)])
     still, *poses = onion(scene, 6).actors
     assert still.clip is None and still.opacity == 1.0
-    # Six times in one second; none of them is frame 5, the only missing one.
+    # The six times in one second do not include frame 5, the only missing frame.
     places = [actor.require_pose().figure_translation[0] for actor in poses]
     np.testing.assert_allclose(places, SPEED * np.array([1.0, 0.8, 0.6, 0.4, 0.2, 0.0]), atol=1e-12)
     expected = np.linspace(1.0, FAINTEST, 6)
@@ -23,7 +23,7 @@ def test_onion_has_poses_at_even_times_with_rising_opacity():
     assert scene.actors[0].clip is not None and scene.actors[0].opacity == 1.0
 
 
-def test_onion_omits_the_absent_unless_gaps_are_interpolated():
+def test_onion_omits_absent_people_unless_gaps_are_interpolated():
     scene = Scene([moving_arm()])
     times = [0.0, MISSING / RATE, 1.0]
     opacities = [actor.opacity for actor in onion(scene, times).actors]
@@ -31,7 +31,7 @@ def test_onion_omits_the_absent_unless_gaps_are_interpolated():
     assert len(onion(scene, times, interpolate=True).actors) == 3
 
 
-def test_onion_of_nothing_that_moves_is_refused():
+def test_onion_without_motion_is_refused():
     with pytest.raises(RigError, match="nothing moves"):
         onion(Scene([Actor(moving_arm().figure)]), 4)
     with pytest.raises(RigError, match="expected at least one time"):

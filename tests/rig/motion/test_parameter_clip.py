@@ -1,4 +1,4 @@
-"""Motions from model parameters, played and compared with the published equations of MHR."""
+"""Motions from model parameters, compared with the published equations of MHR."""
 
 import numpy as np
 import pytest
@@ -32,11 +32,12 @@ def test_frames_have_the_vertices_of_the_published_equations_in_metres(figure):
     for row in range(3):
         pose_actor(actor, 0.1 * row)
         wanted = forward(identity[row], parameters[row], expression[row])[0]
-        # Correctives are among them, so the pose has the rotations of the joints exactly.
+        # The vertices include correctives, so the pose must have exactly the rotations of the
+        # joints.
         assert_allclose(deform(figure, actor.pose)[0], 0.01 * wanted + places[row], atol=1e-9)
 
 
-def test_no_frames_are_refused(figure):
+def test_motion_without_frames_is_refused(figure):
     timing = Timing(10.0, np.zeros(0, dtype=np.int32))
     empty = np.zeros((0, 3))
     with pytest.raises(RigError, match="at least one frame"):

@@ -26,7 +26,7 @@ ATOL = 1e-12  # lengths of 1 to 10: rounding
 
 
 def arm() -> Figure:
-    """A root, an elbow at x = 1 and a hand at x = 2, all ball joints."""
+    """Return a root, an elbow at x = 1 and a hand at x = 2, all ball joints."""
     names = ("root", "elbow", "hand")
     skeleton = ball_skeleton(names, np.array([-1, 0, 1]), PLACES)
     return Figure("arm", skeleton=skeleton)
@@ -43,21 +43,21 @@ def set_dof(actor, name, kind, value):
     actor.pose.dofs[row] = value
 
 
-def test_joints_are_where_the_pose_has_them():
+def test_joint_positions_are_those_of_the_pose():
     actor = Actor(arm())
-    set_dof(actor, "elbow", 5, np.pi / 2)  # about z: the hand is now above the elbow
+    set_dof(actor, "elbow", 5, np.pi / 2)  # a rotation about z that moves the hand above the elbow
     actor.pose.translations[0] = [0.0, 0.0, 3.0]
     actor.pose.figure_translation[:] = [10.0, 0.0, 0.0]
     actor.pose.figure_scale = 2.0
     animation = single_frame(actor, rate=25.0, number=7, time=0.28)
-    # Twice as large, then moved by 10.
+    # The figure is scaled by 2, then moved by 10.
     assert_allclose(places(animation), [[10, 0, 6], [12, 0, 6], [12, 2, 6]], atol=ATOL)
     assert (animation.name, animation.frame_rate, animation.first_frame) == ("arm", 25.0, 7)
     assert_array_equal(animation.frames.times, [0.28])
     assert animation.frames.present.tolist() == [True]
 
 
-def test_motion_holds_the_same_frame():
+def test_motion_contains_the_same_frame():
     actor = Actor(arm())
     set_dof(actor, "elbow", 5, 0.5)
     animation = single_frame(actor, number=3, time=0.1)
@@ -71,7 +71,7 @@ def test_motion_holds_the_same_frame():
 
 
 def course_rig() -> Figure:
-    """A root that translates and rotates; its rotation about y is limited to 1.6 to 3 radians."""
+    """Return a root that translates and rotates, with y limited to 1.6 to 3 radians."""
     limits = np.tile([-np.inf, np.inf], (6, 1))
     limits[4] = 1.6, 3.0
     skeleton = Skeleton(
@@ -89,7 +89,7 @@ def course_rig() -> Figure:
 
 
 def test_keyed_rigs_get_raw_pose_values_as_keys():
-    # Only these angles are possible: those nearest to zero are outside the limits.
+    # Only these angles are within the limits; the equivalent angles nearest to zero are not.
     actor = Actor(course_rig())
     actor.pose.dofs[:] = [5.0, 0.0, 0.0, 0.25, 2.5, 0.0]
     animation = single_frame(actor, time=1.5)
@@ -110,14 +110,14 @@ def test_absent_people_are_missing():
     assert single_frame(actor).frames.present.tolist() == [False]
 
 
-def test_joint_scales_are_kept():
+def test_joint_scales_are_retained():
     actor = Actor(arm())
     actor.pose.scales[0] = [3.0, 1.0, 1.0]
     assert_allclose(places(single_frame(actor)), [[0, 0, 0], [3, 0, 0], [6, 0, 0]], atol=ATOL)
     assert_array_equal(actor.figure.skeleton.rest_scales, np.ones((3, 3)))
 
 
-def test_shapes_that_the_pose_leaves_out_count_as_0():
+def test_shape_weights_missing_in_the_pose_are_zero():
     mesh = Mesh(np.eye(3), np.eye(3), np.array([[0, 1, 2]]))
     shapes = BlendShapes(("a", "b"), np.zeros((2, 3, 3)))
     actor = Actor(replace(arm(), mesh=mesh, blend_shapes=shapes))

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from viewer.errors import RigError
 from viewer.rig.motion.timing import Timing
 
-# Four frames a second from second 1: 1.0, 1.25, (1.5 and 1.75 missing), 2.0, 2.25
+# Four frames per second from 1 s on: 1.0, 1.25, (1.5 and 1.75 missing), 2.0, 2.25
 GAP = Timing(4.0, np.array([0, 1, -1, -1, 2, 3]), first_frame=7, start=1.0)
 
 
@@ -23,7 +23,7 @@ def located(timing, time, interpolate=False):
     [
         (1.0, (0, 1, 0.0)),
         (1.125, (0, 1, 0.5)),
-        (1.25, (1, 1, 0.0)),  # the next frame is missing: this one is held until then
+        (1.25, (1, 1, 0.0)),  # the next frame is missing, so this one is held until its time
         (1.4, (1, 1, 0.0)),
         (1.5, (-1, -1, 0.0)),
         (1.99, (-1, -1, 0.0)),
@@ -33,7 +33,7 @@ def located(timing, time, interpolate=False):
         (-9.0, (0, 1, 0.0)),
     ],
 )
-def test_times_find_their_rows(time, expected):
+def test_times_are_mapped_to_rows(time, expected):
     assert located(GAP, time) == pytest.approx(expected, abs=1e-9)
 
 
@@ -54,24 +54,24 @@ def test_figure_is_absent_outside_the_range_unless_ends_are_held():
         (0.0, (0, 1, 0.0)),
     ],
 )
-def test_gaps_are_bridged_when_asked(time, expected):
+def test_gaps_are_interpolated_if_requested(time, expected):
     assert located(GAP, time, interpolate=True) == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("rate", [30.0, 29.97, 120.00004577636719, 23.976])
-def test_every_frame_is_reached_exactly(rate):
+def test_time_of_every_frame_maps_to_its_row(rate):
     timing = Timing(rate, np.arange(5000))
     frames = np.arange(5000)
     before, _, fraction = timing.locate(frames / rate)
     assert (before == frames).all() and not fraction.any()
 
 
-def test_times_and_frames():
+def test_times_of_frames_include_gaps():
     assert (GAP.n_frames, GAP.end, GAP.time(4)) == (6, 2.25, 2.0)
     assert GAP.present.tolist() == [True, True, False, False, True, True]
 
 
-def test_empty_timing_means_absence():
+def test_empty_timing_is_absent_at_all_times():
     for rows in ([], [-1, -1]):
         assert located(Timing(30.0, np.array(rows, dtype=int)), 0.0) == (-1, -1, 0.0)
 

@@ -20,7 +20,7 @@ def figure(tmp_path_factory):
 
 
 def standing(figure, turns, rows=None):
-    """Return an actor whose pelvis rotates in every frame; the model's own up axis is y."""
+    """Return an actor with a pelvis rotation in every frame; the up axis of the model is y."""
     vectors = np.zeros((len(turns), 1, 3))
     vectors[:, 0] = turns
     timing = Timing(30.0, np.arange(len(turns)) if rows is None else rows)
@@ -67,7 +67,7 @@ def test_keypoints_determine_the_up_axis(count, title, direction, up):
     assert guess_up([pointed(direction, count, title=title)]) == up
 
 
-def test_unseen_keypoints_do_not_count():
+def test_undetected_keypoints_are_ignored():
     assert guess_up([pointed((0, 1, 0), confidence=0.0)]) == "z"
 
 

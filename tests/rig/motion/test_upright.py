@@ -1,4 +1,4 @@
-"""Actors in their own world, as exported: the up axis, and upside-down actors."""
+"""Actors in the world of their file, as exported: the up axis, and upside-down actors."""
 
 from dataclasses import replace
 
@@ -44,7 +44,7 @@ def standing(up, placement=None, world_up=None, **parts):
         ("y", "z", -1, ("y", True)),
     ],
 )
-def test_up_axis_before_the_placement(figure, world, quarters, expected):
+def test_up_axis_is_that_before_the_placement(figure, world, quarters, expected):
     scene, actor = standing(figure, rotation_transform(0, quarters * np.pi / 2), world)
     assert own_up(scene, actor) == expected
 
@@ -98,7 +98,7 @@ def test_every_root_is_rotated_upright():
     assert_allclose(viewer.joint_matrices(figure, found.pose), wanted, rtol=0, atol=1e-13)
 
 
-def test_limits_and_missing_axes_do_not_matter():
+def test_limits_and_missing_axes_do_not_prevent_rotation():
     dofs = [(0, "tx", 0.5, 0, 1), (0, "x", 0.2, -0.1, 0.3), (0, "z", 0.1), (1, "y", 0.3)]
     skeleton = course_skeleton([-1, 0], dofs, offsets=np.array([[1.0, 2, 3], [0, 1, 0]]))
     actor = Actor(Figure("rig", skeleton=skeleton), placement=rotation_transform(0, np.pi))
@@ -107,7 +107,7 @@ def test_limits_and_missing_axes_do_not_matter():
     assert_allclose(viewer.joint_matrices(actor.figure, found.pose), wanted, rtol=0, atol=1e-12)
 
 
-def test_one_pose_is_the_frame_of_the_motion():
+def test_upright_pose_equals_the_frame_of_the_upright_motion():
     (actor,) = viewer.load(bundled_body()).actors
     turns = np.tile([0.0, 0, 0, 1.0], (1, 24, 1))
     turns[0, 0] = np.sin(0.4), 0, 0, np.cos(0.4)
@@ -125,7 +125,7 @@ def test_one_pose_is_the_frame_of_the_motion():
     )
 
 
-def test_an_upright_actor_is_placed_where_the_hanging_one_is():
+def test_upright_actor_is_placed_at_the_position_of_the_upside_down_one():
     scene, actor = standing("y", rotation_transform(0, np.pi), "y")
     actor.pose.figure_translation[:] = 1.0, 2.0, 3.0
     upright = upright_actor(scene, actor)

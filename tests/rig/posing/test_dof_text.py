@@ -16,7 +16,7 @@ def head(low: float, high: float) -> Skeleton:
     return make_skeleton(("head",), [-1], [[0, 0, 0]], (low, high))
 
 
-def test_angles_are_in_degrees_and_lengths_unscaled() -> None:
+def test_angles_are_in_degrees_and_lengths_in_file_units() -> None:
     skeleton = head(-1.0, 1.0)
     assert dof_value_text(skeleton, 4, math.pi / 6) == "30.0°"
     assert dof_value_text(skeleton, 4, -0.0) == "0.0°"
@@ -29,7 +29,7 @@ def test_value_and_limits_are_shown_together() -> None:
     assert text == "head.y is 0.0° in frame 7, its limits are 17.2° and 28.6°"
 
 
-def test_a_value_just_beyond_a_limit_is_distinguishable() -> None:
+def test_value_just_beyond_a_limit_is_distinguishable() -> None:
     # 1e-5 radians are 0.00057 degrees.
     text = str(beyond_text(head(0.3, 0.5), 4, 0.50001))
     assert text == "head.y is 28.6485°, its limits are 17.1887° and 28.6479°"

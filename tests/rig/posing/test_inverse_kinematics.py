@@ -1,4 +1,4 @@
-"""Inverse kinematics against the closed form of a two-link arm, and finite differences."""
+"""Inverse kinematics, compared with the closed form of a two-link arm and finite differences."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ NO_LIMIT = (-np.inf, np.inf)
 
 
 def arm(limits: dict[int, tuple[float, float]] | None = None) -> Skeleton:
-    """Two links of length 1 along x in the plane: each joint rotates about z."""
+    """Return two links of length 1 along x; each joint rotates about z."""
     chosen = limits or {}
     return Skeleton(
         names=("shoulder", "elbow", "hand"),
@@ -50,7 +50,7 @@ def test_arm_reaches_a_target_by_the_law_of_cosines() -> None:
     # |target|^2 = 2 = 2 + 2 cos(elbow), so the elbow is at a right angle.
     assert_allclose(abs(found.dofs[1]), np.pi / 2, atol=1e-5)
     assert_allclose(hand_at(skeleton, found.dofs), [1, 1, 0], atol=1e-6)
-    assert_allclose(pose.dofs, [0.3, 0.4])  # the start is unchanged
+    assert_allclose(pose.dofs, [0.3, 0.4])  # the start pose is unchanged
 
 
 def test_unreachable_target_is_pointed_at_with_a_straight_arm() -> None:
@@ -62,7 +62,7 @@ def test_unreachable_target_is_pointed_at_with_a_straight_arm() -> None:
     assert_allclose(hand_at(skeleton, found.dofs), [0, 2, 0], atol=0.05)
 
 
-def test_straight_arm_bends_when_it_is_pushed_back_along_itself() -> None:
+def test_straight_arm_bends_for_a_target_towards_its_shoulder() -> None:
     skeleton = arm()
     found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 0.0, 0.0]), rounds=200)
     assert found.distance < 1e-5
@@ -81,7 +81,7 @@ def test_reached_limit_is_reported_and_another_joint_compensates() -> None:
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.1, 0.5
     # With the elbow at its limit the hand is sqrt(2 + 2 cos 1) from the shoulder. It can reach any
-    # point of that circle, but none nearer to the shoulder.
+    # point of that circle, but no point nearer to the shoulder.
     radius = np.sqrt(2 + 2 * np.cos(1.0))
     found = reach(skeleton, pose, 2, np.array([0.0, 1.0, 0.0]), rounds=300)
     assert_allclose(found.distance, radius - 1.0, atol=1e-4)
@@ -127,7 +127,7 @@ def test_chain_has_the_nearest_rotatable_joints() -> None:
     assert chain_above(replace(skeleton, dof_limits=limits), 3, 2).tolist() == [1, 0]
 
 
-def test_chain_of_one_leaves_the_joints_above_it_alone() -> None:
+def test_chain_of_one_does_not_move_the_joints_above_it() -> None:
     skeleton = arm()
     found = reach(skeleton, rest_pose(skeleton), 2, np.array([1.0, 1.0, 0.0]), length=1)
     assert_allclose(found.dofs, [0.0, np.pi / 2], atol=1e-5)

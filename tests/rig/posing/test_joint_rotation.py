@@ -1,4 +1,4 @@
-"""A joint's DOFs for a rotation: explicit matrix products, limits, and ties."""
+"""DOFs of a joint for a given rotation: explicit matrix products, limits, and ties."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def single(axes: str, *limits: tuple[float, float], quaternion=(0, 0, 0, 1)) -> 
 
 
 @pytest.mark.parametrize("order", ["".join(order) for order in itertools.permutations("xyz")])
-def test_three_axes_in_any_order_are_exact(order) -> None:
+def test_rotation_about_three_axes_in_any_order_is_exact(order) -> None:
     skeleton = single(order, quaternion=(0.1, -0.3, 0.2, 0.9))
     pose = rest_pose(skeleton)
     for seed in range(20):
@@ -65,7 +65,7 @@ def test_three_axes_in_any_order_are_exact(order) -> None:
         assert found.error < 1e-7 and len(found.limited) == 0
 
 
-def test_order_of_axes_is_the_order_of_the_rows() -> None:
+def test_axes_are_applied_in_the_order_of_the_rows() -> None:
     # Rows z, x, y: z is applied first, so R = Ry Rx Rz.
     angles = np.array([0.3, -0.4, 1.1])
     wanted = about(1, 1.1) @ about(0, -0.4) @ about(2, 0.3)
@@ -74,10 +74,10 @@ def test_order_of_axes_is_the_order_of_the_rows() -> None:
     assert_allclose(found.dofs, angles, atol=1e-12)
 
 
-def test_of_two_solutions_the_one_nearer_the_current_values_is_chosen() -> None:
+def test_solution_nearer_the_current_values_is_chosen() -> None:
     skeleton = single("xyz")
     pose = rest_pose(skeleton)
-    # y beyond a right angle: the same rotation as (x + pi, pi - y, z + pi).
+    # With y beyond a right angle, the rotation equals that of (x + pi, pi - y, z + pi).
     pose.dofs[:] = 0.1, 2.0, 0.2
     wanted = about(2, 0.25) @ about(1, 2.1) @ about(0, 0.05)
     assert_allclose(nearest_dofs(skeleton, pose, 0, wanted).dofs, [0.05, 2.1, 0.25], atol=1e-9)
@@ -88,20 +88,20 @@ def test_of_two_solutions_the_one_nearer_the_current_values_is_chosen() -> None:
 
 
 def test_limits_select_the_allowed_solution() -> None:
-    # Only y between 1.6 and 2.5 is allowed; the usual solution has y below pi / 2.
+    # Only y between 1.6 and 2.5 is allowed; the principal solution has y below pi / 2.
     skeleton = single("xyz", FREE, (1.6, 2.5), FREE)
     wanted = about(2, 0.4) @ about(1, 2.2) @ about(0, -0.3)
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, wanted)
     assert_allclose(found.dofs, [-0.3, 2.2, 0.4], atol=1e-9)
 
 
-def test_limits_360_degrees_away_are_found() -> None:
+def test_solution_360_degrees_away_within_the_limits_is_found() -> None:
     skeleton = single("x", (2 * np.pi + 0.1, 2 * np.pi + 1.0))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(0, 0.5))
     assert_allclose(found.dofs, [2 * np.pi + 0.5], atol=1e-12)
 
 
-def test_beyond_a_limit_the_nearest_rotation_is_used_and_the_dof_named() -> None:
+def test_rotation_beyond_a_limit_is_replaced_by_the_nearest_and_its_dof_named() -> None:
     skeleton = single("xyz", (-0.5, 0.5), (-0.5, 0.5), (-0.5, 0.5))
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(1, 0.8))
     assert_allclose(found.dofs, [0, 0.5, 0], atol=1e-9)
@@ -109,7 +109,7 @@ def test_beyond_a_limit_the_nearest_rotation_is_used_and_the_dof_named() -> None
     assert found.error == pytest.approx(0.3)
 
 
-def test_nothing_within_the_limits_is_nearer() -> None:
+def test_no_rotation_within_the_limits_is_nearer() -> None:
     limits = ((-0.6, 0.4), (-0.3, 0.7), (-0.5, 0.2))
     skeleton = single("xyz", *limits)
     grids = [np.linspace(low, high, 15) for low, high in limits]
@@ -128,9 +128,9 @@ def test_nothing_within_the_limits_is_nearer() -> None:
         assert (found.dofs <= skeleton.dof_limits[:, 1]).all()
 
 
-def test_one_axis_takes_the_twist_about_it() -> None:
+def test_single_axis_takes_the_twist_about_it() -> None:
     skeleton = single("y")
-    # Of Ry(0.7) Rx(0.2) an axis y alone gets 0.7 by symmetry of the trace in x.
+    # For Ry(0.7) Rx(0.2), a single axis y is rotated by 0.7, because the trace is symmetric in x.
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(1, 0.7) @ about(0, 0.2))
     t = np.linspace(-np.pi, np.pi, 100_001)
     wanted = about(1, 0.7) @ about(0, 0.2)
@@ -143,7 +143,7 @@ def test_one_axis_takes_the_twist_about_it() -> None:
     assert found.error > 0.1 and len(found.limited) == 0
 
 
-def test_joint_without_rotations_stays() -> None:
+def test_joint_without_rotations_is_unchanged() -> None:
     skeleton = single("")
     found = nearest_dofs(skeleton, rest_pose(skeleton), 0, about(2, 0.5))
     assert found.dofs.shape == (0,) and found.error == pytest.approx(0.5)

@@ -27,7 +27,7 @@ def test_pose_has_the_vertices_of_the_published_equations(figure):
     assert_allclose(deform(figure, pose)[0], wanted, atol=1e-10)
 
 
-def test_wrong_counts_and_other_figures_are_refused(figure):
+def test_wrong_counts_and_figures_without_parameters_are_refused(figure):
     parameters = np.zeros(len(NAMES))
     with pytest.raises(RigError, match="46"):
         parameter_pose(figure, parameters, np.ones(46), np.zeros(1))

@@ -1,4 +1,4 @@
-"""Pose records: DOFs by name, the model's own pose vector, smplx's parts, shape and placement."""
+"""Pose records: DOFs by name, pose vectors of models, parts of smplx, shape and placement."""
 
 import numpy as np
 import pytest
@@ -36,14 +36,14 @@ def vectors(figure: Figure, pose: Pose) -> np.ndarray:
 
 
 def applied(figure: Figure, **words) -> tuple[np.ndarray, list[str]]:
-    """Apply a record to the rest pose; return the joints' rotation vectors and the notes."""
+    """Apply a record to the rest pose; return the rotation vectors of the joints and the notes."""
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(**words), figure, pose)
     return vectors(figure, pose), notes
 
 
 def refusal(figure: Figure, **words) -> str:
-    """Return the refusal of a record, after checking that the pose is unchanged."""
+    """Check that a record is refused without changing the pose; return the refusal."""
     pose = figure_pose(figure)
     pose.dofs[:] = 0.125
     before = pose_key(pose)
@@ -58,7 +58,7 @@ def hinges() -> Figure:
     return Figure("hinges", skeleton=skeleton([-1, 0], dofs, names=["hip", "knee"]))
 
 
-def test_dofs_are_set_by_name_and_the_others_stay():
+def test_dofs_are_set_by_name_and_others_unchanged():
     figure = hinges()
     pose = rest_pose(figure.skeleton)
     assert apply_record(PoseRecord(dofs={"knee.z": 0.75, "hip.x": -0.5}), figure, pose) == []
@@ -73,19 +73,19 @@ def test_dofs_beyond_their_limits_are_clamped_and_counted():
     assert told(notes) == [("F007.pose-clamped", {"n": 2})]
 
 
-def test_unknown_dof_is_refused_and_leaves_the_pose():
+def test_unknown_dof_is_refused_and_the_pose_unchanged():
     message = refusal(hinges(), dofs={"knee.z": 0.5, "elbow.x": 1.0})
     assert message.startswith("expected a DOF of ") and message.endswith(
         'found "elbow.x": no joint is called "elbow"; there are 2: hip, knee'
     )
 
 
-def test_malformed_dof_is_named_once():
+def test_malformed_dof_is_reported_once():
     message = refusal(hinges(), dofs={"knee.q": 0.5})
     assert message.count("knee.q") == 1 and ": expected JOINT.KIND with KIND" in message
 
 
-def test_dofs_win_over_the_vector():
+def test_dofs_take_precedence_over_the_vector():
     figure = hinges()
     pose = rest_pose(figure.skeleton)
     apply_record(PoseRecord(dofs={"knee.z": 0.25}, vector=np.ones(3)), figure, pose)
@@ -109,7 +109,7 @@ def test_raw_pose_vector_rotates_every_joint(family, kind):
     assert notes == []
 
 
-# Joints beyond the 22 that both models share: first in the vector, first in the figure, count.
+# ``shared``: first joint after the 22 body joints in the vector, in the figure, and their number.
 @pytest.mark.parametrize(
     ("kind", "count", "shared", "left_out"),
     [
@@ -137,7 +137,7 @@ def test_vector_of_another_family_member_is_matched_by_joint_names(
     assert told(notes) == (said if left_out else [])
 
 
-def test_joints_missing_from_the_vector_go_to_rest(family):
+def test_joints_missing_in_the_vector_are_set_to_rest(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[:] = 0.1
@@ -145,7 +145,7 @@ def test_joints_missing_from_the_vector_go_to_rest(family):
     assert not pose.dofs.any()
 
 
-def test_mano_accepts_a_hand_of_either_side(family):
+def test_mano_accepts_a_left_or_right_hand(family):
     wanted = np.random.default_rng(7).uniform(-0.5, 0.5, 45)
     found, notes = applied(family("mano"), parts={"left_hand_pose": wanted})
     assert_allclose(found[1:].ravel(), wanted, atol=1e-13)
@@ -153,7 +153,7 @@ def test_mano_accepts_a_hand_of_either_side(family):
 
 
 @pytest.mark.parametrize("scale", [0.0, -2.0, 1e-300, 1e300])
-def test_invalid_scale_is_left_out(family, scale):
+def test_invalid_scale_is_ignored(family, scale):
     figure = family("smpl")
     pose = figure_pose(figure)
     pose.figure_scale = 1.5
@@ -164,7 +164,7 @@ def test_invalid_scale_is_left_out(family, scale):
     assert values["fault"].values["found"] == scale
 
 
-def test_extreme_placement_and_shape_are_left_out_or_refused(family):
+def test_extreme_placement_is_ignored_and_extreme_shape_refused(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     notes = apply_record(PoseRecord(translation=np.array([1e300, 0, 0])), figure, pose)
@@ -175,7 +175,7 @@ def test_extreme_placement_and_shape_are_left_out_or_refused(family):
     assert message == "shape coefficients: expected at most 1e+06, found 1e+300"
 
 
-def test_resting_hands_of_another_family_member_give_no_note(family):
+def test_hands_at_rest_of_another_family_member_cause_no_note(family):
     wanted = np.zeros(72)
     wanted[:66] = 0.1
     assert applied(family("smplx"), vector=wanted)[1] == []
@@ -191,14 +191,14 @@ def test_vector_of_unknown_length_is_refused(family, kind, count, own):
     assert message == f"expected {own} pose values for {figure.name}, found {count}"
 
 
-def test_body_pose_begins_after_the_root(family):
+def test_body_pose_starts_after_the_root(family):
     wanted = np.random.default_rng(2).uniform(-1, 1, (21, 3))
     found, notes = applied(family("smplx"), parts={"body_pose": wanted.ravel()})
     assert_allclose(found[1:22], wanted, atol=1e-13)
     assert not found[0].any()
     assert not found[22:].any()
     assert notes == []
-    # SMPL's own vector has the two hands as well.
+    # The pose vector of SMPL itself also includes the two hands.
     wanted = np.random.default_rng(3).uniform(-1, 1, (23, 3))
     assert_allclose(applied(family("smpl"), parts={"body_pose": wanted})[0][1:], wanted, atol=1e-13)
 
@@ -223,7 +223,7 @@ def test_body_pose_of_another_length_is_refused(family):
         ("jaw_pose", "flame", 2),
     ],
 )
-def test_single_joints_by_the_names_of_smplx(family, part, kind, joint):
+def test_single_joints_are_set_by_smplx_names(family, part, kind, joint):
     found, notes = applied(family(kind), parts={part: np.array([0.1, -0.2, 0.3])})
     assert_allclose(found[joint], [0.1, -0.2, 0.3], atol=1e-14)
     assert not np.delete(found, joint, axis=0).any()
@@ -238,7 +238,7 @@ def test_missing_part_is_reported_unless_at_rest(family):
     assert not found.any()
 
 
-def test_single_joint_needs_three_numbers(family):
+def test_single_joint_requires_three_numbers(family):
     message = refusal(family("smplx"), parts={"jaw_pose": np.ones(6)})
     assert message == "jaw_pose: expected 3 numbers, found 6"
 
@@ -253,12 +253,12 @@ def hand_arrays(kind, side):
 
 @pytest.mark.parametrize(("kind", "side", "first"), HANDS)
 @pytest.mark.parametrize("flat", [None, True, False])
-def test_few_numbers_are_coefficients(family, kind, side, first, flat):
+def test_few_numbers_are_hand_coefficients(family, kind, side, first, flat):
     components, mean = hand_arrays(kind, side)
     part = f"{side}_hand_pose" if side else "hand_pose"
     weights = np.array([0.5, -0.25, 0.125])
     expected = 0.5 * components[0] - 0.25 * components[1] + 0.125 * components[2]
-    if not flat:  # stated or not stated
+    if not flat:  # not stated, or False
         expected = expected + mean
     found, _ = applied(family(kind), parts={part: weights}, flat_hands=flat)
     assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)
@@ -267,7 +267,7 @@ def test_few_numbers_are_coefficients(family, kind, side, first, flat):
 
 @pytest.mark.parametrize(("kind", "side", "first"), HANDS)
 @pytest.mark.parametrize("flat", [None, True, False])
-def test_forty_five_numbers_are_rotation_vectors(family, kind, side, first, flat):
+def test_forty_five_numbers_are_rotation_vectors_by_default(family, kind, side, first, flat):
     _, mean = hand_arrays(kind, side)
     part = f"{side}_hand_pose" if side else "hand_pose"
     wanted = np.random.default_rng(4).uniform(-0.5, 0.5, 45)
@@ -276,7 +276,7 @@ def test_forty_five_numbers_are_rotation_vectors(family, kind, side, first, flat
     assert_allclose(found[first : first + 15].ravel(), expected, atol=1e-13)
 
 
-def test_forty_five_coefficients_if_the_file_says_so(family):
+def test_forty_five_numbers_are_coefficients_if_the_file_states_so(family):
     components, mean = hand_arrays("smplx", "left")
     weights = np.zeros(45)
     weights[44] = 0.5
@@ -293,7 +293,7 @@ def test_hand_of_another_length_is_refused(family):
     assert refusal(figure, **words) == "left_hand_pose: expected 45 numbers, found 12"
 
 
-def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
+def test_fingers_without_components_accept_only_rotation_vectors(tmp_path):
     none = {f"hands_{what}{side}": None for what in ("components", "mean") for side in "lr"}
     figure = family_figure("smplh", tmp_path, **none)
     wanted = np.random.default_rng(5).uniform(-0.5, 0.5, 45)
@@ -306,7 +306,7 @@ def test_fingers_without_components_take_rotation_vectors_only(tmp_path):
     assert not found.any()
 
 
-def test_shape_and_expression_go_to_their_own_rows(family):
+def test_shape_and_expression_are_set_separately(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.shape_weights[:] = 9.0
@@ -316,7 +316,7 @@ def test_shape_and_expression_go_to_their_own_rows(family):
     assert pose.shape_weights.tolist() == [1, 2, *[0] * 8, 3, *[0] * 9]
 
 
-def test_more_coefficients_than_the_figure_has_must_be_zero(family):
+def test_coefficients_beyond_those_of_the_figure_must_be_zero(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     apply_record(PoseRecord(shape=np.array([1.0] * 10 + [0.0] * 290)), figure, pose)
@@ -327,7 +327,7 @@ def test_more_coefficients_than_the_figure_has_must_be_zero(family):
     assert message == f"{figure.name} has 0 expression coefficients, found 1"
 
 
-def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
+def test_coefficients_beyond_those_of_the_figure_can_be_left_out(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     record = PoseRecord(shape=np.array([0.5] * 14 + [-3.0, 0.0]), expression=np.array([2.0]))
@@ -340,14 +340,14 @@ def test_more_coefficients_than_the_figure_has_can_be_left_out(family):
     assert pose.shape_weights.tolist() == [0.5] * 10
 
 
-def test_shapes_for_a_figure_without_any_are_refused_all_the_same():
+def test_shapes_for_a_figure_without_shapes_are_refused():
     rig = Figure("bones", skeleton=skeleton((-1,)))
     with pytest.raises(RigError) as caught:
         apply_record(PoseRecord(shape=np.ones(3)), rig, figure_pose(rig), drop_excess=True)
     assert str(caught.value) == "bones has 0 shape coefficients, found 3"
 
 
-def test_placement_is_applied_and_missing_values_stay(family):
+def test_placement_is_applied_and_missing_values_are_unchanged(family):
     figure = family("smpl")
     pose = figure_pose(figure)
     pose.dofs[:] = 0.1
@@ -380,7 +380,7 @@ def test_pose_record_round_trips(family, kind):
     assert pose_key(again) == pose_key(pose)
 
 
-def test_record_holds_labels_and_raw_pose_values(family):
+def test_record_contains_labels_and_raw_pose_values(family):
     figure = family("smplx")
     pose = figure_pose(figure)
     pose.dofs[3 * 4] = 0.5  # left knee about x
@@ -393,7 +393,7 @@ def test_record_holds_labels_and_raw_pose_values(family):
     assert record.expression.tolist() == [2.0, *[0.0] * 9]
 
 
-def test_record_of_a_figure_without_shapes_has_none():
+def test_record_of_a_figure_without_shapes_has_no_shapes():
     figure = hinges()
     record = record_of(figure, rest_pose(figure.skeleton))
     assert record.shape is None and record.expression is None

@@ -1,4 +1,4 @@
-"""A model's own pose vectors: rotation vectors or z-y-x angles, to a pose and back."""
+"""Pose vectors of models, as rotation vectors or z-y-x angles, converted to a pose and back."""
 
 from dataclasses import replace
 
@@ -21,7 +21,8 @@ from viewer.rig.skeleton import ball_skeleton
 
 BALLS = ball_skeleton(tuple("abcd"), np.array([-1, 0, 1, 1]), np.eye(4, 3))
 SMPL = PoseLayout(12, 3 * np.arange(4), np.zeros(4, bool))
-# Like PIG: translation, then the root as angles about z, y, x, the others as vectors, then scale.
+# The layout of PIG: translation, root angles about z, y, x, rotation vectors of the other joints,
+# scale.
 PIG = PoseLayout(16, 3 + 3 * np.arange(4), np.arange(4) == 0, translation=0, scale=15)
 
 
@@ -83,14 +84,14 @@ def test_pig_root_at_a_right_angle_about_y_keeps_its_rotation():
     assert_allclose(turn_z(z) @ turn_y(y) @ turn_x(x), wanted, atol=1e-13)
 
 
-def test_raw_pose_values_of_each_joint():
+def test_raw_pose_values_are_those_of_each_joint():
     root = turn_z(0.3) @ turn_y(0.4) @ turn_x(0.5)
     rotations = np.array([root, about([0.1, 0.2, 0.3]), np.eye(3), np.eye(3)])
     expected = [[0.3, 0.4, 0.5], [0.1, 0.2, 0.3], [0, 0, 0], [0, 0, 0]]
     assert_allclose(own_numbers(PIG, rotations), expected, atol=1e-14)
 
 
-def test_values_may_be_in_another_order_than_the_joints():
+def test_values_may_be_in_a_different_order_than_the_joints():
     layout = PoseLayout(13, [9, 0, 6, 3], np.zeros(4, bool), scale=12)
     vector = np.zeros(13)
     vector[0], vector[12] = 0.5, 2.0
@@ -103,10 +104,10 @@ def test_values_may_be_in_another_order_than_the_joints():
 def test_model_without_layout_uses_its_dofs():
     bones = skeleton([-1, 0], [(0, "tx", 0.0), (1, "z", 0.0, -1.0, 1.0)])
     pose = posed(None, [3.0, 2.0], bones)
-    assert pose.dofs.tolist() == [3.0, 1.0]  # clamped to its limits
+    assert pose.dofs.tolist() == [3.0, 1.0]  # the second DOF is clamped to its limits
     written = write_vector(None, bones, pose)
     assert written.tolist() == [3.0, 1.0]
-    written[0] = 9.0  # the caller's own copy
+    written[0] = 9.0  # changing the returned copy does not change the pose
     assert pose.dofs[0] == 3.0
 
 
@@ -120,14 +121,14 @@ def test_wrong_number_of_values_is_refused(layout, count, extra):
     assert not pose.dofs.any()
 
 
-def test_shape_of_the_pose_stays():
+def test_reading_a_vector_does_not_change_shape_weights():
     pose = rest_pose(BALLS)
     pose.shape_weights = np.array([1.0, 2.0])
     read_vector(SMPL, BALLS, pose, np.ones(12))
     assert pose.shape_weights.tolist() == [1.0, 2.0]
 
 
-def test_rotation_rows_are_those_of_ball_joints_only():
+def test_rotation_rows_are_only_those_of_ball_joints():
     dofs = [(0, "x", 0.0), (0, "y", 0.0), (0, "z", 0.0)]
     dofs += [(1, "z", 0.0), (1, "y", 0.0), (1, "x", 0.0)]  # in another order
     dofs += [(2, "x", 0.0), (2, "z", 0.0)]
@@ -163,7 +164,7 @@ def test_limits_apply_to_ball_joints_unless_disabled():
     assert_allclose(pose.dofs, [0.5, 0, 0], atol=1e-15)
 
 
-def test_limits_of_a_hinge_leave_the_rest_to_its_quaternion():
+def test_rotation_beyond_a_hinge_is_stored_in_its_quaternion():
     bones = skeleton([-1], [(0, "x", 0.5, 0.25, 2.0)])
     pose = rest_pose(bones)
     set_joint_rotations(bones, pose, np.array([0]), turn_x(0.75)[None])
@@ -171,7 +172,7 @@ def test_limits_of_a_hinge_leave_the_rest_to_its_quaternion():
     assert_allclose(pose.rotations, [[np.sin(0.25), 0, 0, np.cos(0.25)]], atol=1e-15)
 
 
-def test_only_the_named_joints_rotate():
+def test_only_the_selected_joints_rotate():
     pose = rest_pose(BALLS)
     pose.dofs[:] = 0.25
     set_joint_rotations(BALLS, pose, np.array([2]), np.eye(3)[None])

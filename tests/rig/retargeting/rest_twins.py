@@ -1,8 +1,7 @@
-"""The same walk of the same person, written with different rest conventions.
-
-The truth is a person in a T-pose and the world rotations G of its joints relative to that pose.
-A file with the joint axes C (world axes in the T-pose) has the world rotations G C, and each offset
-in the axes of the parent: C_parent^T offset. Its zero pose puts the offsets together unrotated.
+"""One walk of one person, written with different rest conventions. The ground truth is a person in
+a T-pose and the world rotations G of the joints relative to that pose. A file with the joint axes C
+(world axes in the T-pose) has the world rotations G C, and each offset in the axes of the parent:
+C_parent^T offset. In its zero pose, the offsets are added without rotation.
 """
 
 from __future__ import annotations
@@ -40,12 +39,13 @@ def truth(starts_in_t_pose: bool) -> tuple[np.ndarray, np.ndarray]:
         hip = -0.2 - 0.4 * swing
         rotate(f"{side}UpLeg", X, hip)
         rotate(f"{side}Leg", X, knee)
-        # The sole is level in stance, when the knee is nearly straight, and the heel rises after.
+        # The sole is level in stance, when the knee is nearly straight, and the heel rises
+        # afterwards.
         rotate(f"{side}Foot", X, -hip - knee + np.maximum(0.0, knee - 0.5))
         rotate(f"{side}ForeArm", -sign * Y, 0.6 + 0.4 * swing)
     local = matrices(vectors)
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
-        # The arms hang and swing.
+        # The arms hang down and swing.
         swing = np.sin(phase + (np.pi if sign > 0 else 0.0))
         hang = matrices(np.tile(-sign * 1.2 * Z, (N_FRAMES, 1)))
         local[:, NAMES.index(f"{side}Arm")] = matrices(0.4 * swing[:, None] * X) @ hang
@@ -98,7 +98,7 @@ def t_pose() -> np.ndarray:
 
 
 def a_pose() -> np.ndarray:
-    """Return the axes of a file whose zero pose has the arms lowered by 45 degrees."""
+    """Return the axes of a file with arms lowered by 45 degrees in the zero pose."""
     vectors = np.zeros((1, len(NAMES), 3))
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         vectors[0, NAMES.index(f"{side}Arm")] = -sign * np.pi / 4.0 * Z
@@ -106,7 +106,7 @@ def a_pose() -> np.ndarray:
 
 
 def along_x() -> np.ndarray:
-    """Return the axes of a file whose bones all lie along +x, with any roll."""
+    """Return the axes of a file with all bones along +x and arbitrary roll."""
     axes = t_pose()
     rng = np.random.default_rng(5)
     for joint in range(len(NAMES)):

@@ -33,8 +33,8 @@ def matched(drive, figure=BODY_FIGURE):
     }
 
 
-def test_a_map_of_the_automatic_match_changes_nothing():
-    twin = moving(BODY_FIGURE)  # the same hierarchy: local rotations are copied
+def test_map_of_the_automatic_match_does_not_change_the_motion():
+    twin = moving(BODY_FIGURE)  # the hierarchies are equal, so local rotations are copied
     for motion in (MOTION, twin):
         drive = Drive(motion)
         mapped = replace(drive, joint_map=full_map(drive, BODY_FIGURE))
@@ -44,7 +44,7 @@ def test_a_map_of_the_automatic_match_changes_nothing():
         assert np.array_equal(plain.figure_translations, again.figure_translations)
 
 
-def test_a_mapped_source_joint_is_not_matched_by_name_again():
+def test_mapped_source_joint_is_not_matched_by_name_too():
     drive = Drive(MOTION, joint_map=JointMap((("left_elbow", "RightForeArm"),)))
     found = matched(drive)
     assert found["left_elbow"] == ("RightForeArm", "map")
@@ -52,7 +52,7 @@ def test_a_mapped_source_joint_is_not_matched_by_name_again():
     assert found["left_wrist"] == ("LeftHand", "name")
 
 
-def test_one_source_joint_may_drive_several_and_others_stay_at_rest():
+def test_source_joint_may_drive_several_joints_and_unmapped_joints_stay_at_rest():
     snake = figure_of(SNAKE, "snake")
     motion = moving(figure_of({"x": ("", (0, 0, 0)), "y": ("x", (0, 0, 1))}, "worm"))
     joint_map = JointMap((("base", "x"), ("mid", "y"), ("tip", "y")))
@@ -63,7 +63,7 @@ def test_one_source_joint_may_drive_several_and_others_stay_at_rest():
     np.testing.assert_allclose(clip.rotations[:, 2], [[0, 0, 0, 1]] * 5, atol=1e-12)
 
 
-def test_origins_name_how_joints_were_matched():
+def test_origins_state_how_joints_were_matched():
     own = matched(Drive(MOTION))
     assert own["pelvis"] == ("Hips", "name") and own["left_knee"] == ("LeftLeg", "name")
     twin = matched(Drive(moving(BODY_FIGURE)))
@@ -91,7 +91,7 @@ def test_origins_name_how_joints_were_matched():
         ((("pelvis", "Hips"), ("left_knee", "tail")), 4, "F004.mapping-joints"),
     ],
 )
-def test_errors_in_a_map_are_located(pairs, line, key):
+def test_errors_in_a_map_are_reported_with_their_location(pairs, line, key):
     table = {**HIK, "a": ("Hips", (0, 0, 1)), "b": ("a", (0, 0, 2))}
     figure = figure_of(table, "mocap")
     names = tuple({"a": "tail", "b": "tail"}.get(name, name) for name in table)
@@ -102,7 +102,7 @@ def test_errors_in_a_map_are_located(pairs, line, key):
     assert (found.key, found.path, found.line) == (key, Path("map.txt"), line)
 
 
-def test_a_map_that_keeps_everything_at_rest_is_refused():
+def test_map_that_leaves_all_joints_at_rest_is_refused():
     pairs = tuple((name, "") for name in BODY)
     with pytest.raises(RigError) as caught:
         retarget(MOTION, BODY_FIGURE, JointMap(pairs))

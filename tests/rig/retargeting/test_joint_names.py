@@ -1,4 +1,4 @@
-"""Joint names used by many programs, and plain names."""
+"""Recognition of the joint names of many programs, and plain ASCII names."""
 
 from __future__ import annotations
 
@@ -356,17 +356,17 @@ def test_family_names_map_to_themselves(count: int) -> None:
     ["left_hip", "LeftHip", "L_Hip", "l_hip", "hip.L", "Hip_L", "hip_left", "LEFT_HIP", "lHip",
      "hip-l", "LeftThigh", "thigh.left", "L Thigh", "lthigh", "leftupleg", "ns:sub:LHip"],
 )  # fmt: skip
-def test_sides_are_found_at_either_end(name: str) -> None:
+def test_sides_are_recognised_at_either_end_of_a_name(name: str) -> None:
     assert canonical_names(["pelvis", name], np.array([-1, 0]))[1] == "left_hip"
 
 
-def test_no_name_occurs_twice() -> None:
+def test_no_canonical_name_occurs_twice() -> None:
     names = ["Hips", "LeftLeg", "LeftKnee", "Head", "Head"]
     found = canonical_names(names, np.array([-1, 0, 1, 0, 3]))
     assert found == ("pelvis", "left_knee", "", "head", "")
 
 
-def test_meaningless_names_map_to_nothing() -> None:
+def test_unknown_names_have_no_canonical_name() -> None:
     names = ["", "bone1", "bone2", "left", "tail_01", "wing_02_r", "123", "é"]
     assert canonical_names(names, np.arange(8) - 1) == ("",) * 8
 
@@ -386,7 +386,7 @@ def test_plain_names_are_unique_and_ascii() -> None:
 
 
 @given(st.lists(st.text(max_size=6) | st.sampled_from(["a", "a_2", "a_3", "joint1"]), max_size=12))
-def test_plain_names_of_anything(names: list[str]) -> None:
+def test_plain_names_of_arbitrary_names_are_valid_and_unique(names: list[str]) -> None:
     found = plain_names(names)
     assert len(set(found)) == len(names)
     assert all(name and set(name) <= set(PLAIN) for name in found)

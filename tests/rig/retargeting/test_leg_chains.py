@@ -1,4 +1,4 @@
-"""Legs of animals, found from the shape of the skeleton, and planted paws."""
+"""Animal legs, found by the shape of the skeleton, and planted paws."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.shape import rest_joints
 
 UP = np.array([0.0, 1.0, 0.0])
-EDGE = 6  # frames of a stance during which the paw still lands or already leaves
+EDGE = 6  # frames at either end of a stance in which the paw lands or lifts off
 
 
 def legs(figure, up=UP):
@@ -25,7 +25,7 @@ def legs(figure, up=UP):
     return [tuple(names[j] for j in (leg.hip, leg.knee, leg.ankle, leg.toe)) for leg in found]
 
 
-def test_the_legs_of_the_fox_begin_below_the_scapula():
+def test_legs_of_the_fox_begin_below_the_scapula():
     found = legs(load().actors[0].figure)
     wanted = {
         tuple(f"{end}_{part}_{side}" for part in ("upper", "lower", "paw", "toes"))
@@ -41,7 +41,7 @@ def test_people_have_no_animal_legs(table):
     assert legs(figure_of(table, "person")) == []
 
 
-def test_toes_share_a_leg_and_a_tail_on_the_ground_is_not_a_leg():
+def test_toes_belong_to_one_leg_and_a_tail_on_the_ground_is_not_a_leg():
     table = animal()
     for paw in PAWS:
         place = np.array(table[f"{paw}_toe"][1])
@@ -58,13 +58,13 @@ def test_toes_share_a_leg_and_a_tail_on_the_ground_is_not_a_leg():
     assert len(legs(lying, np.array([0.0, 0.0, 1.0]))) == 4
 
 
-def test_three_legs_or_points_are_not_an_animal():
+def test_three_legs_or_two_points_are_not_an_animal():
     table = {name: row for name, row in animal().items() if not name.startswith("fore_r")}
     assert legs(figure_of(table, "three")) == []
     assert animal_legs(np.array([-1, 0], dtype=np.int32), np.zeros((2, 3)), UP) == []
 
 
-def test_paws_stand_where_those_of_the_other_animal_do():
+def test_paws_are_planted_in_the_stances_of_the_source_animal():
     figure = other_animal()
     found = retargeted(trot(), figure)
     clip, changes = plant_feet(found, figure)
@@ -77,7 +77,7 @@ def test_paws_stand_where_those_of_the_other_animal_do():
         rows = slice(first + EDGE, first + 45 - EDGE)
         slid.append(np.ptp(old[f"{paw}_toe"][rows, 2]))
         assert_allclose(np.ptp(new[f"{paw}_toe"][rows], axis=0), 0.0, atol=1e-9)
-        assert_allclose(new[f"{paw}_toe"][rows, 1], 0.0, atol=1e-9)  # the soles are the toes
+        assert_allclose(new[f"{paw}_toe"][rows, 1], 0.0, atol=1e-9)  # the toes serve as soles
     assert max(slid) > 0.009
     source = places(found.source.figure, found.source.clip)
     assert np.ptp(source["hind_l_toe"][EDGE : 45 - EDGE], axis=0).max() < 1e-12

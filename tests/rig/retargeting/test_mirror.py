@@ -40,7 +40,7 @@ NAMES = (
 PARENTS = np.array([-1, 0, 1, 1, 2, 3, 4, 5, 0, 0])
 PARTNERS = [0, 1, 3, 2, 5, 4, 7, 6, 9, 8]
 LEFT, RIGHT = [2, 4, 6, 8], [3, 5, 7, 9]
-# Across, up and to the front; mirroring negates the first coordinate.
+# Coordinates are across, up and to the front; mirroring negates the first one.
 PLACES = np.zeros((10, 3))
 PLACES[1] = 0.0, 1.0, 0.1
 PLACES[LEFT] = [[0.3, 1.2, 0.1], [0.8, 1.1, 0.0], [1.3, 1.1, 0.3], [0.2, -0.2, 0.0]]
@@ -48,7 +48,7 @@ PLACES[RIGHT] = PLACES[LEFT] * [-1, 1, 1]
 
 
 def symmetric_figure(axis=0, up="y", with_map=True) -> Figure:
-    """Return a cloud with a mirror counterpart of every vertex, bound alike on both sides."""
+    """Return a point cloud with a mirror counterpart, bound symmetrically, for every vertex."""
     rng = np.random.default_rng(0)
     left = rng.normal(size=(20, 3))
     points = np.vstack([left, left * [-1, 1, 1], rng.normal(size=(4, 3)) * [0, 1, 1]])
@@ -56,7 +56,7 @@ def symmetric_figure(axis=0, up="y", with_map=True) -> Figure:
     influences = [[(int(j), float(w)) for j, w in rows] for rows in _rows(rng, 20)]
     mirrored = [[(PARTNERS[j], w) for j, w in pairs] for pairs in influences]
     middle = [[(0, 0.5), (1, 0.5)], [(0, 1.0)], [(2, 0.5), (3, 0.5)], [(6, 0.3), (7, 0.3)]]
-    order = [0, 1, 2] if axis == 0 else [2, 0, 1]  # axes of across, up and front
+    order = [0, 1, 2] if axis == 0 else [2, 0, 1]  # the axes across, up and to the front
     joints = PLACES[:, order]
     bind = np.array([matrix(None, -place) for place in joints])
     return Figure(
@@ -94,7 +94,7 @@ def check_mirror(figure, pose, axis=0):
     assert_allclose(found[figure.symmetry], flipped(positions, axis), atol=1e-12)
 
 
-def test_mirror_counterparts_are_left_and_right():
+def test_mirror_counterparts_are_left_and_right_joints():
     assert joint_partners(symmetric_figure()).tolist() == PARTNERS
     assert joint_partners(symmetric_figure(1, "z")).tolist() == PARTNERS
 
@@ -154,12 +154,12 @@ def turned_figure(uneven=True) -> Figure:
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_rest_rotations_may_differ_from_side_to_side(seed):
+def test_rest_rotations_may_differ_between_sides(seed):
     figure = turned_figure()
     check_mirror(figure, random_pose(figure, seed))
 
 
-def test_scales_change_sides():
+def test_scales_are_exchanged_between_sides():
     figure = turned_figure()
     pose = random_pose(figure)
     pose.scales[4] = 2.0
@@ -168,7 +168,7 @@ def test_scales_change_sides():
 
 
 @pytest.mark.parametrize("make", [symmetric_figure, turned_figure])
-def test_joint_translations_change_sides(make):
+def test_joint_translations_are_exchanged_between_sides(make):
     figure = make()
     pose = random_pose(figure)
     pose.translations[:] = np.random.default_rng(6).normal(size=(10, 3))
@@ -176,7 +176,7 @@ def test_joint_translations_change_sides(make):
 
 
 def moving_figure(figure) -> Figure:
-    """Return the figure with translations as DOFs of the hips and both hands."""
+    """Return the figure with translation DOFs at the hips and both hands."""
     bones = figure.skeleton
     moving = np.repeat([0, 6, 7], 3)
     joints, kinds = [*moving, *bones.dof_joints], [*[0, 1, 2] * 3, *bones.dof_kinds]
@@ -191,7 +191,7 @@ def moving_figure(figure) -> Figure:
 
 
 @pytest.mark.parametrize("make", [symmetric_figure, turned_figure])
-def test_translation_dofs_change_sides(make):
+def test_translation_dofs_are_exchanged_between_sides(make):
     figure = moving_figure(make())
     check_mirror(figure, random_pose(figure))
 
@@ -213,7 +213,7 @@ def hinged(low, high) -> Figure:
 
 
 @pytest.mark.parametrize("limits", [(-2.0, 2.0), (0.25, 2.0), (-2.0, -0.25)])
-def test_hinges_with_limits_change_sides(limits):
+def test_hinges_with_limits_are_exchanged_between_sides(limits):
     figure = hinged(*limits)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = np.mean(limits), limits[0]
@@ -221,13 +221,13 @@ def test_hinges_with_limits_change_sides(limits):
     assert_allclose(found, [np.eye(3), turn_x(limits[0]), turn_x(np.mean(limits))], atol=1e-14)
 
 
-def test_axis_without_a_map_follows_the_up_axis():
+def test_mirror_axis_without_a_map_follows_the_up_axis():
     figure = symmetric_figure(with_map=False)
     assert mirror_axis(figure) == 0
     assert mirror_axis(replace(figure, up="z")) == 1
 
 
-def test_axis_with_a_map_is_the_one_that_fits():
+def test_mirror_axis_with_a_map_is_the_axis_that_fits_it():
     assert mirror_axis(symmetric_figure(0, "z")) == 0
     assert mirror_axis(symmetric_figure(1, "y")) == 1
 
@@ -242,7 +242,7 @@ def test_asymmetry_is_the_distance_to_the_mirrored_counterpart():
     assert_allclose(np.delete(found, [3, 23]), 0.0, atol=1e-15)
 
 
-def test_asymmetry_needs_a_map():
+def test_asymmetry_requires_a_symmetry_map():
     with pytest.raises(RigError) as caught:
         asymmetry(symmetric_figure(with_map=False))
     assert str(caught.value) == "figure twin has no symmetry map"
@@ -287,7 +287,7 @@ def test_mirrored_hip_rotation_is_its_mirror_image():
     assert_allclose(found, flip @ turn @ flip, atol=1e-15)
 
 
-def test_bones_pair_the_joints_of_a_humanoid_with_a_sword() -> None:
+def test_humanoid_bones_pair_the_joints_of_a_figure_with_a_sword() -> None:
     table = BODY | {
         "sword": ("left_wrist", (0.6, 0.9, 0.3)),
         "Ear_L": ("head", (0.1, 1.6, 0.0)),
@@ -297,7 +297,7 @@ def test_bones_pair_the_joints_of_a_humanoid_with_a_sword() -> None:
     figure = figure_of(table, "hero")
     with pytest.raises(RigError):
         joint_partners(figure)
-    # The file states two bones only; the names of the others state their sides.
+    # The file states only two bones; the sides of the remaining bones follow from their names.
     names = tuple(table)
     hands = {"leftHand": names.index("left_wrist"), "rightHand": names.index("right_wrist")}
     humanoid = replace(figure.require_skeleton(), humanoid=Humanoid(hands))

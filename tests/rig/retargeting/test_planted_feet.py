@@ -1,4 +1,4 @@
-"""Feet of driven figures, planted while those of the source stand."""
+"""Feet of driven figures, planted during the stances of the source."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from viewer.rig.retargeting.retarget import retargeted
 from viewer.rig.shape import rest_joints
 
 SIDES = ("Left", "Right")
-PLATEAU = 8  # frames of a stance during which the foot already rolls off or still lands
+PLATEAU = 8  # frames at either end of a stance in which the foot lands or rolls off
 EXACT = 1e-9  # cm
 
 
@@ -40,11 +40,12 @@ def person(thigh: float, shin: float, foot: float, hips: float) -> Figure:
         bone(f"{side}Leg", f"{side}UpLeg", thigh)
         bone(f"{side}Foot", f"{side}Leg", shin)
         bone(f"{side}ToeBase", f"{side}Foot", foot)
-    names = {name: f"{name}_" for name in table}  # another hierarchy: joints are matched by meaning
+    # The hierarchies differ, so joints are matched by meaning.
+    names = {name: f"{name}_" for name in table}
     return figure_of({names[n]: (names.get(p, ""), q) for n, (p, q) in table.items()}, "other")
 
 
-# Thighs longer, shins shorter than those of the source, with longer feet and wider hips.
+# Relative to the source, the thighs and feet are longer, the shins shorter and the hips wider.
 OTHER = person(1.15, 0.85, 1.3, 1.4)
 
 
@@ -60,7 +61,7 @@ def parents(figure: Figure) -> list[str]:
 
 
 def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floats]:
-    """Return how far the balls move horizontally in the middle of every stance."""
+    """Return the horizontal movement of the balls in the middle of every stance."""
     where, result = places(figure, clip), []
     for side, name in zip(SIDES, names, strict=True):
         flags = stands(side)
@@ -74,13 +75,13 @@ def slid(figure: Figure, clip: SampledClip, names: tuple[str, str]) -> list[Floa
 TOES = ("LeftToeBase_", "RightToeBase_")
 
 
-def test_standing_feet_stay_in_place_on_the_ground() -> None:
+def test_standing_feet_are_fixed_on_the_ground() -> None:
     found, clip, changes = planted()
     before, after = slid(OTHER, found.clip, TOES), slid(OTHER, clip, TOES)
     assert len(after) == 3 and np.max(before) > 1.0
     assert_allclose(after, 0.0, atol=EXACT)
     assert changes.n_contacts == 6 and changes.after < changes.source < changes.before
-    # The soles of a skeleton are its lowest joints: the balls, which rest at height 0.
+    # The soles of a skeleton are its lowest joints, here the balls, at height 0 in the rest pose.
     where = places(OTHER, clip)
     for side, name in zip(SIDES, TOES, strict=True):
         flags = stands(side) & np.roll(stands(side), PLATEAU) & np.roll(stands(side), -PLATEAU)
@@ -89,7 +90,7 @@ def test_standing_feet_stay_in_place_on_the_ground() -> None:
     assert changes.gap_after < EXACT < changes.gap_before
 
 
-def test_legs_keep_their_lengths_and_feet_and_trunk_their_orientation() -> None:
+def test_legs_keep_their_length_and_feet_and_trunk_keep_their_orientation() -> None:
     found, clip, _ = planted()
     assert_allclose(np.linalg.norm(clip.rotations, axis=-1), 1.0, atol=1e-9)
     old, new = places(OTHER, found.clip), places(OTHER, clip)
@@ -100,7 +101,7 @@ def test_legs_keep_their_lengths_and_feet_and_trunk_their_orientation() -> None:
         assert_allclose(new[end] - new[start], old[end] - old[start], atol=1e-9)
 
 
-def test_knees_accelerate_hardly_more_than_in_the_source() -> None:
+def test_knees_accelerate_little_more_than_in_the_source() -> None:
     found, clip, _ = planted()
     where = places(OTHER, clip), places(found.source.figure, found.source.clip)
     peaks = []
@@ -113,7 +114,7 @@ def test_knees_accelerate_hardly_more_than_in_the_source() -> None:
     assert peaks[0] < 1.2 * peaks[1]
 
 
-def test_every_step_of_stairs_has_its_own_height() -> None:
+def test_feet_are_planted_at_the_height_of_each_stair() -> None:
     found, clip, changes = planted(rise=8.0)
     assert changes.is_better
     where = places(OTHER, clip)
@@ -125,14 +126,15 @@ def test_every_step_of_stairs_has_its_own_height() -> None:
     assert_allclose(slid(OTHER, clip, TOES), 0.0, atol=EXACT)
 
 
-def test_the_rest_pose_of_the_file_does_not_matter() -> None:
+def test_planting_does_not_depend_on_the_rest_pose_of_the_file() -> None:
     clips = [planted(axes=axes)[1] for axes in (t_pose(), along_x())]
     first, second = (places(OTHER, clip) for clip in clips)
     for name in ("LeftLeg_", "RightFoot_", "LeftToeBase_"):
-        assert_allclose(first[name], second[name], atol=0.5)  # cm: the rest pose is estimated
+        # The tolerance is in cm; the rest pose is estimated.
+        assert_allclose(first[name], second[name], atol=0.5)
 
 
-def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
+def test_feet_of_a_figure_with_z_up_are_planted_on_its_ground() -> None:
     over = axis_rotations(0, np.asarray(np.pi / 2))
     joints = zip(parents(OTHER), rest_joints(OTHER), strict=True)
     table = dict(zip(OTHER.skeleton.names, joints, strict=True))
@@ -142,7 +144,7 @@ def test_a_figure_with_z_up_stands_on_its_own_ground() -> None:
         assert_allclose(found[name], upright[name] @ over.T, atol=1e-9)
 
 
-def test_a_root_with_a_scale_is_supported() -> None:
+def test_root_with_a_scale_is_supported() -> None:
     table = dict(
         zip(OTHER.skeleton.names, zip(parents(OTHER), rest_joints(OTHER), strict=True), strict=True)
     )
@@ -160,13 +162,13 @@ def test_a_root_with_a_scale_is_supported() -> None:
         assert_allclose(100.0 * second[name], first[name], atol=1e-9)
 
 
-def test_a_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
+def test_figure_with_the_proportions_of_the_source_is_unchanged() -> None:
     twin = figure_of({f"{n}_": (p and f"{p}_", q) for n, (p, q) in PERSON.items()}, "same")
     found, clip, changes = planted(twin)
     assert changes is None and clip is found.clip
 
 
-def test_feet_of_a_source_that_never_stands_are_unchanged() -> None:
+def test_feet_are_unchanged_if_the_source_never_stands() -> None:
     rotations, path = walk()
     path[:, 2] += 10.0 * np.arange(N_WALK)  # 6 m/s, as on a bicycle
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
@@ -174,10 +176,11 @@ def test_feet_of_a_source_that_never_stands_are_unchanged() -> None:
     assert clip is found.clip and changes.n_contacts == 0
 
 
-def test_a_foot_held_still_in_the_air_does_not_stand() -> None:
+def test_foot_held_still_in_the_air_is_not_planted() -> None:
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     swing = 0.2 * np.sin(np.linspace(0.0, 6.0, 60))
-    rotations[:, 0] = axis_rotations(1, swing)  # the body rotates about its standing left foot
+    # The body rotates about its left foot, which is planted.
+    rotations[:, 0] = axis_rotations(1, swing)
     for name in NAMES[1:]:
         rotations[:, NAMES.index(name)] = rotations[:, 0]
     bent = axis_rotations(0, np.asarray(1.5))
@@ -187,13 +190,13 @@ def test_a_foot_held_still_in_the_air_does_not_stand() -> None:
     clip, changes = plant_feet(found, OTHER)
     old, new = places(OTHER, found.clip), places(OTHER, clip)
     assert changes.n_contacts == 1
-    # It follows the body, except that the body is lowered for the other, straight leg.
+    # The foot follows the body, except that the body is lowered for the straight left leg.
     away = (new["RightToeBase_"] - old["RightToeBase_"]) - (new["Hips_"] - old["Hips_"])
     assert_allclose(away[:, [0, 2]], 0.0, atol=1e-9)
     assert away[:, 1].min() > -1e-9 and away[:, 1].max() < changes.lowered + 1e-9
 
 
-def test_motions_of_two_frames_and_with_gaps_are_supported() -> None:
+def test_motions_of_two_frames_or_with_gaps_are_supported() -> None:
     motion = written(t_pose(), *walk(), rate=RATE)
     rows = np.arange(N_WALK)
     rows[100:110] = -1
@@ -206,10 +209,10 @@ def test_motions_of_two_frames_and_with_gaps_are_supported() -> None:
         assert (clip.timing.present == timing.present).all()
 
 
-def test_an_upside_down_world_gives_the_same_feet() -> None:
+def test_upside_down_world_results_in_the_same_feet() -> None:
     rotations, path = walk()
     over = axis_rotations(0, np.asarray(np.pi))
-    # The hips rest at a height of 100, the origin of their path.
+    # At rest the hips are at a height of 100, which is the origin of their path.
     moved = (path + 100.0 * Y) @ over.T - 100.0 * Y
     motion = written(t_pose(), over @ rotations, moved, rate=RATE)
     straight, _ = driven_clip(Drive(written(t_pose(), rotations, path, rate=RATE)), OTHER)
@@ -228,13 +231,13 @@ def test_planting_can_be_switched_off_and_is_reported() -> None:
     assert "planted during 6 contacts of twin" in text and "--feet off" in text
 
 
-def test_the_rotations_of_the_arms_are_untouched() -> None:
+def test_rotations_of_the_arms_are_unchanged() -> None:
     found, clip, _ = planted()
     arms = [OTHER.skeleton.names.index(f"{side}Arm_") for side in SIDES]
     assert (clip.rotations[:, arms] == found.clip.rotations[:, arms]).all()
 
 
-def test_legs_that_cannot_be_solved_are_left_alone() -> None:
+def test_legs_that_cannot_be_solved_are_unchanged() -> None:
     skeleton = OTHER.skeleton
     mirrored, points = skeleton.rest_scales.copy(), skeleton.rest_translations.copy()
     mirrored[skeleton.names.index("LeftLeg_")] = -1.0, 1.0, 1.0
@@ -248,7 +251,7 @@ def test_legs_that_cannot_be_solved_are_left_alone() -> None:
         assert changes is None and clip is found.clip
 
 
-def test_legs_that_are_folded_at_rest_have_finite_rotations() -> None:
+def test_legs_folded_at_rest_have_finite_rotations() -> None:
     skeleton, points = OTHER.skeleton, OTHER.skeleton.rest_translations.copy()
     thighs, shins = (
         [skeleton.names.index(f"{side}{part}_") for side in SIDES] for part in ("Leg", "Foot")
@@ -260,7 +263,7 @@ def test_legs_that_are_folded_at_rest_have_finite_rotations() -> None:
     assert changes is not None and np.isfinite(clip.rotations).all()
 
 
-def test_somebody_who_lies_does_not_stand() -> None:
+def test_feet_of_a_lying_person_are_not_planted() -> None:
     rotations, path = np.tile(np.eye(3), (60, len(NAMES), 1, 1)), np.zeros((60, 3))
     rotations[:] = axis_rotations(0, np.asarray(-np.pi / 2))
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)

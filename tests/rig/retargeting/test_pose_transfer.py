@@ -42,7 +42,7 @@ def about(axis: int, angle: float) -> np.ndarray:
 
 
 def figure(names, orders, name="one", up="y", rest=None, limits=None, parents=None) -> Figure:
-    """Return a chain of joints; each rotates about its axes, the first applied first."""
+    """Return a chain of joints, each of which rotates about its axes, the first axis first."""
     dofs = [(joint, "xyz".index(axis)) for joint, word in enumerate(orders) for axis in word]
     count = len(names)
     bounds = np.tile([-np.inf, np.inf], (len(dofs), 1)) if limits is None else np.array(limits)
@@ -74,7 +74,7 @@ def posed(fig, *dofs):
     return pose
 
 
-def test_other_order_of_dofs_gets_the_same_rotation() -> None:
+def test_different_order_of_dofs_gets_the_same_rotation() -> None:
     one, other = figure("ab", ["xyz", "xyz"]), figure("ab", ["zxy", "yzx"], "other")
     angles = 0.3, -0.5, 0.8, 1.0, 0.2, -0.7
     pose, notes = transfer_pose(one, posed(one, *angles), other, rest_pose(other.skeleton))
@@ -87,15 +87,15 @@ def test_other_order_of_dofs_gets_the_same_rotation() -> None:
     assert told(notes) == [("F007.joints-taken-over", {"n": 2, "all": 2, "figure": "one"})]
 
 
-def test_labels_alone_would_give_another_pose() -> None:
-    # The rotation is transferred: the values of the DOFs of the same names differ.
+def test_rotations_and_not_equally_named_dofs_are_transferred() -> None:
+    # The rotation is transferred, so the values of DOFs with equal names differ.
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     pose, _ = transfer_pose(one, posed(one, 0.5, 0.6, 0.7), other, rest_pose(other.skeleton))
     z, y, x = pose.dofs
     assert np.abs([x - 0.5, y - 0.6, z - 0.7]).max() > 0.1
 
 
-def test_missing_joints_are_named_in_one_line_and_others_stay() -> None:
+def test_missing_joints_are_listed_and_others_unchanged() -> None:
     one = figure(["a", "b", "tail", "tip"], ["xyz"] * 4, "cat")
     other = figure(["a", "b", "hat"], ["xyz"] * 3, "man")
     start = posed(other, *np.zeros(6), 0.1, 0.2, 0.3)
@@ -108,8 +108,8 @@ def test_missing_joints_are_named_in_one_line_and_others_stay() -> None:
     assert_allclose(start.dofs[:6], 0)
 
 
-def test_joint_in_between_is_folded_in() -> None:
-    # The other figure's "b" is the child of an extra joint rotated by 0.3, for which b compensates.
+def test_extra_joint_in_between_is_compensated() -> None:
+    # In the target, "b" is the child of an extra joint rotated by 0.3, which b compensates.
     one = figure(["a", "b"], ["xyz", "xyz"])
     other = figure(["a", "extra", "b"], ["xyz"] * 3, "other")
     start = posed(other, 0, 0, 0, 0, 0, 0.3, 0, 0, 0)
@@ -118,8 +118,8 @@ def test_joint_in_between_is_folded_in() -> None:
 
 
 def test_rest_rotations_may_differ() -> None:
-    # The other figure's joint has a rest rotation of 90 degrees about x: a rotation about the
-    # world's y is one about its own -z, as Rx(-90) y = -z.
+    # The target's joint has a rest rotation of 90 degrees about x, so a rotation about the world's
+    # y is one about the joint's -z: Rx(-90) y = -z.
     one = figure("a", ["xyz"])
     other = figure("a", ["xyz"], "other", rest=[[HALF, 0, 0, HALF]])
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
@@ -128,7 +128,7 @@ def test_rest_rotations_may_differ() -> None:
 
 
 def test_up_axes_may_differ() -> None:
-    # A rotation about the up axis: y of the one is z of the other.
+    # The rotation is about the up axis, which is y in one figure and z in the other.
     one, other = figure("a", ["xyz"]), figure("a", ["xyz"], "other", up="z")
     pose, _ = transfer_pose(one, posed(one, 0, 0.4, 0), other, rest_pose(other.skeleton))
     assert_allclose(pose.dofs, [0, 0, 0.4], atol=1e-12)
@@ -136,7 +136,7 @@ def test_up_axes_may_differ() -> None:
     assert_allclose(back.dofs, [0, 0.4, 0], atol=1e-12)
 
 
-def test_limits_and_missing_axes_are_respected_and_reported() -> None:
+def test_limits_and_missing_axes_are_applied_and_reported() -> None:
     one = figure("ab", ["xyz", "xyz"])
     other = figure("ab", ["xyz", "x"], "stiff", limits=[[-0.1, 0.1]] * 3 + [[0, 1]])
     pose, notes = transfer_pose(one, posed(one, 0.5, 0, 0, 0.4, 0, 0.2), other,
@@ -147,7 +147,7 @@ def test_limits_and_missing_axes_are_respected_and_reported() -> None:
     assert told(notes)[1:] == [("F007.joints-limited", {"names": ["a", "b"]})]
 
 
-def test_placement_scale_and_shape_stay() -> None:
+def test_placement_scale_and_shape_are_unchanged() -> None:
     one, other = figure("a", ["xyz"]), figure("a", ["zyx"], "other")
     source = posed(one, 0.1, 0.2, 0.3)
     source.figure_translation[:] = 1, 2, 3
@@ -158,7 +158,7 @@ def test_placement_scale_and_shape_stay() -> None:
     assert pose.figure_scale == 0.5 and not pose.figure_translation.any()
 
 
-def test_nothing_in_common_is_refused() -> None:
+def test_pose_without_common_joints_is_refused() -> None:
     one, other = figure("ab", ["xyz", "x"], "cat"), figure("cd", ["x", "x"], "man")
     with pytest.raises(RigError) as caught:
         transfer_pose(one, rest_pose(one.skeleton), other, rest_pose(other.skeleton))
@@ -166,13 +166,13 @@ def test_nothing_in_common_is_refused() -> None:
     assert caught.value.diagnostic.values == {"pose": "cat", "figure": "man"}
 
 
-def test_repeated_and_empty_names_match_nothing() -> None:
+def test_repeated_and_empty_names_are_not_matched() -> None:
     one = figure(["a", "leg", "leg", ""], ["x"] * 4)
     other = figure(["leg", "a", ""], ["x"] * 3)
     assert joints_by_name(one.skeleton.names, other.skeleton.names).tolist() == [-1, 0, -1]
 
 
-def test_copying_values_needs_the_same_dofs_rest_and_up() -> None:
+def test_values_are_copied_only_for_equal_dofs_rest_pose_and_up_axis() -> None:
     one = figure("ab", ["xyz", "xyz"])
     assert shares_dofs(one, one) and shares_dofs(one, figure("ab", ["xyz", "xyz"], "other"))
     assert shares_dofs(one, shaped(one, 3)) and shares_dofs(shaped(one, 10), shaped(one, 8))
@@ -191,8 +191,8 @@ def test_long_lists_are_truncated() -> None:
     assert told(notes)[1] == ("F007.joints-lacking", {"figure": "man", "names": names})
 
 
-def test_rotations_are_about_the_figures_axes() -> None:
-    # The second joint rotates about x, its parent about z: the product is Rz(0.5) Rx(0.3).
+def test_rotations_are_relative_to_the_axes_of_the_figure() -> None:
+    # The second joint rotates about x, its parent about z; the product is Rz(0.5) Rx(0.3).
     one = figure("ab", ["z", "x"])
     turns = relative_rotations(one, posed(one, 0.5, 0.3))
     assert_allclose(turns.relative[0], [0, 0, np.sin(0.25), np.cos(0.25)], atol=1e-12)
@@ -201,7 +201,7 @@ def test_rotations_are_about_the_figures_axes() -> None:
     assert (turns.figure, turns.names, turns.up) == ("one", ("a", "b"), "y")
 
 
-def test_record_of_the_same_dofs_restores_rotations_beneath_them() -> None:
+def test_record_of_the_same_dofs_restores_rotations_below_the_dofs() -> None:
     # A motion has also rotated the hinge "b" about y, and moved it.
     one = figure("ab", ["xyz", "x"], rest=[[0, 0, 0, 1], [HALF, 0, 0, HALF]])
     pose = posed(one, 0.1, 0.2, 0.3, 0.4)
@@ -215,7 +215,7 @@ def test_record_of_the_same_dofs_restores_rotations_beneath_them() -> None:
     assert found.translations.tolist() == pose.translations.tolist()
 
 
-def test_record_for_other_dofs_rotates_joints_and_keeps_placement_and_scale() -> None:
+def test_record_for_different_dofs_rotates_joints_and_keeps_placement_and_scale() -> None:
     one, other = figure("ab", ["xyz", "xyz"], "cat"), figure("ab", ["zxy", "yzx"], "man")
     pose = posed(one, 0.3, -0.5, 0.8, 1.0, 0.2, -0.7)
     pose.figure_translation[:] = 1, 0, 0
@@ -230,7 +230,7 @@ def test_record_for_other_dofs_rotates_joints_and_keeps_placement_and_scale() ->
     assert found.figure_scale == 1.0 and not found.figure_translation.any()
 
 
-def test_refused_record_leaves_the_pose() -> None:
+def test_refused_record_does_not_change_the_pose() -> None:
     one, other = figure("a", ["xyz"], "cat"), figure("b", ["x"], "man")
     found = rest_pose(other.skeleton)
     before = pose_key(found)
@@ -241,7 +241,7 @@ def test_refused_record_leaves_the_pose() -> None:
     assert pose_key(found) == before
 
 
-def test_handwritten_partial_record_keeps_rotations_beneath() -> None:
+def test_handwritten_partial_record_keeps_rotations_below_the_dofs() -> None:
     one = figure("ab", ["xyz", "x"])
     found = rest_pose(one.skeleton)
     found.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -261,12 +261,12 @@ def test_edited_dofs_override_the_stored_rotations() -> None:
     assert found.dofs.tolist() == [0.1, -0.5, 0.3, 0.25]
     assert found.rotations.tolist() == [[0, 0, 0, 1], [HALF, 0, 0, HALF]]
     assert not found.translations.any()
-    # Rx(90) Rx(0.25) relative to the parent: the edit has its full effect.
+    # Relative to the parent the rotation is Rx(90) Rx(0.25), so the edit has its full effect.
     turned = about(0, np.pi / 2 + 0.25)
     assert_allclose(joint_rotations(one.skeleton, found)[1], turned, atol=1e-12)
 
 
-def test_edited_dofs_keep_rotations_beneath_them() -> None:
+def test_edited_dofs_keep_rotations_below_the_dofs() -> None:
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, np.sin(0.35), 0.0, np.cos(0.35)
@@ -279,7 +279,7 @@ def test_edited_dofs_keep_rotations_beneath_them() -> None:
     assert found.translations.tolist() == [[0, 0, 0], [0.5, 0.25, -1.0]]
 
 
-def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
+def test_edited_dof_beyond_its_limit_leaves_no_rotation_below_the_dofs() -> None:
     one = figure("a", ["xyz"], limits=[[-0.5, 0.5]] * 3)
     record = record_of(one, posed(one, 0.1, 0.2, 0.3))
     found = rest_pose(one.skeleton)
@@ -289,7 +289,7 @@ def test_edited_dof_beyond_its_limit_leaves_no_rotation_beneath() -> None:
     assert found.rotations.tolist() == [[0, 0, 0, 1]]
 
 
-def test_partial_record_restores_its_rotations_beneath() -> None:
+def test_partial_record_restores_rotations_below_its_dofs() -> None:
     one = figure("ab", ["xyz", "x"])
     pose = posed(one, 0, 0, 0, 0.4)
     pose.rotations[1] = 0.0, 1.0, 0.0, 0.0
@@ -301,7 +301,7 @@ def test_partial_record_restores_its_rotations_beneath() -> None:
     assert found.translations.tolist() == [[0, 2, 0], [0, 0, 0]]
 
 
-def test_lists_that_do_not_fit_the_skeleton_are_matched_by_name() -> None:
+def test_lists_of_another_length_than_the_skeleton_are_matched_by_name() -> None:
     # A joint was removed from the file's lists, but the digest of the DOFs was kept.
     one = figure("ab", ["xyz", "x"], "cat")
     record = record_of(one, posed(one, 0.1, 0, 0, 0.4))
@@ -332,7 +332,7 @@ def body_pose(fig: Figure):
 
 
 @pytest.mark.parametrize("cut", [False, True])
-def test_same_skeleton_with_fewer_shapes_takes_placement_scale_and_common_shapes(cut) -> None:
+def test_pose_for_fewer_shapes_transfers_placement_scale_and_common_shapes(cut) -> None:
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), replace(shaped(bones, 2, 1), name="kin")
     found = rest_pose(bones.skeleton)
@@ -347,7 +347,7 @@ def test_same_skeleton_with_fewer_shapes_takes_placement_scale_and_common_shapes
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_same_skeleton_with_more_shapes_takes_placement_scale_and_common_shapes() -> None:
+def test_pose_for_more_shapes_transfers_placement_scale_and_common_shapes() -> None:
     bones = figure("ab", ["xyz", "x"])
     one, other = shaped(bones, 4, 2), shaped(bones, 5, 3)
     found = rest_pose(bones.skeleton)
@@ -357,7 +357,7 @@ def test_same_skeleton_with_more_shapes_takes_placement_scale_and_common_shapes(
     assert found.figure_translation.tolist() == [0, 1, 2] and found.figure_scale == 1.2
 
 
-def test_same_skeleton_without_shapes_reports_dropped_shapes() -> None:
+def test_pose_for_a_figure_without_shapes_reports_dropped_shapes() -> None:
     bones = figure("ab", ["xyz", "x"], "bones")
     one = shaped(bones, 4, 2)
     found = rest_pose(bones.skeleton)
@@ -385,7 +385,7 @@ def test_humanoids_exchange_poses_by_their_bones() -> None:
     assert notes[0].values["n"] == len(BODY)
     expected = half @ joint_rotations(one.require_skeleton(), pose) @ half
     assert_allclose(joint_rotations(stated, moved), expected, atol=1e-12)
-    # Back again, through a file.
+    # The pose is transferred back through a file.
     text = json.loads(json.dumps(named_rotations(relative_rotations(other, moved))))
     assert text["left"] == [[-1.0, 0.0, 0.0]] and "left_hip" in text["joint_meanings"]
     back, _ = transfer_pose(other, moved, one, rest_pose(one.require_skeleton()))

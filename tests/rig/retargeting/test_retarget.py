@@ -90,7 +90,7 @@ def test_limb_directions_match_the_source_from_t_pose_to_a_pose() -> None:
     ]
 
 
-def test_a_very_different_trunk_rest_pose_is_aligned_too() -> None:
+def test_very_different_rest_pose_of_the_trunk_is_aligned() -> None:
     bowed = {**HIK, "Head": ("Neck", (0, 145, 12)), "Spine1": ("Spine", (0, 112, 14))}
     source, figure = moving(figure_of(bowed, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
@@ -110,10 +110,10 @@ def test_limb_directions_match_the_source_from_a_pose_to_t_pose() -> None:
         np.testing.assert_allclose(bones(mine, own), bones(theirs, pair), atol=EXACT)
 
 
-def test_trunk_and_feet_keep_their_own_bend() -> None:
+def test_trunk_and_feet_keep_their_rest_shape() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
-    # In the source's rest pose the slightly bent spine of the figure keeps its own shape.
+    # In the rest pose of the source, the slightly bent spine of the figure keeps its shape.
     still = {"pelvis": 0, "spine1": 3, "spine3": 9, "neck": 10, "head": 13, "left_collar": 11}
     for name, joint in still.items():
         np.testing.assert_allclose(
@@ -121,7 +121,7 @@ def test_trunk_and_feet_keep_their_own_bend() -> None:
         )
 
 
-def test_joint_axes_of_the_figure_do_not_matter() -> None:
+def test_result_does_not_depend_on_the_joint_axes_of_the_figure() -> None:
     source, plain = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     rng = np.random.default_rng(1)
     skeleton = plain.skeleton
@@ -154,7 +154,7 @@ def matrix(quaternion: np.ndarray) -> np.ndarray:
 TO_Y = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])  # z up to y up: (x, y, z) -> (x, z, -y)
 
 
-def test_a_source_with_z_up_is_rotated_upright() -> None:
+def test_source_with_z_up_is_rotated_upright() -> None:
     source = moving(figure_of(HIK, "mocap", TO_Y.T, "z"))
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
@@ -164,7 +164,7 @@ def test_a_source_with_z_up_is_rotated_upright() -> None:
 
 
 def assert_same_path(mine: dict[str, np.ndarray], theirs: dict[str, np.ndarray]) -> None:
-    """Assert that the hips follow the scaled path, and that feet at rest are equally high."""
+    """Assert that the hips follow the scaled path, and that the feet have equal heights at rest."""
     raised = mine["pelvis"] - path_scale() * theirs["Hips"]
     # The first frame is the rest pose.
     height = mine["left_ankle"][0, 1] - path_scale() * theirs["LeftFoot"][0, 1]
@@ -183,7 +183,7 @@ def path_scale() -> float:
     return lengths[0] / lengths[1]
 
 
-def test_the_path_is_scaled_by_leg_length() -> None:
+def test_path_is_scaled_by_leg_length() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     clip, notes = retarget(source, figure)
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
@@ -192,7 +192,7 @@ def test_the_path_is_scaled_by_leg_length() -> None:
     assert clip.figure_translations is None
 
 
-def test_a_path_in_another_unit_than_the_skeleton_is_scaled_by_leg_length() -> None:
+def test_path_in_a_different_unit_than_the_skeleton_is_scaled_by_leg_length() -> None:
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     count, ahead = source.clip.n_rows, np.array([0.0, 0.0, 3.0])
     metres = replace(
@@ -208,7 +208,7 @@ def test_a_path_in_another_unit_than_the_skeleton_is_scaled_by_leg_length() -> N
         np.testing.assert_allclose(moved[name], place + scale * ahead, atol=1e-12)
 
 
-def test_a_skinned_figure_moves_as_a_whole() -> None:
+def test_skinned_figure_moves_with_its_root() -> None:
     source, bare = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     corners = np.eye(3)
     figure = replace(bare, mesh=Mesh(corners, corners, np.array([[0, 1, 2]], dtype=np.int32)))
@@ -219,18 +219,18 @@ def test_a_skinned_figure_moves_as_a_whole() -> None:
         np.testing.assert_allclose(place, expected[name], atol=1e-12)
 
 
-def test_a_source_with_another_front_at_rest_rotates_the_figure() -> None:
-    quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # z, its front, is now x
+def test_source_with_a_different_front_at_rest_rotates_the_figure() -> None:
+    quarter = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])  # maps z, the front, to x
     source = moving(figure_of(HIK, "mocap", quarter))
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     assert_same_limbs(source, figure, clip)
     where = places(figure, clip)
-    # The line between the figure's hips, along x at rest, is aligned with the source's: along -z.
+    # The line between the hips is along x at rest, and is aligned with the source's, along -z.
     np.testing.assert_allclose(bones(where, ("right_hip", "left_hip"))[0], [0, 0, -1], atol=EXACT)
 
 
-def test_a_humanoid_with_any_names_that_faces_backwards_walks_forwards() -> None:
+def test_humanoid_with_arbitrary_names_that_faces_backwards_moves_forwards() -> None:
     half = np.diag([-1.0, 1.0, -1.0])  # VRM 0.x
     bones = {VRM_BONES[name]: joint for joint, name in enumerate(BODY)}
     source, figure = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body", half)
@@ -241,9 +241,9 @@ def test_a_humanoid_with_any_names_that_faces_backwards_walks_forwards() -> None
     assert_same_path(places(figure, clip), places(source.figure, source.clip))
 
 
-def test_a_source_whose_rest_pose_lies_down_stands_up_in_its_frames() -> None:
+def test_source_with_a_lying_rest_pose_stands_up_in_its_frames() -> None:
     down = np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-    source = moving(figure_of(HIK, "mocap", down))  # y is up, yet the body lies along z
+    source = moving(figure_of(HIK, "mocap", down))  # y is up, but the body is along z
     figure = figure_of(BODY, "body")
     clip, _ = retarget(source, figure)
     assert_same_limbs(source, figure, clip)

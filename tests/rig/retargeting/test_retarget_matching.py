@@ -1,4 +1,4 @@
-"""Retargeting onto other hierarchies: which joints match, which rotations are transferred."""
+"""Retargeting onto different hierarchies: matched joints and transferred rotations."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.retarget import retarget, scaled_motion
 
 
-def test_joints_between_two_that_match_are_folded_in() -> None:
+def test_rotations_of_joints_between_matched_joints_are_included() -> None:
     table = dict(HIK)
     table["LeftArmRoll"] = ("LeftArm", (30, 145, 0))
     table["LeftForeArm"] = ("LeftArmRoll", HIK["LeftForeArm"][1])
@@ -58,7 +58,8 @@ def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
 
     hik = ["LeftHandIndex1", "LeftHandIndex2", "LeftHandPinky1", "LeftHandPinky2"]
     own = ["left_index1", "left_index2", "left_pinky1", "left_pinky2"]
-    # The figure's hand hangs down, palm to the body; the source's is stretched out, palm down.
+    # The hand of the figure hangs down, palm to the body; that of the source is stretched out, palm
+    # down.
     hang = np.array([[0.0, 1, 0], [-1, 0, 0], [0, 0, 1]])
     source = moving(figure_of(with_fingers(HIK, "LeftHand", hik, np.eye(3)), "mocap"))
     figure = figure_of(with_fingers(BODY, "left_wrist", own, hang), "body")
@@ -74,7 +75,7 @@ def test_fingers_rotate_with_the_hand_and_bend_about_the_knuckles() -> None:
         np.testing.assert_allclose(bones(mine, ours), bones(theirs, pair), atol=EXACT)
 
 
-def test_same_hierarchy_with_other_proportions_transfers_rotations() -> None:
+def test_equal_hierarchy_with_different_proportions_receives_equal_rotations() -> None:
     source = moving(figure_of(BODY, "one"))
     names = list(BODY)
     # Depth-first instead of breadth-first, with 0.9 times the width and 1.1 times the height.
@@ -115,7 +116,7 @@ def test_joint_translations_are_transferred_between_equal_hierarchies() -> None:
     assert told(notes)[-1] == ("F007.joint-positions-left-out", values)
 
 
-def test_mapping_covers_names_without_rules() -> None:
+def test_mapping_matches_names_without_rules() -> None:
     strange = {
         f"x{i}": (f"x{list(HIK).index(p)}" if p else "", at)
         for i, (p, at) in enumerate(HIK.values())
@@ -138,7 +139,7 @@ def test_mapping_covers_names_without_rules() -> None:
     assert resting[1]["names"][:2] == ["left_hip", "right_hip"]
 
 
-def test_equal_names_match_whatever_they_mean() -> None:
+def test_equal_names_match_without_a_known_meaning() -> None:
     table = {
         "base": ("", (0, 0, 0)),
         "tail_01": ("base", (0, 0, 1)),
@@ -197,7 +198,7 @@ def test_incompatible_figures_are_refused(
     assert found is not None and (found.key, found.values) == (key, values)
 
 
-def test_gaps_stay_where_they_are() -> None:
+def test_gaps_are_preserved() -> None:
     motion = moving(figure_of(HIK, "mocap"))
     timing = Timing(25.0, np.array([0, 1, -1, -1, 2, 3, 4]), first_frame=7)
     clip, _ = retarget(

@@ -1,4 +1,4 @@
-"""One walk in files with different rest conventions gives the same motion of the bundled body."""
+"""One walk in files with different rest conventions, which must move the bundled body equally."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def degrees(mine, others):
 
 
 def limb_error(body, found, first=0):
-    """Return the largest angle between limbs and those of the truth, in degrees."""
+    """Return the largest angle between the limbs and those of the ground truth, in degrees."""
     rotations, _ = truth(False)
     names = body.skeleton.names
     worst = 0.0
@@ -84,18 +84,18 @@ def limb_error(body, found, first=0):
 
 
 @pytest.mark.parametrize("convention", CONVENTIONS)
-def test_twins_with_a_t_pose_give_the_same_body(body, expected, convention):
+def test_files_with_a_t_pose_result_in_the_same_motion(body, expected, convention):
     found, notes = posed(body, twin(CONVENTIONS[convention]()))
     keys = [("F007.rest-frame", {"motion": "twin", "frame": 0, "pose": Phrase("t-pose")})]
     assert notes == (keys if convention in SCRAMBLED else [])
     assert limb_error(body, found, 1) < 0.5
-    # Limbs bend about the same axes; from an A-pose, the arms roll slightly differently.
+    # The limbs bend about the same axes; after an A-pose, the arms roll slightly differently.
     assert degrees(found, expected).max() < 5.0
     assert np.abs(found[..., :3, 3] - expected[..., :3, 3]).max() < 0.001  # m
 
 
 @pytest.mark.parametrize("convention", SCRAMBLED)
-def test_twins_without_a_t_pose_are_understood_from_anatomy(body, convention):
+def test_rest_pose_of_files_without_a_t_pose_is_estimated_from_anatomy(body, convention):
     expected, _ = posed(body, twin(t_pose(), starts_in_t_pose=False), "zero")
     found, notes = posed(body, twin(CONVENTIONS[convention](), starts_in_t_pose=False))
     assert notes == [("F007.rest-anatomy", {"motion": "twin"})]
@@ -104,26 +104,26 @@ def test_twins_without_a_t_pose_are_understood_from_anatomy(body, convention):
     assert np.abs(found[..., :3, 3] - expected[..., :3, 3]).max() < 0.001  # m
 
 
-def test_the_zero_pose_of_scrambled_axes_would_give_another_body(body, expected):
+def test_zero_pose_of_scrambled_axes_results_in_a_different_motion(body, expected):
     found, notes = posed(body, twin(along_x()), "zero")
     assert not notes
     assert degrees(found, expected).max() > 90.0
 
 
-def test_a_frame_can_be_the_rest_pose(body, expected):
+def test_frame_can_be_chosen_as_the_rest_pose(body, expected):
     found, notes = posed(body, twin(arbitrary()), 0)
     assert notes == [("F007.rest-asked", {"motion": "twin", "frame": 0})]
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)  # rounding of rotations
 
 
-def test_a_missing_frame_is_an_error(body):
+def test_missing_rest_frame_is_refused(body):
     with pytest.raises(RigError) as problem:
         retarget(twin(t_pose()), body, source_rest=N_FRAMES)
     values = {"first": 0, "last": N_FRAMES - 1, "found": N_FRAMES}
     assert told([problem.value.diagnostic]) == [("F004.rest-frame", values)]
 
 
-def test_a_frame_in_an_a_pose_is_found(body, expected):
+def test_frame_in_an_a_pose_is_found(body, expected):
     motion = twin(arbitrary())
     lowered = motion.clip.rotations.copy()
     arms = [NAMES.index(f"{side}Arm") for side in ("Left", "Right")]
@@ -139,7 +139,7 @@ def test_a_frame_in_an_a_pose_is_found(body, expected):
 
 
 @pytest.mark.parametrize("axes", [along_x(), arbitrary()])
-def test_someone_who_never_stands_is_estimated_from_the_trunk(body, axes):
+def test_rest_pose_of_a_person_who_never_stands_is_estimated_from_the_trunk(body, axes):
     motions = [twin(each, starts_in_t_pose=False) for each in (t_pose(), axes)]
     lying = [replace(each, figure=replace(each.figure, up="z")) for each in motions]
     (wanted, _), (found, notes) = (posed(body, each) for each in lying)
@@ -147,11 +147,11 @@ def test_someone_who_never_stands_is_estimated_from_the_trunk(body, axes):
     away = degrees(found, wanted).max(axis=0)
     feet = [name.endswith(("ankle", "foot")) for name in body.skeleton.names]
     assert away[np.logical_not(feet)].max() < 5.0
-    # The slope of the feet is 26.6 degrees, and assumed to be 30.
+    # The slope of the feet is 26.6 degrees, while the estimate assumes 30.
     assert away[feet].max() < 15.0
 
 
-def test_limbs_that_never_bend_are_named(body):
+def test_limbs_that_never_bend_are_reported(body):
     motion = twin(arbitrary(), starts_in_t_pose=False)
     stiff = motion.clip.rotations.copy()
     axes, joint = arbitrary(), NAMES.index("LeftForeArm")
@@ -161,7 +161,7 @@ def test_limbs_that_never_bend_are_named(body):
     assert notes[1:] == [("F007.rest-straight", {"motion": "twin", "names": ["LeftForeArm"]})]
 
 
-def test_a_motion_of_the_same_skeleton_keeps_its_rest_pose():
+def test_motion_of_the_same_skeleton_keeps_its_rest_pose():
     motion = twin(along_x())
     clip, notes = retarget(motion, motion.figure, source_rest="auto")
     assert not [key for key, _ in told(notes) if ".rest-" in key]
@@ -169,7 +169,7 @@ def test_a_motion_of_the_same_skeleton_keeps_its_rest_pose():
     np.testing.assert_allclose(same, 1.0, atol=1e-12)
 
 
-def test_an_upside_down_file_is_understood(body):
+def test_rest_pose_of_an_upside_down_file_is_estimated(body):
     # The same person in a file whose up axis points down: z-up axes, standing along -z.
     motion = twin(along_x(), starts_in_t_pose=False)
     over = matrix_to_quaternion(matrices(np.array([[-np.pi / 2.0, 0.0, 0.0]])))[0]
@@ -179,14 +179,14 @@ def test_an_upside_down_file_is_understood(body):
     turned = replace(motion, clip=clip, figure=replace(motion.figure, up="z"))
     found, notes = posed(body, turned)
     assert [key for key, _ in notes] == ["F007.rest-anatomy"]
-    # The common axes are y-up: the person hangs head down, and faces the other way.
+    # In the common y-up axes, the person hangs upside down and faces the other way.
     expected, _ = posed(body, twin(t_pose(), starts_in_t_pose=False), "zero")
     flip = np.diag([1.0, -1.0, -1.0])
     assert degrees(found, flip @ expected[..., :3, :3]).max() < 5.0
 
 
 @pytest.mark.parametrize("starts_in_t_pose", [True, False])
-def test_files_with_z_up_are_understood(body, starts_in_t_pose):
+def test_rest_pose_of_files_with_z_up_is_estimated(body, starts_in_t_pose):
     motion = twin(along_x(), starts_in_t_pose)
     raised = matrix_to_quaternion(matrices(np.array([[np.pi / 2.0, 0.0, 0.0]])))
     rotations = motion.clip.rotations.copy()

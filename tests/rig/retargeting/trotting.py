@@ -1,4 +1,4 @@
-"""Animals of different proportions, and a trot with exactly planted paws, by trigonometry."""
+"""Animals of different proportions, and a trot with exactly planted paws, built by trigonometry."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing
 
 N_TROT = 160
-STRIDE = 0.2  # metres in 80 frames; each paw stands for 45 of them
+STRIDE = 0.2  # metres in 80 frames, 45 of which are a stance of each paw
 LIFT = 0.04
 PAWS = ("hind_l", "hind_r", "fore_l", "fore_r")
 DIAGONAL = ("hind_l", "fore_r")
@@ -32,7 +32,8 @@ def animal(thigh: float = 0.13, shin: float = 0.14, length: float = 0.3) -> dict
     for end, side in (("hind", 1.0), ("hind", -1.0), ("fore", 1.0), ("fore", -1.0)):
         leg = f"{end}_{'l' if side > 0 else 'r'}"
         back, top = (0.0, "hips") if end == "hind" else (length, "chest")
-        # Knees of hind legs point forwards, elbows backwards; hocks are 0.09 above the toes.
+        # The knees of the hind legs point forwards, the elbows backwards; hocks are 0.09 above the
+        # toes.
         slope = 0.5 if end == "hind" else -0.5
         knee = np.array([0.0, 0.33 - thigh * np.cos(slope), back + thigh * np.sin(slope)])
         hock = knee - shin * np.array([0.0, np.cos(slope), np.sin(slope)])
@@ -45,7 +46,7 @@ def animal(thigh: float = 0.13, shin: float = 0.14, length: float = 0.3) -> dict
 
 
 def stands(paw: str) -> np.ndarray:
-    """Return the frames in which a paw stands: (N,)."""
+    """Return whether a paw stands in each frame: (N,)."""
     return (np.arange(N_TROT) + (0 if paw in DIAGONAL else 40)) % 80 < 45
 
 
@@ -80,5 +81,5 @@ def trot() -> SkeletonMotion:
 
 
 def other_animal() -> Figure:
-    """Return an animal with the same joints and longer shins, a longer back and shorter thighs."""
+    """Return an animal with the same joints but longer shins, a longer back and shorter thighs."""
     return figure_of(animal(0.11, 0.18, 0.4), "other animal")

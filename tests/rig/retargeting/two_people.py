@@ -36,7 +36,8 @@ HIK = {
 }
 
 
-# Metres, arms and legs spread at odd angles (an A-pose), the spine bent, other proportions.
+# An A-pose in metres, with different proportions, a bent spine, and arms and legs spread at
+# irregular angles.
 BODY = {
     "pelvis": ("", (0.0, 0.9, 0.02)),
     "left_hip": ("pelvis", (0.07, 0.82, 0.02)),

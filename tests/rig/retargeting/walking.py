@@ -1,7 +1,8 @@
 """A walk with exactly planted feet, built from the paths of the ankles by trigonometry.
 
-The person is that of ``rest_twins``. Each foot stands for 60 of 100 frames, with the sole on the
-ground, and swings to the next position in the others. Hips, knees and ankles rotate about x only.
+The person is that of ``rest_twins``. Each foot stands for 60 of 100 frames with the sole on the
+ground, and swings to the next position in the remaining frames. Hips, knees and ankles rotate about
+x only.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ RATE = 60.0
 STRIDE = 100.0  # cm per 100 frames
 N_WALK = 250
 STANCE = 60
-PELVIS = -7.0  # cm, relative to the rest pose: the legs are never straight
+PELVIS = -7.0  # cm relative to the rest pose, so that the legs are never straight
 
 
 def stands(side: str) -> np.ndarray:
-    """Return the frames in which a foot stands: (N,)."""
+    """Return whether a foot stands in each frame: (N,)."""
     return (np.arange(N_WALK) + (0 if side == "Left" else 50)) % 100 < STANCE
 
 

@@ -18,7 +18,7 @@ ROWS = [
     [(2, 1.0)],
     [],
     [(0, 0.0)],
-    [(1, 0.3), (0, 0.4), (1, 0.3)],  # joint 1 twice: 0.6 together
+    [(1, 0.3), (0, 0.4), (1, 0.3)],  # joint 1 is listed twice with a sum of 0.6
     [(0, 1.5), (1, -0.5)],
     [(3, 0.5)],
 ]
@@ -38,8 +38,9 @@ def test_weight_of_a_joint_is_the_sum_of_its_entries():
     assert found("weight:#3") == [0, 0, 0, 0, 0, 0, 0.5]
 
 
-def test_weights_are_those_in_use():
-    # Two influences: 0.5 and 0.25 scaled to a sum of 1; of equal ones the first is kept.
+def test_weights_follow_the_skinning_settings():
+    # With two influences, 0.5 and 0.25 are scaled to a sum of 1; of equal weights the first is
+    # kept.
     assert found("weight:j0", max_influences=2)[0] == pytest.approx(2 / 3)
     assert found("weight:j1", max_influences=2)[0] == pytest.approx(1 / 3)
     assert found("weight:j2", max_influences=2)[0] == 0.0
@@ -54,7 +55,7 @@ def test_dominant_joint_of_a_tie_is_the_first():
     assert found("dominant", [[(2, 0.5), (1, 0.5)]]) == [2]
 
 
-def test_influences_are_joints_with_a_weight():
+def test_influences_are_counted_as_joints_with_a_weight():
     assert found("influences") == [3, 1, 0, 0, 2, 2, 1]
     assert found("influences", max_influences=2) == [2, 1, 0, 0, 2, 2, 1]
 
@@ -64,7 +65,7 @@ def test_sums_are_compared_with_one():
     assert found("sums", normalize=True) == [0, 0, 1, 1, 0, 0, 0]
 
 
-def test_sums_that_differ_by_rounding_only_are_one():
+def test_sums_that_differ_from_one_only_by_rounding_are_one():
     tenths = [[(0, 0.1)] * 10]
     total = 0.0
     for _, weight in tenths[0]:
@@ -80,13 +81,13 @@ def test_entropy_of_equal_weights_is_the_logarithm_of_their_number():
 
 
 def test_entropy_matches_hand_calculation():
-    # 1/2 1 + 1/4 2 + 1/4 2 bits; 0.4 and 0.6; three quarters and one quarter of 2.
+    # 1/2 * 1 + 1/4 * 2 + 1/4 * 2 bits; then the entropies of 0.4 and 0.6, and of 3/4 and 1/4.
     binary = -0.4 * math.log2(0.4) - 0.6 * math.log2(0.6)
     quarter = -0.75 * math.log2(0.75) + 0.25 * 2
     np.testing.assert_allclose(found("entropy"), [1.5, 0, 0, 0, binary, quarter, 0], atol=1e-15)
 
 
-def test_figure_without_triangles_or_weights_has_values():
+def test_figure_without_triangles_or_weights_has_finite_values():
     for name in ("weight:j1", "influences", "entropy"):
         assert found(name, [[], []]) == [0, 0]
     assert found("dominant", [[], []]) == [-1, -1]

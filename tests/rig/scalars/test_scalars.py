@@ -49,42 +49,43 @@ def slid(figure, *moves):
 
 
 def test_influence_limit_error_is_the_distance_to_four_influences():
-    # Six equal sixths; the last two joints move by 6: one unit each is lost.
+    # All six weights are 1/6; the last two joints move by 6, so each loses one unit.
     sixths = [(joint, 1 / 6) for joint in range(6)]
     figure = sliding([sixths, [(5, 1.0)], []])
     found = compute("pruning", figure, slid(figure, 0, 0, 0, 0, 6, 6), Skinning())
     assert_allclose(found, [2.0, 0, 0], atol=1e-14)
 
 
-def test_influence_limit_error_follows_the_chosen_number():
+def test_influence_limit_error_depends_on_the_chosen_limit():
     figure = sliding([[(0, 0.5), (1, 0.25), (2, 0.25)], [(0, 1.0)], []])
     pose = slid(figure, 4, 0, 0)
-    # With one influence 4 instead of 2; with two 4 * 2/3; with three nothing is cut.
+    # The vertex moves by 2; by 4 with one influence, 4 * 2/3 with two, and 2 with three.
     for count, expected in ((1, 2.0), (2, 4 * 2 / 3 - 2), (3, 0.0)):
         found = compute("pruning", figure, pose, Skinning(max_influences=count))
         assert_allclose(found, [expected, 0, 0], atol=1e-14)
 
 
-def test_normalized_is_the_displacement_by_normalising_weights():
-    # 0.9 of a vertex 5 from the origin: half a unit. 0.5 of (1, 1, 1) is half its length.
+def test_normalised_quantity_is_the_displacement_by_normalising_weights():
+    # A weight of 0.9 moves a vertex at distance 5 by half a unit; 0.5 moves (1, 1, 1) by half its
+    # length.
     figure = sliding([[(0, 0.9)], [(0, 0.5), (1, 0.5)], [(0, 0.5)]])
     for how in (Skinning(), Skinning(normalize=True), Skinning(max_influences=4)):
         found = compute("normalized", figure, slid(figure), how)
         assert_allclose(found, [0.5, 0, np.sqrt(3) / 2], atol=1e-14)
 
 
-def test_methods_is_the_radius_lost_by_linear_blending_in_a_twist():
+def test_methods_quantity_is_the_radius_lost_by_linear_blending_in_a_twist():
     figure = sliding([[(0, 0.5), (1, 0.5)], [(0, 1.0)], [(1, 1.0)]])
     pose = rest_pose(figure.skeleton)
     pose.dofs[3] = np.pi / 2  # joint 1 about x
-    # Radius 5 against 5 cos 45.
+    # The radius is 5 with DQS and 5 cos 45 with LBS.
     expected = [5.0 * (1.0 - np.sqrt(0.5)), 0, 0]
     for method in ("lbs", "dqs", "mix"):
         found = compute("methods", figure, pose, Skinning(method))
         assert_allclose(found, expected, atol=1e-14)
 
 
-def test_correctives_is_how_far_they_move_a_vertex():
+def test_correctives_quantity_is_their_displacement_of_a_vertex():
     offsets = np.zeros((45, 3, 3))
     offsets[4, 0] = 3.0, 0.0, 4.0  # joint 1, middle of the second row: cos x - 1
     ties = [[(0, 1.0)]] * 3
@@ -97,12 +98,12 @@ def test_correctives_is_how_far_they_move_a_vertex():
     assert compute("correctives", sliding(ties), pose, Skinning()).tolist() == [0, 0, 0]
 
 
-def test_asymmetry_of_a_posed_figure():
+def test_asymmetry_of_a_posed_figure_matches_hand_calculation():
     points = [[2.0, 0, 0], [-2.0, 0, 0], [0.0, 1, 0]]
     figure = sliding([[(0, 1.0)], [(1, 1.0)], [(2, 1.0)]], symmetry=np.array([1, 0, 2]))
     figure = replace(figure, mesh=mesh(points))
     assert compute("asymmetry", figure, slid(figure), Skinning()).tolist() == [0, 0, 0]
-    # Moving both sides outwards by 1 is symmetric, one side alone is not; the middle counts twice.
+    # Moving both sides outwards by 1 is symmetric, moving one side is not; the middle counts twice.
     assert compute("asymmetry", figure, slid(figure, 1, -1), Skinning()).tolist() == [0, 0, 0]
     assert compute("asymmetry", figure, slid(figure, 1, 0, 0.5), Skinning()).tolist() == [1, 1, 1]
 
@@ -116,7 +117,7 @@ def test_asymmetry_ignores_placement():
     assert_allclose(compute("asymmetry", figure, pose, Skinning()), [2, 2, 0], atol=1e-14)
 
 
-def test_asymmetry_without_a_map_is_missing():
+def test_asymmetry_without_a_map_is_not_available():
     figure = sliding([[(0, 1.0)]] * 3)
     assert compute("asymmetry", figure, slid(figure, 1), Skinning()).tolist() == [0, 0, 0]
 
@@ -133,7 +134,7 @@ def test_mesh_in_bind_pose_shows_zero(name):
 
 
 @pytest.mark.parametrize("name", SCALARS)
-def test_figure_without_the_data_of_a_view_has_no_values(name):
+def test_figure_without_the_required_data_has_no_values(name):
     figure = sliding([[(0, 1.0)]] * 3)
     bare = Figure("bare", mesh(POINTS), figure.skeleton)
     nothing = -1 if SCALARS[name].kind == "categorical" else 0
@@ -142,7 +143,7 @@ def test_figure_without_the_data_of_a_view_has_no_values(name):
 
 
 @pytest.mark.parametrize("name", [name for name in SCALARS if name not in MOVING])
-def test_weight_and_part_views_need_no_pose(name):
+def test_weight_and_part_views_do_not_need_a_pose(name):
     parts = BodyParts(("a", "b"), np.array([0, 1, 1]))
     figure = replace(
         sliding([[(0, 0.5), (1, 0.2)]] * 3, body_parts=parts),
@@ -174,7 +175,7 @@ def test_unknown_quantity_is_refused():
         ("influences", 1.0, 4.0, (0.0, 4.0)),
     ],
 )
-def test_automatic_range_of_a_view(name, low, high, ends):
+def test_automatic_range_of_a_view_is_that_of_its_kind(name, low, high, ends):
     assert SCALARS[name].shown(low, high) == ends
 
 
@@ -249,7 +250,7 @@ def test_joints_without_a_skeleton_have_indices():
     assert str(caught.value) == 'no joint "knee"; without a skeleton, joints are #0 to #1'
 
 
-def test_missing_data_for_the_joint_weight_view():
+def test_missing_data_of_the_joint_weight_view_is_reported():
     figure = named("hip", "knee")
     assert missing_part("weight:knee", figure) == ""
     assert missing_part("weight", figure) == "a selected joint"
@@ -259,7 +260,7 @@ def test_missing_data_for_the_joint_weight_view():
         assert quantity_title(name, figure, Skinning()) == "Weight of a joint"
 
 
-def test_units_of_views():
+def test_views_have_their_units():
     figure = sliding([[]] * 3, unit="m")
     found = {name: shown_unit(name, figure) for name in ("pruning", "stretch", "entropy", "weight")}
     assert found == {
@@ -279,10 +280,10 @@ def test_every_module_of_the_folder_is_in_the_table():
 def test_small_lengths_are_millimetres_or_a_fraction_of_the_size():
     figure = sliding([[]] * 3, unit="m")
     assert length_unit(figure) == (1000.0, "mm")
-    # A centimetre is 10 mm, an inch 25.4.
+    # A centimetre is 10 mm, an inch 25.4 mm.
     assert length_unit(replace(figure, unit="cm")) == (10.0, "mm")
     assert length_unit(replace(figure, unit="in"))[0] == pytest.approx(25.4)
-    # Box of 1 x 2 x 3: a diagonal of sqrt 14.
+    # A box of 1 x 2 x 3 has a diagonal of sqrt 14.
     factor, word = length_unit(replace(figure, unit=""))
     assert word == "% of the size"
     assert factor == pytest.approx(100.0 / np.sqrt(14.0))
@@ -295,7 +296,7 @@ def test_strongest_is_the_largest_number_of_influences():
     assert strongest(Figure("bare", mesh(POINTS))) == 0
 
 
-def test_fields_are_shown_by_name_or_the_first_of_their_kind():
+def test_field_view_shows_the_named_or_the_first_field():
     figure = replace(sliding([[(0, 1.0)]] * 3), fields=(FAR, KINDS_OF_MATCH), unit="m")
     for name in ("field", "field:far", "field:FAR"):
         assert compute(name, figure, None, Skinning()).tolist() == [0.5, 2.0, 0.0]
@@ -309,7 +310,7 @@ def test_fields_are_shown_by_name_or_the_first_of_their_kind():
         compute("field:match", figure, None, Skinning())
 
 
-def test_titles_give_the_influence_limit():
+def test_titles_include_the_influence_limit():
     figure = sliding([[(0, 1.0)]] * 3)
     assert quantity_title("pruning", figure, Skinning()) == "Distance to 4 influences"
     assert menu_title("pruning", Skinning(max_influences=1)) == "Distance to 1 influence"

@@ -1,4 +1,4 @@
-"""Normals under joints that scale, shear or reflect, against closed forms."""
+"""Normals under joints that scale, shear or reflect, compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_scaled_joint_below_a_rotated_one_shears_the_sphere_exactly(how):
     assert_allclose(normals, unit(DIRECTIONS @ np.linalg.inv(linear)), atol=1e-13)
 
 
-def test_blended_matrix_is_inverted_as_a_whole():
+def test_normals_use_the_inverse_of_the_blended_matrix():
     first, second = matrix(turn_x(0.4) @ np.diag([2.0, 1, 1])), matrix(turn_z(1.0), (1, 0, 0))
     blended = 0.25 * first[:3, :3] + 0.75 * second[:3, :3]
     found = sphere_on([first, second], [(0, 0.25), (1, 0.75)])
@@ -94,7 +94,7 @@ def test_rigid_joints_keep_the_blended_matrix_itself():
 
 
 @pytest.mark.parametrize("factor", [1e-3, 0.5, 1000.0])
-def test_length_unit_does_not_change_normals(factor):
+def test_uniform_scale_does_not_change_normals(factor):
     turns = [matrix(turn_x(0.4)), matrix(turn_z(1.0))]
     pairs = [(0, 0.25), (1, 0.75)]
     larger = [factor * turn for turn in turns]
@@ -107,12 +107,12 @@ def test_mirrored_normals_point_outward(method):
     found = sphere_on([mirror, np.eye(4)], [(0, 1.0)], method)
     outward = unit(DIRECTIONS @ np.linalg.inv(mirror[:3, :3]))
     assert_allclose(found, outward, atol=1e-13)
-    # The surface's own points lie on the side that the normals point to, as it is convex.
+    # The surface is convex around the origin, so its points are in the direction of the normals.
     assert (np.einsum("va,va->v", found, DIRECTIONS @ mirror[:3, :3].T) > 0.0).all()
 
 
 @pytest.mark.parametrize("method", [lbs, dqs, mix])
-def test_flattened_joint_gives_the_normal_of_its_plane(method):
+def test_flattened_joint_has_the_normal_of_its_plane(method):
     found = sphere_on([matrix(np.diag([1.0, 0.0, 2.0])), np.eye(4)], [(0, 1.0)], method)
     assert_allclose(np.abs(found), np.tile([0.0, 1.0, 0.0], (200, 1)), atol=1e-15)
     assert (np.sign(found[:, 1]) == np.sign(DIRECTIONS[:, 1])).all()
@@ -141,11 +141,11 @@ RIGID = [np.eye(4), matrix(turn_x(2.0), (3, 4, 5))]
         pytest.param(np.zeros((0, 4, 4)), True, id="no joints"),
     ],
 )
-def test_palette_is_rigid(palette, expected):
+def test_rigid_palettes_are_recognised(palette, expected):
     assert is_rigid(np.array(palette)).tolist() is expected
 
 
-def test_palettes_of_several_poses_are_judged_one_by_one():
+def test_palettes_of_several_poses_are_checked_one_by_one():
     stretched = [RIGID[0], np.diag([1.0, 2.0, 1.0, 1.0])]
     assert is_rigid(np.array([RIGID, stretched, RIGID])).tolist() == [True, False, True]
 

@@ -1,4 +1,4 @@
-"""Linear blending in dense blocks against the plain sum, for all sizes and many frames."""
+"""Linear blending in dense blocks, compared with the plain sum, for all sizes and many frames."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning, _blocks, deform, deform_frames, joint_matrices, lbs
 from viewer.rig.skinning._blocks import blocks_of
 
-ROUNDING = 2e-14  # sums of some ten terms of size 10
+ROUNDING = 2e-14  # for sums of about ten terms of size 10
 
 
 def random_skin(seed, n_vertices, n_joints, most=6):
@@ -51,7 +51,7 @@ def test_blocks_match_the_direct_sum(n_vertices, n_joints):
     assert_allclose(found[1], expected[1], atol=1e-10)  # sums that nearly cancel lose digits
 
 
-def test_blocks_are_consecutive_and_hold_every_weight():
+def test_blocks_are_consecutive_and_contain_every_weight():
     influences, skin = random_skin(3, 600, 20)
     dense = np.zeros((600, 20))
     for vertex, pairs in enumerate(influences):
@@ -69,7 +69,7 @@ def test_blocks_are_consecutive_and_hold_every_weight():
     assert end == 600
 
 
-def test_blocks_are_made_once_unless_they_are_huge(monkeypatch):
+def test_blocks_are_cached_unless_they_are_too_large(monkeypatch):
     _, skin = random_skin(4, 600, 20)
     first = [id(block) for block in blocks_of(skin)]
     assert [id(block) for block in blocks_of(skin)] == first
@@ -85,7 +85,7 @@ def test_blocks_are_made_once_unless_they_are_huge(monkeypatch):
 
 
 @pytest.mark.parametrize("chunk", [1, 300, 1024])
-def test_chunks_of_any_size_give_the_same(monkeypatch, chunk):
+def test_chunk_size_does_not_change_results(monkeypatch, chunk):
     _, skin = random_skin(7, 900, 12)
     positions = np.random.default_rng(8).normal(size=(900, 3))
     palette = random_palette(2, 12)
@@ -96,14 +96,14 @@ def test_chunks_of_any_size_give_the_same(monkeypatch, chunk):
     assert np.array_equal(lbs.blended_matrices(skin, palette), blended)
 
 
-def test_mesh_without_vertices_is_skinned_to_nothing():
+def test_mesh_without_vertices_stays_empty():
     skin = skin_from_lists([], np.tile(np.eye(4), (2, 1, 1)))
     assert list(blocks_of(skin)) == []
     assert lbs.move(np.zeros((0, 3)), skin, random_palette(0, 2))[0].shape == (0, 3)
 
 
 def animated(correctives=False, n_vertices=300) -> Figure:
-    """Return a chain of four with raw weights, blend shapes and, if asked for, correctives."""
+    """Return a chain of four with raw weights, blend shapes and, if requested, correctives."""
     rng = np.random.default_rng(9)
     dofs = [(joint, axis, 0.0) for joint in range(4) for axis in "xyz"]
     bones = skeleton([-1, 0, 1, 2], dofs, offsets=rng.normal(size=(4, 3)))
@@ -154,7 +154,7 @@ def test_many_frames_leave_correctives_out_as_single_poses_do():
     assert_allclose(deform_frames(figure, poses, how), expected, atol=1e-11)
 
 
-def test_many_frames_need_poses_a_skin_and_linear_blending():
+def test_many_frames_require_poses_and_a_skin_and_linear_blending():
     figure = animated()
     poses = poses_of(figure, 1)
     message = "expected poses, a figure with mesh, skeleton and skin, and method lbs"
@@ -166,7 +166,8 @@ def test_many_frames_need_poses_a_skin_and_linear_blending():
 
 
 def test_placement_is_applied_after_raw_weights():
-    # Weights sum to 0.5: halfway to the origin, then scaled by 2, then moved by 1 along x.
+    # The weights sum to 0.5, so the vertex moves halfway to the origin; then it is scaled by 2 and
+    # moved by 1 along x.
     bones = skeleton([-1], [(0, "z", 0.0)])
     skin = skin_from_lists([[(0, 0.5)]], np.eye(4)[None])
     figure = Figure("point", Mesh([[2.0, 4, 6]], [[0, 0, 1.0]], np.zeros((0, 3), int)), bones, skin)

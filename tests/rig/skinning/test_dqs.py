@@ -1,4 +1,4 @@
-"""Dual quaternion skinning: its invariants, and closed forms of its results."""
+"""Invariants of dual quaternion skinning, and closed forms of its results."""
 
 from dataclasses import replace
 
@@ -86,7 +86,7 @@ def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
     around = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
     for a in around:
         point, pairs = (0.3, np.cos(a), np.sin(a)), [(0, 0.5), (1, 0.5)]
-        # Halfway between two rotations about x: the rotation by half the angle.
+        # Halfway between two rotations about x is the rotation by half the angle.
         half = turn_x(angle / 2) @ point
         moved, turned = move(point, pairs, palette, normal=(0, np.cos(a), np.sin(a)))
         assert_allclose(moved, half, atol=ROUNDING)
@@ -96,7 +96,7 @@ def test_twist_keeps_the_radius_where_linear_blending_collapses(degrees):
         assert np.hypot(*linear[1:]) == pytest.approx(np.cos(angle / 2))
 
 
-def test_half_turn_keeps_the_radius():
+def test_twist_of_180_degrees_keeps_the_radius():
     palette = [np.eye(4), matrix(np.diag([1.0, -1.0, -1.0]))]
     for point in ((0.3, 1.0, 0.0), (0.0, 0.6, 0.8)):
         moved, _ = move(point, [(0, 0.5), (1, 0.5)], palette)
@@ -108,8 +108,9 @@ def test_half_turn_keeps_the_radius():
 def middle_screw(first, second):
     """Return the motion halfway along the screw from one rigid motion to another.
 
-    Independent of quaternions: the relative motion is a rotation by ``angle`` about an axis through
-    a point and a translation along it; half of it is half the rotation and half the translation.
+    The formula uses no quaternions: the relative motion is a rotation by ``angle`` about an axis
+    through a point and a translation along that axis. Half of the motion is half the rotation and
+    half the translation.
     """
     relative = second @ np.linalg.inv(first)
     turn, shift = relative[:3, :3], relative[:3, 3]
@@ -135,7 +136,7 @@ def test_equal_weights_meet_halfway_along_the_screw(seed):
 
 
 def test_result_does_not_depend_on_the_origin():
-    """Blending follows the screw motion: moving everything moves the result equally."""
+    """Blending follows the screw motion, so moving all joints moves the result equally."""
     rng = np.random.default_rng(3)
     palette, shift = random_rigid(rng, 3), matrix(turn_y(1.0), (10, -20, 5))
     pairs, point = [(0, 0.2), (1, 0.5), (2, 0.3)], rng.normal(size=3)
@@ -154,7 +155,7 @@ def test_rotations_take_the_shorter_arc(angle):
         assert_allclose(moved, turn_y(angle + 0.2) @ [1, 2, 3], atol=ROUNDING)
 
 
-def test_chain_rotated_by_more_than_a_half_turn_blends_across_its_last_joint():
+def test_chain_rotated_by_more_than_180_degrees_blends_across_its_last_joint():
     # Ten joints of 50 degrees each: 450 and 500 degrees meet at 475.
     bones = skeleton([-1, *range(9)], [(joint, "z", np.radians(50)) for joint in range(10)])
     skin = bound([[(8, 0.5), (9, 0.5)]], 10)
@@ -164,7 +165,8 @@ def test_chain_rotated_by_more_than_a_half_turn_blends_across_its_last_joint():
 
 
 def test_hemisphere_is_that_of_the_strongest_influence():
-    # 0, 100 and 200 degrees about z, most at 100: 0 and 200 both differ by less than 180.
+    # The joints are at 0, 100 and 200 degrees about z; 100 has the largest weight, and both other
+    # rotations differ from it by less than 180.
     angles = np.radians([0.0, 100.0, 200.0])
     palette = [matrix(turn_z(angle)) for angle in angles]
     weights = [0.25, 0.5, 0.25]
@@ -187,28 +189,28 @@ def test_order_of_influences_does_not_matter():
         assert_allclose(move((1, 2, 3), mixed, palette)[0], expected, atol=ROUNDING)
 
 
-def test_weights_count_relative_to_their_sum():
+def test_weights_are_relative_to_their_sum():
     expected, _ = move((1, 2, 3), [(0, 0.75), (1, 0.25)], RIGID)
     for factor in (0.1, 0.998, 4.0, -2.0):
         pairs = [(0, 0.75 * factor), (1, 0.25 * factor)]
         assert_allclose(move((1, 2, 3), pairs, RIGID)[0], expected, atol=1e-13)
 
 
-def test_joint_listed_twice_adds_up():
+def test_weights_of_a_joint_listed_twice_are_added():
     once, _ = move((1, 2, 3), [(0, 0.75), (1, 0.25)], RIGID)
     twice, _ = move((1, 2, 3), [(0, 0.375), (1, 0.25), (0, 0.375)], RIGID)
     assert_allclose(twice, once, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("pairs", [[], [(0, 0.0)], [(0, 1.0), (1, -1.0)], [(0, 0.5), (0, -0.5)]])
-def test_vertex_without_influence_or_with_cancelling_weights_stays(pairs):
+def test_vertex_without_influence_or_with_cancelling_weights_does_not_move(pairs):
     moved, turned = move((1, 2, 3), pairs, RIGID)
     assert moved.tolist() == [1, 2, 3]
     assert_allclose(turned, [0.6, 0, 0.8], atol=ROUNDING)
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 100])
-def test_chunks_of_any_size_give_the_same(monkeypatch, chunk):
+def test_chunk_size_does_not_change_results(monkeypatch, chunk):
     rng = np.random.default_rng(5)
     influences = [
         [(int(rng.integers(5)), float(rng.uniform(0.1, 1))) for _ in range(rng.integers(0, 4))]
@@ -223,13 +225,13 @@ def test_chunks_of_any_size_give_the_same(monkeypatch, chunk):
     assert np.array_equal(found[1], expected[1])
 
 
-def test_mesh_without_vertices_is_skinned_to_nothing():
+def test_mesh_without_vertices_stays_empty():
     none = np.zeros((0, 3))
     assert dqs.deform(none, none, bound([], 2), np.array(RIGID[:2]))[0].shape == (0, 3)
 
 
 @pytest.mark.parametrize("blend_factor", [0.0, 0.25, 0.5, 1.0])
-def test_mix_is_the_straight_line_between_both(blend_factor):
+def test_mix_interpolates_linearly_between_both_methods(blend_factor):
     figure = random_arm(6)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = np.random.default_rng(7).uniform(-2, 2, 21)
@@ -241,8 +243,8 @@ def test_mix_is_the_straight_line_between_both(blend_factor):
     assert_allclose(normals, between, atol=1e-13)
 
 
-def test_mix_defaults_to_half_of_each():
+def test_mix_uses_half_of_each_method_by_default():
     palette = [np.eye(4), matrix(turn_x(np.pi / 2))]
     moved, _ = move((0, 1, 0), [(0, 0.5), (1, 0.5)], palette, mix)
-    # LBS gives (0, 1/2, 1/2), DQS a point on the circle at 45 degrees.
+    # LBS returns (0, 1/2, 1/2), DQS a point on the circle at 45 degrees.
     assert_allclose(moved, [0, *[(0.5 + np.sqrt(0.5)) / 2] * 2], atol=ROUNDING)

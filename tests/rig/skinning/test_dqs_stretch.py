@@ -54,7 +54,7 @@ def test_one_influence_is_the_affine_map(motion, joint):
 
 @pytest.mark.parametrize("factor", [0.2, 2.0, -1.5])
 def test_figure_scaled_as_a_whole_equals_linear_blending(factor):
-    """All joints have the same map, so any weights must give it, at any position."""
+    """All joints have the same map, so any weights must result in this map at any position."""
     motion = scaled(factor, turn_x(0.9) @ turn_z(2.0), (5, -1, 2))
     moved, _ = moved_by([motion] * 3, [(0, 0.2), (1, 0.5), (2, 0.3)])
     assert_allclose(moved, POINTS @ motion[:3, :3].T + motion[:3, 3], atol=1e-13)
@@ -79,7 +79,7 @@ def test_scaled_root_scales_the_whole_figure(factors):
 
 
 def test_two_scales_blend_linearly_without_rotation():
-    # Stretches about the joints' own positions: 0.5 (2 x) + 0.5 (4 (x - c) + c).
+    # Each joint stretches about its position: 0.5 (2 x) + 0.5 (4 (x - c) + c).
     palette = [scaled(2.0), matrix(4.0 * np.eye(3), -3.0 * PLACES[1]), np.eye(4)]
     moved, _ = moved_by(palette, [(0, 0.5), (1, 0.5)])
     assert_allclose(moved, POINTS + 2.0 * POINTS - 1.5 * PLACES[1], atol=1e-13)
@@ -107,7 +107,7 @@ def test_stretch_of_a_rotated_joint_is_blended_before_the_rotation():
 
 
 def test_bind_matrix_with_scale_and_shear_is_part_of_the_map():
-    """Only the product M counts: a sheared binding cancelled by the pose changes nothing."""
+    """Only the product M matters: a sheared binding that the pose cancels has no effect."""
     rng = np.random.default_rng(3)
     bind = np.tile(np.eye(4), (3, 1, 1))
     bind[:, :3] += 0.3 * rng.normal(size=(3, 3, 4))
@@ -116,7 +116,7 @@ def test_bind_matrix_with_scale_and_shear_is_part_of_the_map():
     assert_allclose(moved, POINTS, atol=1e-13)
 
 
-def test_rounding_of_a_long_chain_counts_as_rigid():
+def test_long_chain_with_rounding_errors_is_rigid():
     rotation = np.linalg.matrix_power(turn_x(0.3) @ turn_y(0.2), 1000)
     _, stretches = dqs.split_palette(matrix(rotation)[None], np.zeros((1, 3)))
     assert stretches[0].tolist() == np.eye(3, 4).tolist()

@@ -60,13 +60,13 @@ def test_one_influence_is_a_rigid_motion(joint):
     assert_allclose(normals[0], RIGID[joint][:3, :3] @ [0.6, 0, 0.8], atol=1e-15)
 
 
-def test_two_influences_give_the_weighted_mean():
-    # Moved by +2 and by -1 along x with weights 3/4 and 1/4: 1 + 1.5 - 0.25.
+def test_two_influences_result_in_the_weighted_mean():
+    # The joints move by +2 and -1 along x with weights 3/4 and 1/4: 1 + 1.5 - 0.25.
     palette = np.array([matrix(None, (2, 0, 0)), matrix(None, (-1, 0, 0)), np.eye(4)])
     assert skinned([(0, 0.75), (1, 0.25)], palette)[0].tolist() == [[2.25, 2, 3]]
 
 
-def test_half_turn_collapses_to_the_axis():
+def test_twist_of_180_degrees_collapses_to_the_axis():
     palette = np.array([np.eye(4), matrix(np.diag([-1.0, -1.0, 1.0])), np.eye(4)])
     assert skinned([(0, 0.5), (1, 0.5)], palette)[0].tolist() == [[0, 0, 3]]
 
@@ -83,14 +83,14 @@ def test_weights_that_cancel_send_the_vertex_to_the_origin():
     assert normals.tolist() == [[0, 0, 0]]
 
 
-def test_joint_listed_twice_adds_up():
+def test_weights_of_a_joint_listed_twice_are_added():
     once, twice = skinned([(0, 0.75), (1, 0.25)]), skinned([(0, 0.5), (1, 0.25), (0, 0.25)])
     assert_allclose(twice[0], once[0], atol=1e-15)
     assert_allclose(twice[1], once[1], atol=1e-15)
 
 
 @pytest.mark.parametrize("pairs", [[], [(0, 0.0)], [(0, 0.0), (1, 0.0)]])
-def test_vertex_without_influence_stays(pairs):
+def test_vertex_without_influence_does_not_move(pairs):
     positions, normals = skinned(pairs)
     assert positions.tolist() == [[1, 2, 3]]
     assert_allclose(normals, [[0.6, 0, 0.8]], atol=1e-15)
@@ -103,18 +103,19 @@ def test_vertices_without_influence_at_either_end_do_not_affect_the_others():
         assert_allclose(blended[vertex], RIGID[expected][:3], atol=0)
 
 
-def test_mesh_without_any_influence_stays():
+def test_mesh_without_any_influence_does_not_move():
     skin = skin_from_lists([[]], np.tile(np.eye(4), (3, 1, 1)))
     assert skin_mesh(POINT, skin, PALETTE)[0].tolist() == [[1, 2, 3]]
 
 
-def test_all_of_thousands_of_influences_count():
-    # 2,500 of joint 0 and 2,500 of joint 1, 1/4096 each: exact sums of 0.6103515625 of each matrix.
+def test_thousands_of_influences_are_summed():
+    # Joints 0 and 1 are listed 2,500 times each with 1/4096, so both matrices have the exact sum
+    # 0.6103515625.
     pairs = [(number % 2, 1 / 4096) for number in range(5000)]
     positions, _ = skinned(pairs)
     share = 2500 / 4096
     expected = share * (RIGID[0] @ [1, 2, 3, 1]) + share * (RIGID[1] @ [1, 2, 3, 1])
-    # 5,000 rounding errors of numbers near 1e-3.
+    # The tolerance is 5,000 rounding errors of numbers near 1e-3.
     assert_allclose(positions[0], expected[:3], atol=1e-13)
 
 
@@ -131,13 +132,13 @@ def test_deform_matches_the_direct_sum(seed):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_normals_are_unit(seed):
+def test_normals_have_unit_length(seed):
     figure, _ = random_figure(seed)
     lengths = np.linalg.norm(deform(figure)[1], axis=1)
     assert_allclose(lengths, 1.0, atol=1e-15)
 
 
-def test_unit_keeps_zero_vectors():
+def test_normalising_keeps_zero_vectors():
     assert unit(np.array([[0.0, 0, 0], [0, -3, 0]])).tolist() == [[0, 0, 0], [0, -1, 0]]
 
 
@@ -145,7 +146,7 @@ def test_deform_without_skeleton_returns_the_bind_pose():
     figure = Figure("a", mesh=mesh([[1, 2, 3]], [[0, 0, 5.0]]))
     positions, normals = deform(figure)
     assert (positions.tolist(), normals.tolist()) == ([[1, 2, 3]], [[0, 0, 1]])
-    positions[0] = 0  # the caller's own copy
+    positions[0] = 0  # changing the returned copy does not change the mesh
     assert figure.mesh.positions.tolist() == [[1, 2, 3]]
 
 

@@ -1,4 +1,4 @@
-"""Skins for engines with few influences: merged, sorted, pruned, scaled."""
+"""Skins for engines with few influences: merged, sorted, pruned and normalised."""
 
 import numpy as np
 import pytest
@@ -28,7 +28,7 @@ def skin(*influences) -> Skin:
     return skin_from_lists(influences, BIND)
 
 
-def test_strongest_come_first_and_ties_keep_their_order():
+def test_strongest_influences_are_first_and_ties_keep_their_order():
     mixed = skin([(0, 0.25), (3, 0.5), (1, 0.25), (2, 0.5)], [], [(5, -1.0), (4, 0.0)])
     assert rows(strongest_first(mixed)) == [
         [(3, 0.5), (2, 0.5), (0, 0.25), (1, 0.25)],
@@ -42,8 +42,8 @@ def test_limit_keeps_the_strongest_and_normalises_them():
     assert rows(cut) == [[(1, 0.5 / 0.75), (2, 0.25 / 0.75)]]
 
 
-def test_influences_of_one_joint_are_added_up_before_pruning():
-    # Joint 4 holds 0.25 + 0.25: more than joint 1's 0.375 alone.
+def test_influences_of_one_joint_are_summed_before_pruning():
+    # Joint 4 has 0.25 + 0.25, which is more than the 0.375 of joint 1.
     cut = limit_influences(skin([(4, 0.25), (1, 0.375), (4, 0.25), (0, 0.125)]), 1)
     assert rows(cut) == [[(4, 1.0)]]
 
@@ -98,12 +98,12 @@ def test_limit_matches_a_plain_loop(count):
         assert [weight for _, weight in found] == sorted((w for _, w in found), reverse=True)
 
 
-def test_entries_in_any_order_become_rows_that_keep_theirs():
+def test_unsorted_entries_are_converted_to_rows_in_the_order_of_entries():
     built = skin_from_entries(4, [2, 0, 2, 3, 0], [5, 1, 0, 2, 4], [0.1, 0.2, 0.3, 0.4, 0.5], BIND)
     assert rows(built) == [[(1, 0.2), (4, 0.5)], [], [(5, 0.1), (0, 0.3)], [(2, 0.4)]]
 
 
-def test_unmodified_skin_is_used_as_is():
+def test_skin_that_needs_no_change_is_returned_unchanged():
     stored = skin([(0, 0.5)])
     assert skin_used(stored, Skinning()) is stored
 

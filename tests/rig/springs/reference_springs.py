@@ -1,4 +1,4 @@
-"""Reference simulation of spring joints, after the pseudocode of ``VRMC_springBone`` 1.0."""
+"""Reference simulation of spring joints, following the pseudocode of ``VRMC_springBone`` 1.0."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def turn(quaternion: np.ndarray) -> np.ndarray:
 
 
 class Reference:
-    """State of all spring joints, whose local matrices are given for each step."""
+    """The state of all spring joints; each step is given their local matrices."""
 
     def __init__(self, skeleton: Skeleton, locals_: np.ndarray) -> None:
         self.skeleton, self.springs = skeleton, skeleton.springs

@@ -1,4 +1,4 @@
-"""Spring joints against closed forms and an independent implementation."""
+"""Spring joints, compared with closed forms and an independent implementation."""
 
 from __future__ import annotations
 
@@ -63,13 +63,13 @@ def run(skeleton: Skeleton, n_steps: int, tails=None):
     return tails, rotations
 
 
-def test_a_spring_without_forces_stays_at_rest() -> None:
+def test_spring_without_forces_stays_at_rest() -> None:
     tails, rotations = run(skeleton_of(springs_of([0], [[0, -2, 0]])), 10)
     assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-12)
     assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-12)
 
 
-def test_a_pendulum_comes_to_rest_along_gravity() -> None:
+def test_pendulum_comes_to_rest_along_gravity() -> None:
     springs = springs_of([0], [[2, 0, 0]], gravity=(0, -3, 0), drags=0.2)
     tails, rotations = run(skeleton_of(springs), 600)
     assert_allclose(tails.now, [[0, -1, 0]], rtol=0, atol=1e-6)
@@ -79,7 +79,7 @@ def test_a_pendulum_comes_to_rest_along_gravity() -> None:
 
 
 def test_stiffness_and_gravity_balance_along_their_sum() -> None:
-    # At rest, the point lies along stiffness * axis + gravity: 3 x - 4 y.
+    # At rest, the point is in the direction of stiffness * axis + gravity, 3 x - 4 y.
     springs = springs_of([0], [[1, 0, 0]], gravity=(0, -4, 0), stiffness=3.0, drags=0.5)
     tails, _ = run(skeleton_of(springs), 600)
     assert_allclose(tails.now, [[0.6, 1.0 - 0.8, 0]], rtol=0, atol=1e-9)
@@ -96,14 +96,14 @@ def test_stiffness_alone_returns_to_the_rest_direction() -> None:
     assert_allclose(rotations, [[0, 0, 0, 1]], rtol=0, atol=1e-9)
 
 
-def test_the_first_step_moves_by_the_force_times_the_step() -> None:
+def test_first_step_moves_by_the_force_times_the_time_step() -> None:
     springs = springs_of([0], [[1, 0, 0]], gravity=(0, -3, 0))
     tails, _ = run(skeleton_of(springs), 1)
     wanted = np.array([1.0, -3.0 * STEP, 0.0])
     assert_allclose(tails.now[0] - [0, 1, 0], wanted / np.linalg.norm(wanted), rtol=0, atol=1e-12)
 
 
-def test_a_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
+def test_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
     # The sphere is below the pivot, in the path of a pendulum that swings down from +x.
     shape = Colliders(
         np.array([1]), np.array([[0, -1, 0]]), np.array([[0, -1, 0]]), np.array([0.5])
@@ -117,10 +117,11 @@ def test_a_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
         colliders=shape,
         obstacles=((0,),),
     )
-    # Joint 1 is a second root at the same place, which does not swing.
+    # Joint 1 is a second root at the same position, which does not swing.
     skeleton = skeleton_of(springs, (-1, -1), ((0, 1, 0), (0, 1, 0)))
     tails, _ = run(skeleton, 600)
-    # The constant length pulls it back into the sphere, by less than gravity moves it in a step.
+    # The constant length pulls the point back into the sphere by less than gravity moves it in a
+    # step.
     assert_allclose(np.linalg.norm(tails.now[0] - [0, 0, 0]), 0.75, rtol=0, atol=STEP / 2)
     assert_allclose(np.linalg.norm(tails.now[0] - [0, 1, 0]), 1.0, rtol=0, atol=1e-12)
     assert tails.now[0, 0] > 0.0
@@ -135,7 +136,8 @@ def test_inertia_is_relative_to_the_center(center: int) -> None:
     shifted = pose_of(skeleton, shift=(1, 0, 0))
     _, rotations = simulation.step(tails, *shifted)
     tilt = abs(rotations[0, 2])
-    # The point follows its centre, or stays behind: pulled from (0, -1) to (-1, -1) / sqrt(2).
+    # The point either follows its centre or stays behind, pulled from (0, -1) to (-1, -1) /
+    # sqrt(2).
     assert_allclose(tilt, 0.0 if center == 0 else np.sin(np.pi / 8), rtol=0, atol=1e-12)
 
 
@@ -149,7 +151,7 @@ def _random_figure(rng: np.random.Generator) -> Skeleton:
         rng.normal(size=(2, 3)) * 0.2,
         np.array([0.3, 0.2]),
     )
-    # Joint 3 is between spring joints, but is not one itself.
+    # Joint 3 is between spring joints, but is not a spring joint itself.
     springs = Springs(
         np.array([2, 4, 5, 6]),
         rng.normal(size=(4, 3)) * 0.3,
@@ -180,7 +182,7 @@ def test_chains_agree_with_the_pseudocode_of_the_specification(seed: int) -> Non
         tails, rotations = simulation.step(tails, world, local, scales, place)
         wanted = reference.step(local, world)
         for row, joint in enumerate(skeleton.springs.joints.tolist()):
-            # 40 steps of 1e-16 relative rounding, amplified by inertia.
+            # The tolerance is 40 steps of 1e-16 relative rounding, amplified by inertia.
             assert_allclose(turn(rotations[row]), wanted[joint], rtol=0, atol=1e-9)
 
 

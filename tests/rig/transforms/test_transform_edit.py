@@ -1,4 +1,4 @@
-"""Edits of keyed transforms: curves compared with closed forms before and after."""
+"""Edits of keyed transforms. Curves before and after are compared with closed forms."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def row_of(clip, path: str, joint: int, component: int) -> int:
     )
 
 
-def test_curves_are_the_keyed_components_and_all_rotations():
+def test_curves_are_shown_for_keyed_components_and_all_rotations():
     rows = rows_of(wave(), SKELETON)
     assert [(row.path, row.joint, row.channel) for row in rows[::3]] == [
         ("translation", 0, 0), ("rotation", 0, 1), ("rotation", 1, 2), ("scale", 1, 3),
@@ -44,12 +44,12 @@ def test_curves_are_the_keyed_components_and_all_rotations():
     times = np.array([0.5, 1.0, 2.5])
     chosen = [row_of(wave(), "rotation", 0, 2), row_of(wave(), "rotation", 1, 0),
               row_of(wave(), "scale", 1, 1), len(rows) - 2]  # fmt: skip
-    # The knee's rest rotation is 90 degrees about x: its first key is at 0, the second at -60.
+    # The rest rotation of the knee is 90 degrees about x; its first key is at 0, the second at -60.
     wanted = [[0.0, 0, 1, 0], [np.pi / 4, -np.pi / 3, 1.5, 0.5], [np.pi / 2, -np.pi / 3, 3, 1]]
     assert_allclose(row_values(wave(), SKELETON, chosen, times), wanted, atol=EXACT)
 
 
-def test_moved_keys_stop_before_their_neighbours_with_all_components():
+def test_moved_keys_stop_at_neighbours_in_all_components():
     clip, row = wave(), row_of(wave(), "translation", 0, 1)
     moved = move_transform_keys(clip, SKELETON, [(row, 1)], 0.25, 0.5, GAP)
     assert_array_equal(moved.channels[0].times, [0.5, 1.25, 2.0])
@@ -72,7 +72,7 @@ def test_angles_of_a_rotation_key_are_relative_to_rest():
         np.array(about(1, 20.0))
     )
     assert_allclose(quaternion_to_matrix(found), wanted, atol=EXACT)
-    # Beyond 90 degrees, the rotation has other angles, so the middle angle stops there.
+    # Beyond 90 degrees the rotation has different angles, so the middle angle stops at 90.
     steep = set_transform_key(clip, SKELETON, (row, 0), value=2.0)
     assert row_values(steep, SKELETON, [row], np.array([0.5]))[0, 0] == pytest.approx(np.pi / 2)
 
@@ -85,7 +85,7 @@ def cubic_turn():
 
 
 @pytest.mark.parametrize("clip", [wave(), cubic_turn(), bow()])
-def test_an_added_key_keeps_the_shape_of_every_curve(clip):
+def test_added_key_keeps_the_shape_of_every_curve(clip):
     times = np.linspace(0.0, 3.0, 61)
     before = sample_transforms(clip, times)
     for index, row in enumerate(rows_of(clip, SKELETON)):
@@ -100,14 +100,14 @@ def test_an_added_key_keeps_the_shape_of_every_curve(clip):
     assert all(0.77 in one.times for one in clip.channels)
 
 
-def test_a_key_at_a_time_rounded_to_single_precision_is_changed_not_duplicated():
+def test_key_at_a_time_rounded_to_single_precision_is_changed_and_not_duplicated():
     third = float(np.float32(1.0 / 3.0))
     one = channel(0, "scale", [0.0, third], np.ones((2, 3)))
     changed, key = added_key(one, 1.0 / 3.0, np.array([2.0, 2, 2]))
     assert key == 1 and len(changed.times) == 2 and changed.values[1, 0] == 2.0
 
 
-def test_keys_are_deleted_for_all_components_and_empty_channels_are_removed():
+def test_keys_are_deleted_in_all_components_and_empty_channels_removed():
     clip = wave()
     row = row_of(clip, "translation", 0, 2)
     assert len(delete_transform_keys(clip, SKELETON, [(row, 0)]).channels[0].times) == 2
@@ -120,7 +120,7 @@ def test_interpolation_changes_only_values_between_keys():
     assert_array_equal(value_at(clip.channels[0], 0.99), [0.0, 0, 0])
     curved = with_interpolation(channel(0, "scale", [0.0, 1, 3], [[0.0] * 3, [1] * 3, [3] * 3]),
                                 "cubic")  # fmt: skip
-    # The slope at the middle key is the one between its neighbours; ends are flat.
+    # The slope at the middle key is that between its neighbours; the ends are flat.
     assert_array_equal(curved.tangents[:, 0, 0], [0.0, 1.0, 0.0])
     keys = [about(2, 0.0), -np.array(about(2, 40.0)), about(2, 80.0)]
     turn = with_interpolation(channel(0, "rotation", [0.0, 1, 2], keys), "cubic")
@@ -137,18 +137,18 @@ def test_slopes_of_cubic_keys_are_per_second():
 
 
 @pytest.mark.parametrize("only_changed", [False, True])
-def test_a_keyed_pose_is_reached_at_its_time(only_changed):
+def test_keyed_pose_is_reproduced_at_its_time(only_changed):
     figure, clip = leg(), wave()
     actor = Actor(figure, clip=clip)
     pose_actor(actor, 1.25)
-    actor.pose.dofs[7] = 0.4  # the foot, which no channel moves
+    actor.pose.dofs[7] = 0.4  # the foot, which has no channel
     actor.pose.dofs[0] += 0.2
     actor.pose.translations[1, 0] += 0.5
     actor.pose.shape_weights[0] = 0.9
     wanted = actor.pose.copy()
     keyed = key_transform_pose(clip, figure, actor.pose, 1.25, only_changed)
     counts = [len(one.times) for one in keyed.channels]
-    # Channels of the translation of the knee and the rotation of the foot are new.
+    # The channels for the translation of the knee and the rotation of the foot are new.
     assert counts == ([3, 3, 2, 2, 3, 1, 1] if only_changed else [4, 3, 3, 3, 3, 1, 1])
     again = Actor(figure, clip=keyed)
     pose_actor(again, 1.25)
@@ -156,7 +156,7 @@ def test_a_keyed_pose_is_reached_at_its_time(only_changed):
         assert_allclose(getattr(again.pose, name), getattr(wanted, name), atol=EXACT)
 
 
-def test_a_changed_cubic_rotation_rotates_its_spline():
+def test_changed_cubic_rotation_rotates_its_spline():
     clip = cubic_turn()
     row = row_of(clip, "rotation", 1, 0)
     before = row_values(clip, SKELETON, [row, row + 1, row + 2], np.array([1.0]))[0]

@@ -50,7 +50,7 @@ def plain_local(figure: Figure, clip, time: float) -> np.ndarray:
 
 
 @pytest.mark.parametrize("time", TIMES)
-def test_a_pose_has_the_transforms_of_the_keys(time):
+def test_pose_has_the_transforms_of_the_keys(time):
     actor = Actor(leg(), clip=wave(), offset=-0.25)
     pose_actor(actor, time - 0.25)
     skeleton = actor.figure.require_skeleton()
@@ -58,11 +58,12 @@ def test_a_pose_has_the_transforms_of_the_keys(time):
         local_matrices(skeleton, actor.pose), plain_local(actor.figure, wave(), time), atol=EXACT
     )
     assert_allclose(actor.pose.shape_weights, plain_value(wave().channels[4], time), atol=EXACT)
-    # Sliders show the whole rotation: none of it is in the quaternions.
+    # The DOFs contain the whole rotation, so that sliders show it; the quaternions are the
+    # identity.
     assert_array_equal(actor.pose.rotations, skeleton.rest_rotations)
 
 
-def test_euler_angles_in_gimbal_lock_give_the_exact_rotation():
+def test_euler_angles_in_gimbal_lock_reproduce_the_exact_rotation():
     lock = [about(1, 90.0), about(1, -90.0), (np.array(about(1, 90.0)) + about(0, 90.0)) / 2]
     clip = clip_of(channel(1, "rotation", [0.0, 1.0, 2.0], lock))
     actor = Actor(leg(), clip=clip)
@@ -91,7 +92,7 @@ def test_joints_without_channels_keep_their_pose():
     )
 
 
-def test_translation_dofs_take_the_offset_within_their_limits():
+def test_translation_dofs_receive_the_offset_within_their_limits():
     skeleton = leg().require_skeleton()
     slides = Skeleton(
         skeleton.names, skeleton.parents, skeleton.rest_translations, skeleton.rest_rotations,
@@ -109,7 +110,7 @@ def test_translation_dofs_take_the_offset_within_their_limits():
     assert_array_equal(places, [[0.0, 0, 0], [5, 7, 0], [3, 1, 0]])
 
 
-def test_frames_equal_the_poses_and_store_shared_rows_once():
+def test_frames_equal_the_poses_and_store_repeated_rows_once():
     figure, clip = leg(), wave()
     frames = frames_of(figure, clip, TIMES)
     assert frames.scales.shape == (len(TIMES), 3, 3) and frames.shape_weights.shape[0] == len(TIMES)
@@ -188,7 +189,7 @@ def test_single_frames_keep_scales_of_joints():
     assert_allclose(found, world_matrices(actor.figure.skeleton, actor.pose), atol=EXACT)
 
 
-def test_paths_and_onion_skins_follow_the_clip():
+def test_motion_paths_and_onion_skins_follow_the_clip():
     figure, clip = leg(), wave()
     assert_allclose(path_times(clip)[[0, -1]], [0.5, 2.5])
     path = motion_path(figure, clip, [0, 2], np.array([0.5, 2.0]))

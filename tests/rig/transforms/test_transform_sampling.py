@@ -1,4 +1,4 @@
-"""Values of keyed transforms: closed forms, and the formulas of glTF evaluated key by key."""
+"""Values of keyed transforms, compared with closed forms and the formulas of glTF."""
 
 import numpy as np
 import pytest
@@ -11,11 +11,11 @@ from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.transforms.rate import key_rate
 from viewer.rig.transforms.sampling import sample_transforms
 
-EXACT = 1e-14  # a few roundings of numbers near 1
+EXACT = 1e-14  # a few rounding errors of numbers near 1
 
 
 def test_linear_rotations_have_constant_speed_along_the_shorter_arc():
-    # The second key's negative is the same rotation: 90 degrees, not 270.
+    # The second key is negated, which is the same rotation: the arc is 90 degrees, not 270.
     keys = [about(2, 0.0), -np.array(about(2, 90.0)), about(2, 180.0)]
     found = sample_transforms(clip_of(channel(3, "rotation", [1.0, 2.0, 4.0], keys)),
                               np.array([1.0, 1.25, 1.5, 2.0, 3.0, 4.0]))  # fmt: skip
@@ -56,7 +56,8 @@ def test_cubic_channels_follow_their_polynomial_and_its_slopes():
 
 
 def test_cubic_rotations_are_normalised_after_interpolation():
-    # With zero tangents, the middle is the mean of the keys: 45 degrees, of length cos(22.5 deg).
+    # With zero tangents, the middle is the mean of the keys: a rotation by 45 degrees with length
+    # cos(22.5 deg).
     keys = [about(2, 0.0), about(2, 90.0)]
     clip = clip_of(channel(0, "rotation", [0.0, 1.0], keys, "cubic", np.zeros((2, 2, 4))))
     assert_allclose(sample_transforms(clip, [0.5]).rotations[0, 0], about(2, 45.0), atol=EXACT)
@@ -66,7 +67,7 @@ def test_cubic_rotations_are_normalised_after_interpolation():
     assert_array_equal(sample_transforms(clip, [0.5]).rotations[0, 0], [0, 0, 0, 1])
 
 
-def test_each_channel_holds_its_end_values_outside_its_range():
+def test_each_channel_keeps_its_end_values_outside_its_range():
     clip = clip_of(
         channel(0, "translation", [1.0], [[7.0, 8, 9]]),
         channel(1, "translation", [2.0, 3.0], [[0.0, 0, 0], [4, 0, 0]]),
@@ -120,18 +121,18 @@ def test_all_channels_agree_with_the_formulas_of_gltf(seed):
             assert_allclose(cosines, 1.0, atol=1e-12)
         else:
             assert_allclose(values, wanted, atol=1e-12)
-    # One time at a time gives the same numbers as all times together.
+    # Evaluating one time at a time returns the same numbers as all times together.
     single = sample_transforms(clip, times[7:8])
     assert_array_equal(single.rotations[0], found.rotations[7])
     assert_array_equal(single.translations[0], found.translations[7])
 
 
-def test_a_clip_without_channels_has_no_samples():
+def test_clip_without_channels_has_no_samples():
     found = sample_transforms(TransformClip("empty", (), 0.0, 1.0), [0.0, 1.0])
     assert found.rotations.shape == (2, 0, 4) and found.weights.shape == (2, 0)
 
 
-def test_the_zero_quaternion_is_not_a_rotation():
+def test_zero_quaternion_is_not_a_rotation():
     with pytest.raises(RigError, match="key 1"):
         channel(0, "rotation", [0.0, 1.0], [[0.0, 0, HALF, HALF], [0, 0, 0, 0]])
 
@@ -147,6 +148,6 @@ def test_the_zero_quaternion_is_not_a_rotation():
         ([0.0, 0.0123], 30.0),
     ],
 )
-def test_the_frame_rate_is_estimated_from_the_keys(times, rate):
+def test_frame_rate_is_estimated_from_the_keys(times, rate):
     clip = clip_of(channel(0, "translation", times, np.zeros((len(times), 3))))
     assert key_rate(clip) == rate

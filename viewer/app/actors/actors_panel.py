@@ -29,7 +29,7 @@ from viewer.rig.scene import Actor
 __all__ = ["draw"]
 
 _PLAIN = (0.75, 0.72, 0.68)  # button colour of actors without their own colour
-_LONGEST_WINDOW = 1e4  # seconds
+_LONGEST_WINDOW = 1e4  # maximum extent of a motion path, seconds
 _LOOK = (
     imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.float
 )

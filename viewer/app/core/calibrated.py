@@ -24,7 +24,7 @@ def look_through_view(state: AppState, view: CameraView) -> None:
 
 
 def follow_calibrated(state: AppState) -> None:
-    """Move the camera with the moving calibrated camera that it looks through, if any."""
+    """Update the view through a moving calibrated camera, if it looks through one."""
     follow_view(state.camera, _size(state), state.clock.time, state.box)
 
 

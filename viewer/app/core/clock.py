@@ -22,10 +22,10 @@ MODES = {
     "ping-pong": "Ping-pong",
     "run on": "Run on",
 }
-"""Playback modes at the end of the range, with their labels."""
+"""Playback modes, which differ at the end of the range, with their labels."""
 
 FASTEST = 4.0
-"""Largest playback speed, forwards and backwards."""
+"""Maximum playback speed, forwards and backwards."""
 
 
 class PosedFor(NamedTuple):
@@ -77,7 +77,7 @@ class Clock:
         Frames per second for scenes without sampled motion: the rate that was set, or else the
         rate of the keys.
     has_frames : bool
-        Whether some motion is sampled: each frame is then shown for its whole duration.
+        Whether any motion is sampled: each frame is then shown for its whole duration.
     interpolate_gaps : bool
         Whether captures are interpolated in their gaps.
     has_motion : bool
@@ -129,7 +129,7 @@ class Clock:
         self.seek(self.start if scene.time is None else scene.time)
 
     def follow(self, chosen: Actor | None = None) -> None:
-        """Update the range for clips that changed or grew; a full range stays full.
+        """Update the range for changed or longer clips; a range that covered all clips still does.
 
         If only the frame rate changes, time and range stay on their frames.
 
@@ -292,7 +292,7 @@ class Clock:
         self.time = self.start + (2.0 * length - place if self._is_returning else place)
 
     def pose(self, chosen: Actor | None = None, again: bool = False) -> bool:
-        """Pose all actors for the current time if it or a clip has changed; return whether it has.
+        """Pose all actors if the time or a clip has changed; return whether they were posed.
 
         Parameters
         ----------

@@ -112,7 +112,7 @@ def slider_float(
 def slider_int(
     state: AppState, label: str, value: int, low: int, high: int, text: str = "%d", flags: int = 0
 ) -> tuple[bool, int]:
-    """Draw a slider of whole numbers; as ``slider_float``."""
+    """Draw a slider of whole numbers; see ``slider_float``."""
     if is_typed_in_place(label):
         changed, typed = _typed(state, label, value, (low, high), text, flags, is_whole=True)
         return changed, round(typed)
@@ -125,7 +125,7 @@ def slider_int(
 def drag_float(
     state: AppState, label: str, value: float, speed: float, text: str, low: float = -math.inf
 ) -> tuple[bool, float]:
-    """Draw a number that is changed by dragging it, or typed after a click; as ``slider_float``.
+    """Draw a number that is changed by dragging it, or typed after a click; see ``slider_float``.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def drag_float(
     speed : float
         Change per pixel.
     low : float
-        Smallest value.
+        Minimum value.
     """
     if is_typed_in_place(label):
         return _typed(state, label, value, (low, math.inf), text, _CLAMP)
@@ -146,7 +146,7 @@ def drag_float(
 def drag_int(
     state: AppState, label: str, value: int, limits: tuple[int, int], speed: float = 0.3
 ) -> tuple[bool, int]:
-    """Draw a whole number that is changed by dragging it; as ``drag_float``."""
+    """Draw a whole number that is changed by dragging it; see ``drag_float``."""
     if is_typed_in_place(label):
         changed, typed = _typed(state, label, value, limits, "%d", _CLAMP, is_whole=True)
         return changed, round(typed)
@@ -214,7 +214,7 @@ class _Track:
     def __enter__(self) -> _Track:
         style = imgui.get_style()
         colors = imgui.Col_.slider_grab, imgui.Col_.slider_grab_active
-        # Copies: the style's colours are about to change.
+        # These are copies, because the style's colours are about to change.
         self._quiet, self._strong = (list(style.color_(color)) for color in colors)
         for color in colors:
             imgui.push_style_color(color, _CLEAR)

@@ -17,7 +17,7 @@ _NARROWEST = 40.0  # points: a smaller view is unusable
 
 
 def keep_fitting(state: AppState, grows: bool) -> None:
-    """Extend the known extent of the scene; fit the camera to it unless the user moved the camera.
+    """Extend the known extent of the scene; fit the camera to it unless the user has moved it.
 
     Called in each frame once the free part of the view is known.
 
@@ -56,7 +56,7 @@ def fit_points(state: AppState, points: Floats) -> None:
 
 
 def fit_again(state: AppState) -> None:
-    """Fit the camera in its current direction: to the previous points unless the user moved it."""
+    """Fit the camera in its direction, to the previous points unless the user has moved it."""
     framing = state.framing
     if not framing.is_fitting:
         fit_shown(state)

@@ -1,4 +1,4 @@
-"""Camera fitting state: the points to which the camera is fitted, and whether it still is."""
+"""Camera fitting state: the points to fit, and whether the camera is still fitted to them."""
 
 from __future__ import annotations
 

@@ -114,12 +114,19 @@ class CountedJob:
         Description of the job until it reports its first step.
     act : callable
         Gets a ``Report`` and returns messages about the result; may raise ViewerError.
+    finish : callable, optional
+        Applies the result of a successful job; called in the frame loop.
     """
 
-    def __init__(self, title: str, act: Callable[[Report], list[str]]) -> None:
+    def __init__(
+        self,
+        title: str,
+        act: Callable[[Report], list[str]],
+        finish: Callable[[], None] | None = None,
+    ) -> None:
         self.title, self.error, self.can_cancel = title, "", True
         self.lines: list[str] = []
-        self._act = act
+        self._act, self._finish = act, finish
         self._progress = (0, 0)
         self._is_cancelled = False
         self._thread = threading.Thread(target=self._run)
@@ -142,8 +149,9 @@ class CountedJob:
 
     @property
     def is_done(self) -> bool:
-        """Whether it has ended or was cancelled."""
-        return self._is_cancelled or not self._thread.is_alive()
+        """Whether it has ended or was cancelled, and its result has been applied."""
+        has_ended = not self._thread.is_alive() and self._finish is None
+        return self._is_cancelled or has_ended
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -151,7 +159,12 @@ class CountedJob:
         return self._progress
 
     def step(self) -> None:
-        """Do nothing: the thread does the work."""
+        """Apply the result of a thread that has ended."""
+        if self._finish is None or self._is_cancelled or self._thread.is_alive():
+            return
+        finish, self._finish = self._finish, None
+        if not self.error:
+            finish()
 
     def cancel(self) -> None:
         """End the job before its next step, and discard its result."""

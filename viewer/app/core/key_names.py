@@ -32,7 +32,7 @@ def key_name(state: AppState, usual: str) -> str:
 
 
 def with_key(state: AppState, text: str, usual: str) -> str:
-    """Return a text for a button or tooltip, followed by the name of its key.
+    """Return the text of a button or tooltip, followed by the name of its key.
 
     Parameters
     ----------
@@ -41,6 +41,6 @@ def with_key(state: AppState, text: str, usual: str) -> str:
     text : str
         The text, which describes the key's effect.
     usual : str
-        Its label in the table of keys.
+        Label of the key in the table of keys.
     """
     return f"{text} ({key_name(state, usual)})"

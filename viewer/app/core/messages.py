@@ -14,7 +14,7 @@ KINDS = ("note", "status", "error")
 """Kinds of messages: unsolicited notes, status after a key or button, and errors."""
 
 _MOST = 1000  # maximum number of messages in the log
-_NOTE_SECONDS = 4.0  # how long a short message is shown
+_NOTE_SECONDS = 4.0  # seconds for which a short message is shown
 
 
 @dataclass(slots=True)

@@ -69,7 +69,7 @@ def no_drive(state: AppState) -> str:
 def no_parts(state: AppState) -> str:
     """Return the reason why the parts of the chosen actor cannot be hidden."""
     mesh = state.actor.figure.mesh
-    return "" if mesh is not None and len(mesh.parts) > 1 else "this figure has one part only"
+    return "" if mesh is not None and len(mesh.parts) > 1 else "this figure has only one part"
 
 
 def no_pose(state: AppState) -> str:

@@ -26,7 +26,7 @@ def draw_space(state: AppState) -> None:
 
 
 def switch_space(state: AppState, space: str) -> None:
-    """Show the people in another space; time, selection, appearance and calibrated camera stay.
+    """Show the people in another space; keep time, selection, appearance and calibrated camera.
 
     The people are read again, so edits of their motions and the undo history are discarded.
     """

@@ -71,7 +71,7 @@ class AppState:
     error : str
         Error message shown above everything else; empty if there is none.
     messages : Messages
-        All messages, and those shown now.
+        All messages, and those currently shown.
     stats : Stats
         Statistics of the last frame.
     history : History
@@ -206,7 +206,7 @@ class AppState:
             camera.target = center + away * (_FARTHEST * size / length)
 
     def say(self, *messages: str | Diagnostic) -> None:
-        """Show messages that time out; longer ones stay longer."""
+        """Show messages that time out; longer ones are shown longer."""
         for message in messages:
             self.messages.show(str(message))
 

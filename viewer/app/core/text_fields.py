@@ -82,8 +82,8 @@ def number_field(
 ) -> float | None:
     """Draw a field for a number, and return the number once it is entered.
 
-    Enter, Tab or a click elsewhere enters the number; Escape restores the old one. A text that is
-    not a number is marked while it is typed, and causes a message if it is entered.
+    Enter, Tab or a click elsewhere enters the number; Escape restores the old one. Text that is not
+    a number is marked while it is typed, and causes a message if it is entered.
 
     Parameters
     ----------

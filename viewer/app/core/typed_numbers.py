@@ -96,7 +96,7 @@ def read_number(text: str, unit: str = "") -> float:
 
 
 def _without_unit(text: str, unit: str) -> tuple[str, float]:
-    """Return a text without its unit, and the factor from that unit to the field's."""
+    """Return the text without its unit, and the factor from that unit to the field's unit."""
     found = _UNIT.search(text)
     if found is None or found.group(1) == "pi":
         return text, 1.0

@@ -222,7 +222,7 @@ def offer_files(state: AppState, text: str) -> None:
 
 
 def begin_menu(state: AppState, text: str, enabled: bool = True) -> bool:
-    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must follow then."""
+    """Draw a menu's title and return whether it is open; ``imgui.end_menu`` must then follow."""
     opened = imgui.begin_menu(text, enabled)
     if not opened:
         note_item(state, f"menu {text}")

@@ -85,7 +85,7 @@ def draw(state: AppState) -> None:
 
 
 def _follow(state: AppState, curves: tuple[Curve, ...]) -> None:
-    """Deselect curves and keys that no longer exist, and show those of a newly selected joint."""
+    """Deselect curves and keys that no longer exist; show the curves of a newly selected joint."""
     view, clip = state.of(Curves), state.actor.clip
     kind = f"{type(clip).__name__} {state.actor.animation}"
     owner = (id(state.actor), kind, len(curves))

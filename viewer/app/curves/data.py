@@ -78,7 +78,7 @@ _parts: Memo[Clip, Clip] = Memo(kept=2)
 def curves_of(actor: Actor) -> tuple[Curve, ...]:
     """Return the curves of an actor's motion; a row is an index into them.
 
-    A keyed clip has a curve per DOF, keyed transforms have those of ``rows_of``. A sampled
+    A keyed clip has a curve per DOF; keyed transforms have those of ``rows_of``. A sampled
     animation has the figure's position and each joint's angles about x, y and z (R = Rz Ry Rx);
     captured points have their coordinates.
     """
@@ -150,7 +150,7 @@ def channel_of(clip: Clip, row: int) -> Channel | None:
 
 
 def keyed_values(clip: Clip, rows: tuple[int, ...], times: Floats) -> Floats:
-    """Return some curves of a clip at many times: (T, C); curves without a channel are 0."""
+    """Return the values of curves of a clip at many times: (T, C); 0 without a channel."""
 
     def chosen() -> Clip:
         channels = (channel_of(clip, row) for row in rows)

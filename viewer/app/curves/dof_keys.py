@@ -28,7 +28,7 @@ __all__ = ["DofKeys"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DofKeys:
-    """A clip of DOFs: a row is a row of the DOF table."""
+    """A clip of DOFs, whose rows are those of the DOF table."""
 
     clip: Clip
     skeleton: Skeleton
@@ -44,7 +44,7 @@ class DofKeys:
         return None if channel is None or len(channel.times) < 2 else slopes(channel)
 
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return some curves at many times."""
+        """Return the values of some curves at many times."""
         return keyed_values(self.clip, rows, times)
 
     def wraps(self, row: int) -> bool:

@@ -26,10 +26,10 @@ class KeyedMotion(Protocol):
         """Return the slopes at the keys that can be dragged, (N, 2); None if there are none."""
 
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return some curves at many times: (T, C); those without keys are 0."""
+        """Return the values of some curves at many times: (T, C); those without keys are 0."""
 
     def wraps(self, row: int) -> bool:
-        """Return whether a curve of angles jumps by full rotations."""
+        """Return whether a curve shows angles that jump by full rotations."""
 
     def moved(self, places: Iterable[KeyPlace], dt: float, dv: float, gap: float) -> Motion:
         """Move keys together; they stop at unselected keys."""

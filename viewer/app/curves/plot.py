@@ -154,7 +154,7 @@ def _draw_line(plot: Plot, row: int) -> None:
 
 
 def _broken(times: Floats, values: Floats) -> tuple[Floats, Floats]:
-    """Return a curve of angles with gaps where it jumps by a rotation."""
+    """Return a curve of angles with gaps where it jumps by a full rotation."""
     jumps = np.flatnonzero(np.abs(np.diff(values)) > math.pi) + 1
     return np.insert(times, jumps, times[jumps]), np.insert(values, jumps, np.nan)
 

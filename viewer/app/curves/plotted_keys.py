@@ -83,7 +83,7 @@ def _mark(plot: Plot, chosen: list[tuple[KeyPlace, float, float]]) -> None:
 
 
 def _draw_many(plot: Plot, seen: list[tuple[int, Floats, Floats, list[int]]]) -> None:
-    """Draw keys as plain dots, which cannot be dragged; for too many keys."""
+    """Draw keys as plain dots, which cannot be dragged, if there are too many keys."""
     for row, times, values, keys in seen:
         if keys:
             color = plot.color(row)

@@ -27,7 +27,7 @@ __all__ = ["TransformKeys"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TransformKeys:
-    """A clip of transforms: a row is an index into ``rows_of``."""
+    """A clip of transforms, whose rows are indices into ``rows_of``."""
 
     clip: TransformClip
     skeleton: Skeleton
@@ -56,7 +56,7 @@ class TransformKeys:
         return channel.tangents[:, :, self.row(row).component]
 
     def values(self, rows: tuple[int, ...], times: Floats) -> Floats:
-        """Return some curves at many times."""
+        """Return the values of some curves at many times."""
         return row_values(self.clip, self.skeleton, rows, times)
 
     def wraps(self, row: int) -> bool:

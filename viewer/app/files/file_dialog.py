@@ -20,7 +20,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_file_dialog"]
 
-_SIZE = (46.0, 33.0)  # in font sizes
+_SIZE = (46.0, 33.0)  # size of the dialog, in font sizes
 _HINTS = {
     "open": "Ctrl+click selects several: a .skel and its .skin",
     "folder": "",
@@ -112,7 +112,7 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
 
 
 def _draw_name(state: AppState, dialog: FileDialog) -> bool:
-    """Draw the field of the name; return whether Enter confirmed the name of a file."""
+    """Draw the field for the name; return whether Enter confirmed the name of a file."""
     imgui.set_next_item_width(0.5 * imgui.get_content_region_avail().x)
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()

@@ -14,7 +14,7 @@ from viewer.phrases import printable
 
 __all__ = ["draw_file_list", "is_confirmed_by_key"]
 
-_PAGE = 12  # rows
+_PAGE = 12  # number of rows skipped by Page Up and Page Down
 
 
 def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Path]:

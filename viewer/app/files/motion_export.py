@@ -113,13 +113,13 @@ def motion_files(state: AppState, path: Path, everyone: bool) -> list[Path]:
 
 
 def is_one_file(path: Path) -> bool:
-    """Return whether a name stands for one file with all actors."""
+    """Return whether a name selects one file with all actors."""
     kinds = [kind for kind in EXPORTERS.values() if path.suffix.lower() in kind.suffixes]
     return any(kind.writes_several for kind in kinds) and is_together(path, MotionOptions())
 
 
 def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
-    """Return the different files of actors."""
+    """Return the distinct files of actors."""
     return [path] if is_one_file(path) else motion_paths(path, actors)
 
 
@@ -147,8 +147,9 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         Target, whose suffix selects the format; without a suffix, it is an EasyMocap folder. Either
         all files are written or none.
     everyone : bool
-        Whether all actors are written, or only the chosen one. Formats that hold several figures
-        and folders contain all of them, also those that do not move; others get one file each.
+        Whether all actors are written, or only the chosen one. Folders, and formats that hold
+        several figures, contain all of them, including those that do not move; other formats get
+        one file per actor.
     """
     try:
         parts, left_out = _parts(state, path, everyone)
@@ -239,7 +240,7 @@ def _write_together(
     path: Path,
     options: MotionOptions,
 ) -> list[Diagnostic]:
-    """Write all actors into one file: with their own keys if all of them have some."""
+    """Write all actors into one file, with their own keys if all of them have keys."""
     from viewer.export.gltf import export_animations
 
     if all(part.frames is None and keeps_keys(scene, part.actor) for part in parts):

@@ -9,15 +9,18 @@ from collections.abc import Callable, Sequence
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
+from viewer.progress import Cancelled, receiving
 from viewer.rig.captures.capture import CapturePart
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.retargeting.drive import Drive
 from viewer.rig.scene import Actor
 
 __all__ = ["Stream", "keep_rate"]
 
+_Motions = list[tuple[Actor, Drive, SampledClip, list[Diagnostic]]]
 _WAITING = 4  # maximum number of parts in the queue: limits memory
 
 
@@ -35,14 +38,18 @@ class Stream:
     ----------
     error : str
         Reason why reading ended early; empty if there is no error.
+    finishing : float
+        Completed fraction of the final motions of driven figures; negative before they are begun.
     """
 
     def __init__(self, builders: Sequence[Builder], wake: Callable[[], None]) -> None:
         self.builders = tuple(builder for builder in builders if not builder.is_done)
-        self.error = ""
+        self.error, self.finishing = "", -1.0
         self._wake = wake
-        self._parts: queue.Queue[tuple[Builder, CapturePart]] = queue.Queue(_WAITING)
-        self._stop = threading.Event()
+        self._parts: queue.Queue[tuple[Builder, CapturePart | _Motions]] = queue.Queue(_WAITING)
+        for builder in self.builders:
+            builder.defers = True
+        self._stop, self._is_waiting = threading.Event(), False
         self._thread = threading.Thread(target=self._read, daemon=True)
         self._thread.start()
 
@@ -54,13 +61,35 @@ class Stream:
                         break
                     if not self._hand_over(builder, part):
                         return
+                if not self._finish(builder):
+                    return
+        except Cancelled:
+            return
         except ViewerError as problem:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.builders[0].capture.name}: not enough memory"
         self._wake()
 
-    def _hand_over(self, builder: Builder, part: CapturePart) -> bool:
+    def _finish(self, builder: Builder) -> bool:
+        """Compute the final motions after all parts were added; return False if cancelled."""
+        self._is_waiting = True
+        while not self._parts.empty() or not builder.is_done:
+            if self._stop.wait(0.02):
+                return False
+        self._is_waiting = False
+        # Cancelling takes effect between two steps of the work.
+        with receiving(self._receive):
+            motions = builder.final_motions()
+        return self._hand_over(builder, motions) if motions else True
+
+    def _receive(self, done: int, total: int, unit: str, what: str) -> None:
+        if self._stop.is_set():
+            raise Cancelled
+        self.finishing = done / max(total, 1)
+        self._wake()
+
+    def _hand_over(self, builder: Builder, part: CapturePart | _Motions) -> bool:
         """Put a part into the queue when it has room; return False if reading was cancelled."""
         while not self._stop.is_set():
             try:
@@ -98,6 +127,10 @@ class Stream:
                 return new, notes, grew
             if builder.is_cut:
                 continue
+            if isinstance(part, list):
+                notes += builder.finish(part)
+                grew = True
+                continue
             known = builder.actors
             more, said = builder.add(part)
             # The user may have changed the frame rate since the first person appeared.
@@ -124,10 +157,10 @@ class Stream:
             builder.is_cut = True
 
     def wait(self) -> None:
-        """Wait until the thread has ended or the queue is full. For tests."""
+        """Wait until the thread has ended or waits for parts to be added; used by tests."""
         while self._thread.is_alive():
             self._thread.join(0.01)
-            if self._parts.full():
+            if self._parts.full() or self._is_waiting:
                 return
 
 

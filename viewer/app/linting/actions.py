@@ -110,7 +110,7 @@ def is_stale(state: AppState) -> bool:
         view.is_edited = True
     actors, old, options = state.scene.actors, known.scene.actors, _options(state)
     if [actor.clip for actor in actors] != [actor.clip for actor in old]:
-        # Other animations may have another frame rate.
+        # Other animations may have a different frame rate.
         options = replace(options, frame_rate=known.options.frame_rate)
     return (
         view.is_edited
@@ -174,7 +174,7 @@ def choose_finding(state: AppState, index: int) -> None:
 
 
 def is_in_scene(state: AppState, finding: Finding) -> bool:
-    """Return whether a finding is about an actor of the scene; others concern files only."""
+    """Return whether a finding is about an actor of the scene; others are about files only."""
     return finding.actor is not None and finding.actor < len(state.scene.actors)
 
 

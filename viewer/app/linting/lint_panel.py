@@ -45,7 +45,7 @@ _GROUNDS = {
     "none": "none: feet are not checked",
 }
 _LONGEST = 400  # maximum length of a message in the list, characters
-_LIMITS_WIDTH = 24.0  # in font sizes
+_LIMITS_WIDTH = 24.0  # width of the limits, in font sizes
 _FASTEST = 100.0  # highest speed that can be set, units per second
 _TIP_WIDTH = 30.0  # width of tooltips, in font sizes
 

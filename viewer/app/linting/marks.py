@@ -26,7 +26,7 @@ _FEW = 200  # up to this number, triangles also have a central mark: tiny edges 
 _AROUND, _AROUND_JOINTS = 0.06, 0.15  # extents shown around a finding, relative to the actor's size
 _ONE_WAY = 0.5  # minimum length of the mean normal of a location with a front side
 _AWAY = 0.2  # cosine to the line of sight below which the front side is not visible
-_STEEPEST = 70.0  # degrees
+_STEEPEST = 70.0  # maximum inclination of the camera, degrees
 _JOINT, _MIDDLE = 6.5, 3.0  # radii, pixels
 
 
@@ -142,7 +142,7 @@ def aim(state: AppState, points: Floats, facing: Floats, around: float) -> None:
     facing : (3,)
         Mean normal, as in ``Places``.
     around : float
-        Smallest extent to show around their centre, as a fraction of the actor's size.
+        Minimum extent to show around their centre, as a fraction of the actor's size.
     """
     linting = state.of(Linting)
     points, camera, finding = _finite(points), state.camera, linting.finding

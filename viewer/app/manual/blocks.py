@@ -51,7 +51,7 @@ def blocks_of(text: str) -> list[Block]:
 
 
 def _prose(text: str) -> list[Block]:
-    """Return the blocks of a text without code."""
+    """Return the blocks of text without code."""
     found: list[Block] = []
     lines = text.splitlines()
     for is_empty, group in groupby(lines, lambda line: not line.strip()):

@@ -29,7 +29,7 @@ _LONGEST = 60  # maximum length of a name in characters
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """Something that can be found and run.
+    """An entry that can be found and run.
 
     Attributes
     ----------

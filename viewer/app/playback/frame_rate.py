@@ -29,7 +29,7 @@ def foreign_rate(state: AppState) -> str:
     clock = state.clock
     if not clock.has_frames or isinstance(state.actor.clip, SampledClip | PointClip):
         return ""
-    return "the frames are those of another motion: select its actor"
+    return "the frames belong to another motion: select its actor"
 
 
 def set_rate(state: AppState, rate: float) -> None:

@@ -15,7 +15,7 @@ _gaps: Memo[Motion, bool] = Memo()
 
 
 def no_gaps(state: AppState) -> str:
-    """Return the reason why gaps cannot be interpolated; empty if they can, or during reading."""
+    """Return the reason why gaps cannot be interpolated; empty if they can or files are read."""
     if state.of(Files).stream is not None or any(
         _has_gaps(actor.clip) for actor in state.scene.actors if actor.clip is not None
     ):

@@ -28,7 +28,7 @@ def key_times(actor: Actor, joint: int) -> Floats:
     Returns
     -------
     (N,)
-        Seconds of scene time, increasing.
+        Scene times in seconds, increasing.
     """
     clip, skeleton = actor.clip, actor.figure.skeleton
     if skeleton is None or not isinstance(clip, Clip | TransformClip):

@@ -30,7 +30,7 @@ from viewer.rig.number_text import number_text
 
 __all__ = ["draw"]
 
-_WIDEST_LIST = 16.0  # font sizes
+_WIDEST_LIST = 16.0  # maximum width of the list of animations, in font sizes
 _CLAMP = imgui.SliderFlags_.always_clamp
 
 

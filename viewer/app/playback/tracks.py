@@ -21,7 +21,7 @@ from viewer.rig.srgb import encode_color
 
 __all__ = ["bars", "draw_tracks", "nice_step", "present_spans", "ruler_text_place"]
 
-_NAME_WIDTH = 9.0  # in font sizes
+_NAME_WIDTH = 9.0  # width of the actors' names, in font sizes
 _TICK_GAP = 5.0  # font sizes: minimum distance between two numbers on the ruler
 _TICK_ASIDE = 3.0  # points between a tick of the ruler and its number
 _TIME = (1.0, 0.62, 0.25, 1.0)
@@ -138,7 +138,7 @@ def bars(places: Sequence[float], narrowest: float, end: float) -> list[tuple[fl
     places : sequence of float
         Start and end of each bar, alternating, in points.
     narrowest : float
-        Smallest width of a bar, unless its neighbours leave less room.
+        Minimum width of a bar, unless its neighbours leave less room.
     end : float
         Right end of the track.
 

@@ -25,7 +25,7 @@ def draw_captured_points(state: AppState, actor: Actor, layout: PointLayout) -> 
     Parameters
     ----------
     state : AppState
-        State with the filter and the smallest confidence that is drawn.
+        State with the filter and the minimum confidence of drawn points.
     actor : Actor
         Actor that consists of captured points.
     layout : PointLayout

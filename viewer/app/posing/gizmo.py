@@ -70,7 +70,7 @@ def use_handles(state: AppState) -> bool:
 
 
 def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
-    """Pose by the pointer; releasing the left button ends the drag, the right button cancels it."""
+    """Pose the actor by the pointer; a release ends the drag, the right button cancels it."""
     posing = state.of(Posing)
     if state.actor is not drag.actor or drag.actor.pose is not drag.outcome.pose:
         drag.is_over = True  # the pose was undone, reset or closed during the drag
@@ -91,7 +91,7 @@ def _go_on(state: AppState, drag: Drag, place: Place) -> bool:
     if not imgui.is_mouse_down(_LEFT):
         posing.drag = None
         if not drag.has_moved:
-            choose_joint(state)  # a joint's dot may lie under a ring or an arrow
+            choose_joint(state)  # a joint's dot may be under a ring or an arrow
     return True
 
 

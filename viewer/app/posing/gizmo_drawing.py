@@ -168,7 +168,7 @@ def _draw_arc(pen: _Pen, center: Floats, arc: LimitArc, radius: float) -> None:
 
 
 def _draw_rings(state: AppState, pen: _Pen, posed: PosedJoint, hot: Handle | None) -> None:
-    """Draw the rings of the joint; during a drag only the grabbed ring and the angle."""
+    """Draw the rings of the joint; during a drag, draw only the grabbed ring and the angle."""
     drag, pose = _drag(state), state.actor.pose
     if drag is not None and isinstance(drag.handle, RotateHandle):
         _draw_rotation(pen, posed, drag.handle, drag.outcome.angle or 0.0)

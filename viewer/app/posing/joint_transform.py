@@ -26,9 +26,9 @@ __all__ = [
     "unlocked_joints",
 ]
 
-_LABEL_WIDTH = 4.2  # in font sizes
+_LABEL_WIDTH = 4.2  # width of a label, in font sizes
 _LARGEST = 1e9
-_NOTICEABLE = 1e-4  # relative to the longest bone or a scale of 1; less is rounding
+_NOTICEABLE = 1e-4  # tolerance for rounding, relative to the longest bone or a scale of 1
 _animated: Memo[TransformClip, frozenset[int]] = Memo()
 
 

@@ -60,7 +60,7 @@ from viewer.rig.skeleton import DOF_KINDS, FIRST_ROTATION, Skeleton
 
 __all__ = ["draw"]
 
-_LABEL_WIDTH = 1.6  # in font sizes
+_LABEL_WIDTH = 1.6  # width of a label, in font sizes
 _INDENT = 0.6  # indentation per level, in font sizes
 _DEEPEST = 14  # maximum number of indented levels: chains of thousands must stay readable
 _AXIS_COLORS = ((0.95, 0.45, 0.42, 1.0), (0.48, 0.85, 0.45, 1.0), (0.45, 0.65, 1.0, 1.0))

@@ -75,7 +75,7 @@ def used_chain(skeleton: Skeleton, joint: int, asked: int) -> Ints:
     joint : int
         Index of the dragged joint.
     asked : int
-        Maximum number; 0 means two, with a root, which would rotate the whole figure, only if
+        Maximum number; 0 means two, without the root, which would rotate the whole figure, unless
         nothing else can rotate.
     """
     chain = chain_above(skeleton, joint, asked or 2)

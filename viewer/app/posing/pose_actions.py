@@ -76,7 +76,7 @@ def paste_pose(state: AppState) -> None:
         return
     text = imgui.get_clipboard_text() or ""
     try:
-        # Numbers may be separated by commas, as in a program's list.
+        # Numbers may be separated by commas, as in the list syntax of programming languages.
         cleaned = text if "{" in text else re.sub(r"[\[\],;]", " ", text)
         source = Source("clipboard", cleaned.encode("utf-8", "replace"))
         if not text.strip():
@@ -186,7 +186,7 @@ def random_shape(state: AppState) -> None:
 
 
 def reset_shape(state: AppState) -> None:
-    """Set every coefficient of the chosen actor to that of the file."""
+    """Reset every shape coefficient of the chosen actor to the file's value."""
     actor = state.actor
     if actor.pose is not None:
         actor.pose.shape_weights = figure_pose(actor.figure).shape_weights

@@ -11,7 +11,7 @@ from viewer.rig.geometry.vectors import unit
 from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["PosedJoint", "posed_joint"]
@@ -115,8 +115,8 @@ def posed_joint(actor: Actor, joint: int, pose: Pose | None = None) -> PosedJoin
     pose = actor.pose if pose is None else pose
     if pose is None or joint < 0:
         return None
-    skeleton = shaped(actor.figure, pose.shape_weights).skeleton
-    if skeleton is None or joint >= skeleton.n_joints:
+    if actor.figure.skeleton is None or joint >= actor.figure.skeleton.n_joints:
         return None
+    skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
     placement = actor.placement @ placement_matrix(pose)
     return PosedJoint(skeleton, joint, placement, placement @ posed_skeleton(skeleton, pose).world)

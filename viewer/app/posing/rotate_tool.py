@@ -254,7 +254,8 @@ class RotateHandle:
         """Return the angle of a ring seen edge-on, which is rolled like a wheel."""
         eye = toward_eye(frame, self.center)
         radius = self.ring.size * frame.unit_length(self.center)
-        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)  # movement of its front by 1 mrad
+        # Movement of the ring's front for 1 mrad.
+        rim = 1e-3 * radius * np.cross(self.ring.axis, eye)
         ends = frame.project(np.stack([self.center, self.center + rim]))
         way = (ends[1] - ends[0]) * 1e3
         length = float(way @ way)

@@ -129,9 +129,9 @@ def _draw_coefficients(state: AppState, figure: Figure, pose: Pose) -> None:
 
 
 def _rows(shapes: BlendShapes, wanted: str) -> list[int | str]:
-    """Return the shapes whose names contain a text, below the headings of their groups.
+    """Return the shapes whose names contain the given text, below the headings of their groups.
 
-    A heading is a row like the others, so that long lists can be clipped.
+    Headings are rows too, so that long lists can be clipped.
     """
     rows: list[int | str] = []
     last = ""

@@ -154,7 +154,7 @@ class Posing:
     held_vector : HeldVector or None
         The rotation vector being edited.
     shape_filter : str
-        Text that the names of listed shapes contain, for figures with many.
+        Text that the names of listed shapes must contain, for figures with many shapes.
     shape_seed : int
         Seed of the last random shape.
     n_hand_components : int

@@ -131,7 +131,7 @@ def _draw_chain(state: AppState) -> None:
 def _draw_actions(state: AppState) -> None:
     """Draw the buttons of actions on the whole pose."""
     why = no_pose(state)
-    paste = "paste a pose, also from another figure"
+    paste = "paste a pose, even from another figure"
     rows = (
         ("Mirror", mirror, with_key(state, "mirror the pose left to right", "M"), why),
         ("Copy", copy_pose, with_key(state, "copy the pose", "Ctrl+C"), why),

@@ -1,4 +1,4 @@
-"""Applies the preferences to the running window: theme, scale, font and keys."""
+"""Application of the preferences to the running window: theme, scale, font and keys."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def change(state: AppState, preferences: Preferences) -> None:
 
 
 def scale_of(state: AppState) -> float:
-    """Return the scale of the interface: as given, as preferred, or that of the monitor."""
+    """Return the scale of the interface: the given, the preferred, or the monitor's scale."""
     appearance = state.of(Appearance)
     return appearance.given_scale or state.of(Preferences).scale or appearance.screen_scale
 

@@ -62,7 +62,7 @@ def chord_name(chord: int) -> str:
 
 
 def chords_of(shortcut: Shortcut, keys: Mapping[str, str]) -> tuple[int, ...]:
-    """Return the key codes of an action: those of the table unless the user chose another key."""
+    """Return the key codes of an action: the user's key, or by default those of the table."""
     chord = parse_chord(keys.get(shortcut.name, ""))
     return (chord,) if chord else shortcut.chords
 

@@ -42,7 +42,7 @@ from viewer.rendering.options import QUALITIES
 __all__ = ["close_preferences", "draw_preferences", "open_preferences"]
 
 _TITLE = "Preferences"
-_SIZE = (36.0, 42.0)  # in font sizes
+_SIZE = (36.0, 42.0)  # initial size of the window, in font sizes
 _ALWAYS_CLAMP = imgui.SliderFlags_.always_clamp
 _LISTED = 20.0  # height of the list of keys, in rows
 

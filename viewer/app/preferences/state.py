@@ -27,7 +27,7 @@ SCALES = (0.75, 1.0, 1.25, 1.5, 1.75, 2.0, 2.5, 3.0)
 """Scales of the interface that can be chosen."""
 
 FONT_SIZES = (9.0, 36.0)
-"""Smallest and largest font size, points at scale 1."""
+"""Minimum and maximum font size, points at scale 1."""
 
 SAMPLES = (1, 2, 4, 8, 16)
 """Samples per pixel that can be chosen."""

@@ -11,7 +11,7 @@ from viewer.rendering.renderer import Renderer
 
 __all__ = ["Preview", "preview_size"]
 
-_WIDEST, _HIGHEST = 320, 200  # pixels
+_WIDEST, _HIGHEST = 320, 200  # maximum size of the preview, pixels
 
 
 class Preview:

@@ -57,7 +57,7 @@ _BACKGROUNDS = {
     "transparent": "transparent",
 }
 _TITLE = "Record"
-_WINDOW = (30.0, 42.5)  # in font sizes
+_WINDOW = (30.0, 42.5)  # initial size of the window, in font sizes
 _MOST_PIXELS = 16384
 _MOST_CELLS = 400
 

@@ -23,7 +23,7 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["recording_steps"]
 
-_FULL = 360.0  # degrees
+_FULL = 360.0  # full revolution, degrees
 
 
 def recording_steps(

@@ -21,7 +21,7 @@ VIDEO_KINDS = (".mp4", ".webm", ".gif")
 """Kinds that are a video file, by its suffix."""
 
 LEAST_PIXELS = 16
-"""Smallest width and height of a recording."""
+"""Minimum width and height of a recording."""
 
 
 @dataclass(slots=True)
@@ -43,7 +43,7 @@ class RecordSettings:
     seconds : float
         Duration of the orbit if there is no motion.
     n_cells : int
-        Frames of a contact sheet.
+        Number of frames in a contact sheet.
     quality : int
         Quality of the compression of videos, 0 to 100.
     look : str

@@ -1,14 +1,17 @@
-"""Changes to how a motion drives a figure: it is retargeted immediately, and undo reverts it."""
+"""Changes to the drive of a figure: its motion is retargeted, and each change can be undone."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 
-from viewer.app.core.reasons import no_drive
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_drive, no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.errors import ViewerError
+from viewer.phrases import printable
+from viewer.progress import Receiver, receiving
+from viewer.rig.motion.evaluation import frame_rate
 from viewer.rig.motion.retimed import with_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
@@ -16,6 +19,8 @@ from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
 __all__ = ["change_drive", "no_edit"]
+
+_SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 
 
 def no_edit(state: AppState) -> str:
@@ -26,8 +31,13 @@ def no_edit(state: AppState) -> str:
     return why
 
 
-def change_drive(state: AppState, change: Callable[[Drive], Drive]) -> bool:
+def change_drive(
+    state: AppState, change: Callable[[Drive], Drive], tell: Callable[[], None]
+) -> None:
     """Retarget the motion of the chosen actor, and those of all people of its capture.
+
+    Long motions are retargeted in the background. If retargeting fails or is cancelled, a message
+    is shown and nothing changes.
 
     Parameters
     ----------
@@ -35,27 +45,55 @@ def change_drive(state: AppState, change: Callable[[Drive], Drive]) -> bool:
         State with a driven actor.
     change : callable
         Returns the changed drive.
-
-    Returns
-    -------
-    bool
-        Whether it succeeded; otherwise a message is shown and nothing changes.
+    tell : callable
+        Reports success.
     """
-    first = state.actor
-    together = [actor for actor in state.scene.actors if _is_together(actor, first)]
+    if no_job_room(state):
+        state.say_status(no_job_room(state))
+        return
+    first, scene = state.actor, state.scene
+    together = [actor for actor in scene.actors if _is_together(actor, first)]
+    work = [(actor, change(actor.drive)) for actor in together if actor.drive is not None]
+    changed: list[SampledClip] = []
+
+    def act(report: Report) -> list[str]:
+        for number, (actor, drive) in enumerate(work):
+            with receiving(_shown(report, number, len(work), actor.title)):
+                changed.append(_retargeted(actor, drive))
+        return []
+
+    def finish() -> None:
+        if state.scene is not scene:
+            return
+        for (actor, drive), clip in zip(work, changed, strict=True):
+            rate = frame_rate(actor.clip) if actor.clip is not None else clip.timing.frame_rate
+            actor.clip, actor.drive = with_rate(clip, rate), drive
+            state.clock.pose(actor, again=True)
+        tell()
+
+    if sum(drive.motion.clip.n_rows for _, drive in work) > _SHORT:
+        state.job = CountedJob(f"Retargeting {printable(first.title, 60)}", act, finish)
+        return
     try:
-        changed = [_retargeted(actor, change) for actor in together]
+        act(lambda *_: None)
     except ViewerError as problem:
         state.error = str(problem)
-        return False
-    for actor, found in zip(together, changed, strict=True):
-        actor.clip, actor.drive = found.clip, found.drive
-        state.clock.pose(actor, again=True)
-    return True
+    else:
+        finish()
+
+
+def _shown(report: Report, number: int, count: int, title: str) -> Receiver:
+    """Return a receiver that reports the steps of one person as percentages of all."""
+
+    def receive(done: int, total: int, unit: str, what: str) -> None:
+        fraction = (number + done / max(total, 1)) / count
+        report(int(100.0 * fraction), 100, f"Retargeting {printable(title, 60)}")
+
+    return receive
 
 
 def _is_together(actor: Actor, first: Actor) -> bool:
-    """Return whether an actor is the first one or another person of the same capture."""
+    """Return whether two actors are the same, or people of the same capture."""
     if actor is first:
         return True
     if actor.drive is None or first.drive is None or not isinstance(actor.clip, SampledClip):
@@ -64,13 +102,7 @@ def _is_together(actor: Actor, first: Actor) -> bool:
     return is_same and actor.drive.joint_map is first.drive.joint_map
 
 
-def _retargeted(actor: Actor, change: Callable[[Drive], Drive]) -> Actor:
-    """Return a copy of an actor with its motion retargeted by a changed drive."""
-    assert actor.drive is not None and isinstance(actor.clip, SampledClip)  # checked by ``no_edit``
-    drive = change(actor.drive)
+def _retargeted(actor: Actor, drive: Drive) -> SampledClip:
+    """Return the motion of an actor retargeted by a changed drive."""
     clip = driven_clip(drive, actor.figure)[0]
-    if drive.finish is not None:
-        clip = drive.finish(clip)
-    return replace(
-        actor, drive=drive, clip=with_rate(clip, actor.clip.timing.frame_rate), pose=actor.pose
-    )
+    return clip if drive.finish is None else drive.finish(clip)

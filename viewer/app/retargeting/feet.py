@@ -22,5 +22,7 @@ def toggle_feet(state: AppState) -> None:
         state.say_status(no_edit(state))
         return
     is_on = not plants_feet(state)
-    if change_drive(state, lambda drive: replace(drive, plants_feet=is_on)):
-        state.say_status(f"Feet: {'kept on the ground' if is_on else 'as retargeted'}")
+    text = f"Feet: {'kept on the ground' if is_on else 'as retargeted'}"
+    change_drive(
+        state, lambda drive: replace(drive, plants_feet=is_on), lambda: state.say_status(text)
+    )

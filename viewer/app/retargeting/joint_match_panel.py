@@ -34,9 +34,9 @@ __all__ = ["draw"]
 _ORIGINS = {
     "map": ("edited", "chosen by hand or in a joint map"),
     "hierarchy": ("same skeleton", "both skeletons have the same names and hierarchy"),
-    "humanoid": ("human bones", "the file states which joints are which human bones, as VRM does"),
+    "humanoid": ("human bones", "the file assigns its joints to human bones, as VRM files do"),
     "name": ("known name", "both names are known names of this joint"),
-    "place": ("hierarchy", "recognised by its place in the hierarchy"),
+    "place": ("hierarchy", "recognised by its position in the hierarchy"),
     "same name": ("same name", "both joints have this name"),
     "": ("at rest", "no joint of the motion drives this joint"),
 }

@@ -1,7 +1,8 @@
-"""Edits of the joint match: the motion is retargeted immediately, and edits can be undone."""
+"""Edits of the joint match: each retargets the motion, and can be undone."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -57,17 +58,17 @@ def match_joint(state: AppState, joint: int, partner: int) -> None:
     chosen = joint_label(source, partner) if partner >= 0 else ""
     known = full_map(actor.drive, actor.figure)
     pairs = tuple((mine, chosen if mine == label else theirs) for mine, theirs in known.pairs)
-    if _apply(state, JointMap(pairs)):
-        does = f"follows {printable(chosen, 60)}" if chosen else "stays at rest"
-        state.say_status(f"{printable(label, 60)} {does}")
+    does = f"follows {printable(chosen, 60)}" if chosen else "stays at rest"
+    text = f"{printable(label, 60)} {does}"
+    _apply(state, JointMap(pairs), lambda: state.say_status(text))
 
 
 def match_automatically(state: AppState) -> None:
     """Match all joints of the chosen figure automatically."""
     if is_automatic(state):
         state.say_status(is_automatic(state))
-    elif _apply(state, None):
-        state.say_status("Joints matched automatically")
+    else:
+        _apply(state, None, lambda: state.say_status("Joints matched automatically"))
 
 
 def ask_for_map(state: AppState) -> None:
@@ -95,8 +96,8 @@ def _load(state: AppState, paths: list[Path]) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
-    if _apply(state, joint_map):
-        state.say(f"Joints matched by {printable(paths[0], 200)}")
+    text = f"Joints matched by {printable(paths[0], 200)}"
+    _apply(state, joint_map, lambda: state.say(text))
 
 
 def _save(state: AppState, paths: list[Path]) -> None:
@@ -114,6 +115,6 @@ def _save(state: AppState, paths: list[Path]) -> None:
     save_files(state, act, paths)
 
 
-def _apply(state: AppState, joint_map: JointMap | None) -> bool:
+def _apply(state: AppState, joint_map: JointMap | None, tell: Callable[[], None]) -> None:
     """Set the joint match of the chosen actor, and of all people of its capture."""
-    return change_drive(state, lambda drive: replace(drive, joint_map=joint_map))
+    change_drive(state, lambda drive: replace(drive, joint_map=joint_map), tell)

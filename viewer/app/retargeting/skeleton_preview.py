@@ -70,7 +70,7 @@ def hover_pair(state: AppState, shown: Shown, joint: int) -> None:
 
 
 def _hover(state: AppState, shown: Shown, placed: list[Floats]) -> None:
-    """Highlight the joint under the mouse and its partners; a click selects that of the figure."""
+    """Highlight the joint under the mouse and its partners; a click selects the figure's joint."""
     view = state.of(JointMatch)
     near = _NEAR * imgui.get_font_size()
     mouse = np.array([imgui.get_mouse_pos().x, imgui.get_mouse_pos().y])

@@ -18,7 +18,7 @@ from viewer.rig.skeleton import joint_labels, shown_joints
 __all__ = ["JointMatch", "Shown", "Side", "shown_match"]
 
 _LONG = 1.3  # ratio of length to width from which a body is shown from the side
-_SIDE_VIEW = -1.1  # radians
+_SIDE_VIEW = -1.1  # yaw of the view from the side, radians
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -92,7 +92,7 @@ def aligned_template(state: AppState) -> Template | None:
 
 
 def similarity_now(state: AppState, template: Template) -> Similarity:
-    """Return the similarity that places the template; it is based on boxes until the alignment."""
+    """Return the similarity that places the template, from bounding boxes until it is aligned."""
     placing = placing_now(state)
     if placing is not None:
         return placing.similarity

@@ -63,7 +63,7 @@ def draw(state: AppState) -> None:
     with disabled(state, why):
         if _section("Align", "align the template with the target"):
             draw_alignment(state)
-        if _section("Match", "conditions for taking the template's weights unchanged"):
+        if _section("Match", "conditions for using the template's weights unchanged"):
             _draw_match(state)
         if _section("Rig", "transfer of weights, joints and rest pose"):
             _draw_run(state)
@@ -128,7 +128,7 @@ def _template_text(template: Template | None) -> str:
     if template is None:
         return "read on first use"
     skeleton, mesh = template.figure.skeleton, template.figure.mesh
-    assert skeleton is not None and mesh is not None  # templates have both
+    assert skeleton is not None and mesh is not None  # templates have a mesh and a skeleton
     pose = "in its current pose" if template.actor is not None else "in its file's pose"
     return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 
@@ -214,7 +214,7 @@ def _draw_run(state: AppState) -> None:
 
 
 def _draw_advanced(state: AppState, choices: RigChoices) -> None:
-    """Draw the rarely used settings, collapsed; the label gives the number of changed ones."""
+    """Draw the rarely used settings, collapsed; the label shows the number of changed settings."""
     usual = RigChoices()
     changed = sum(getattr(choices, name) != getattr(usual, name) for name in _ADVANCED)
     text = f"Advanced ({changed} changed)" if changed else "Advanced"

@@ -49,7 +49,7 @@ def templates(state: AppState) -> list[Actor]:
 
 
 def refresh(state: AppState) -> None:
-    """Discard state of another scene, and choose target and template; called in each frame."""
+    """Discard the state of another scene, and choose target and template; called in each frame."""
     view = state.of(Rigging)
     if view.scene is not state.scene:
         view = state.put(Rigging(scene=state.scene, choices=view.choices))

@@ -182,13 +182,13 @@ class RigChoices:
     method, joints : str
         As in ``TransferSettings``.
     max_distance : float
-        Largest distance of a match, relative to the target's size.
+        Maximum distance of a match, relative to the target's size.
     max_angle : float
-        Largest angle between the normals of a match, degrees.
+        Maximum angle between the normals of a match, degrees.
     smoothing : int
         Number of smoothing iterations.
     max_influences : int
-        Largest number of influences per vertex; 0 for all.
+        Maximum number of influences per vertex; 0 for all.
     correctives : bool
         Whether pose correctives are transferred.
     """

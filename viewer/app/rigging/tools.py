@@ -33,7 +33,7 @@ def choose_rig_tool(state: AppState, tool: str) -> None:
 
 
 def drop_rig_tool(state: AppState) -> bool:
-    """Drop an incomplete pair of landmarks, or the tool; return whether there was either."""
+    """Discard an incomplete pair of landmarks, or deselect the tool; return whether it did so."""
     view = state.of(Rigging)
     if view.pending is not None:
         view.pending = None

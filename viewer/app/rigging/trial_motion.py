@@ -18,7 +18,7 @@ TRIAL = "trial motion"
 
 _ANGLE = math.radians(35.0)
 _LONGEST, _WHOLE = 0.9, 20.0
-"""Seconds for a joint, and for all joints."""
+"""Maximum duration of the motion of one joint, and of all joints, in seconds."""
 
 
 def trial_clip(skeleton: Skeleton, pose: Pose) -> Clip | None:

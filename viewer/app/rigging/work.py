@@ -183,7 +183,7 @@ def _snapshot(state: AppState, aligned: bool) -> Callable[[Report], Template]:
 
 
 def _keep(state: AppState, template: Template) -> None:
-    """Keep a template that was read by a job."""
+    """Store a template that was read by a job."""
     view = state.of(Rigging)
     is_new = view.template is None or view.template.key != template.key
     if is_new and template.actor is None and view.template_key == template.key:

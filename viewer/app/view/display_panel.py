@@ -97,7 +97,7 @@ def _draw_surface(state: AppState) -> None:
         for name in ("metallic", "roughness"):
             value = slider(state, name.capitalize(), getattr(options, name), 0.0, 1.0, flags=_CLAMP)
             setattr(options, name, value)
-            explain("for materials that do not specify it")
+            explain("value for materials that do not specify one")
 
 
 def _draw_bones(state: AppState, why: str) -> None:
@@ -138,7 +138,7 @@ def _draw_extras(state: AppState) -> None:
     options, figure = state.options, state.actor.figure
     if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
         options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
-        explain("Of the file; they multiply the colours of materials")
+        explain("vertex colours of the file, which are multiplied by the colours of materials")
     if figure.keypoints is not None:
         options.keypoints = checkbox(state, "Keypoints", options.keypoints)
         if figure.reduced is not None:

@@ -1,7 +1,7 @@
 """Image of the outlines over the view, separate from the image of the scene.
 
 The item under the pointer changes often, whereas the image of the scene, which may be the average
-of many passes, is kept.
+of many passes, is cached.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Outlines of the parts that are selected in the window or lie under the pointer."""
+"""Outlines of the parts that are selected in the window or are under the pointer."""
 
 from __future__ import annotations
 
@@ -36,9 +36,8 @@ def toggle_outlines(state: AppState) -> None:
 def outlined_parts(state: AppState) -> tuple[Outlined, ...]:
     """Return the outlines of the current frame.
 
-    The selected joint is outlined if the skeleton is drawn; if no joint is selected, the actor that
-    the user chose among several. The pinned vertex and the item under the pointer are also
-    outlined.
+    The selected joint is outlined if the skeleton is drawn; otherwise, the actor is outlined if the
+    user chose it among several. The pinned vertex and the item under the pointer are also outlined.
     """
     if not state.of(Outlines).is_shown:
         return ()

@@ -17,7 +17,7 @@ class Picking:
         Position of a click, relative to the upper left corner of the view, and whether the camera
         is aimed there.
     menu_at : (x, y) or None
-        Position of a right click without drag.
+        Position of a right click without a drag.
     """
 
     wanted: tuple[float, float, bool] | None = None

@@ -90,7 +90,7 @@ def fitting(room: float, font_size: float) -> tuple[float, int]:
     scale = 0.0
     for digits in range(_DIGITS, _FEWEST - 1, -1):
         number = _NUMBER - _DIGIT * (_DIGITS - digits)
-        # Four numbers of a matrix, or a label and three of a point.
+        # Four numbers of a matrix row, or a label and the three numbers of a point.
         widest = (max(_LABEL, number) + 3.0 * number) * font_size
         scale = min((room - 8.0 * _PADDING - _SPARE) / widest, 1.0)
         if scale >= _SMALLEST:

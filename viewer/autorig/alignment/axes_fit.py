@@ -37,13 +37,13 @@ def fit_axes(
         Whether the rotation is also refined: a rotation found with a single scale is biased
         towards the stretched target's diagonal.
     own : bool
-        Whether the axes are those of the template.
+        Whether the axes are the template's.
 
     Returns
     -------
     Similarity
-        Alignment with factors; the best one so far if a fit would be a reflection or too few pairs
-        are left.
+        Alignment with factors; the best one so far if the next fit would be a reflection or too few
+        pairs are left.
     """
     similarity, scales = start, np.full(3, start.scale)
     for _ in range(rounds):

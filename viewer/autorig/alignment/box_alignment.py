@@ -10,11 +10,11 @@ from viewer.rig.mesh import bounding_box
 
 __all__ = ["align_boxes"]
 
-_FLAT = 1e-9  # fraction of the longest side; a thinner box cannot be scaled to another box
+_FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
 
 
 def align_boxes(positions: Floats, onto: Floats) -> Floats:
-    """Return the map that aligns the bounding box of one set of points with that of another.
+    """Return the map that aligns the bounding boxes of two sets of points.
 
     p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is the rule of
     Tex-An Mesh; an axis along which both boxes are flat keeps its scale.

@@ -270,7 +270,7 @@ def _step(similarity: Similarity, moved: Floats, pairs: Pairs, scales: bool) -> 
 
 
 def pairs_between(template: Side, target: Side, similarity: Similarity) -> Pairs:
-    """Match samples of both sides with the other side, and reject incompatible pairs."""
+    """Match samples of each mesh with the other mesh, and reject incompatible pairs."""
     ours, theirs = template.samples, target.samples
     found = template.find(similarity.undo(theirs.positions))
     towards = _kept(similarity, found.positions, found.normals, theirs.positions, theirs.normals)
@@ -294,7 +294,7 @@ def _kept(
 
 
 def _rotated(similarity: Similarity, normals: Floats) -> Floats:
-    # Normals transform by the inverse transpose.
+    # Normals are transformed by the inverse transpose.
     return unit(((normals / similarity.own_factors) @ similarity.rotation.T) / similarity.factors)
 
 
@@ -312,7 +312,7 @@ def capped_rms(distances: Floats, cap: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gaps:
-    """Distances of samples from the other side's surface, in the target's unit.
+    """Distances of samples from the surface of the other mesh, in the target's unit.
 
     Attributes
     ----------
@@ -321,8 +321,8 @@ class Gaps:
     away : (M,)
         From the template's samples to the target.
     uneven_towards, uneven_away : (N,), (M,)
-        The same without the median offset along the normals, so that a jacket at a constant
-        distance of two centimetres from the skin has a small error.
+        The same distances without the median offset along the normals, so that a jacket at a
+        constant distance of two centimetres from the skin has a small error.
     """
 
     towards: Floats
@@ -332,7 +332,7 @@ class Gaps:
 
 
 def gaps_between(template: Side, target: Side, similarity: Similarity) -> Gaps:
-    """Return the distances of samples from the other side's surface.
+    """Return the distances of samples from the surface of the other mesh.
 
     Parameters
     ----------

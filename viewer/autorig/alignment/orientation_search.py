@@ -31,9 +31,9 @@ _UNITS = (1.0, 100.0, 0.01, 1000.0, 0.001, 39.37, 1.0 / 39.37)
 """Ratios between metres and centimetres, millimetres and inches, in both directions."""
 
 _NEAR_UNIT = 0.15  # relative tolerance for interpreting a ratio of sizes as a ratio of units
-# Fraction of the distances that are used, which excludes hair, skirts and cropped parts.
+# Fraction of the distances that is used, to exclude hair, skirts and cropped parts.
 _TRIM = 0.8
-_QUICK, _LONG = 12, 60  # numbers of iterations for every candidate, and for the best few
+_QUICK, _LONG = 12, 60  # numbers of iterations for every candidate, and for the best candidates
 _FINALISTS = 4
 # A mesh that is already in place is rotated only if that reduces the error below this fraction.
 _NO_BETTER = 0.7
@@ -106,7 +106,7 @@ def axis_rotations(
 
 
 def unit_scale(ratio: float) -> float:
-    """Return the unit factor within 15 % of a ratio of sizes, or the ratio itself if there is none.
+    """Return the unit factor within 15 % of a ratio of sizes; the ratio itself if there is none.
 
     >>> unit_scale(93.0), unit_scale(1.4)
     (100.0, 1.4)

@@ -43,7 +43,7 @@ _NEARING = 16  # number of iterations over which the search radius shrinks
 _VERTICES = 1500  # number of template vertices that are matched with the target
 _FAR, _NEAR = 0.25, 0.03  # ratio of the search radius to the size, at the start and at the end
 _SAME_WAY = 0.5  # cosine of 60 degrees between the normals of a pair
-_STILL = 2e-3  # radians; iterations end when no joint rotates by more than this
+_STILL = 2e-3  # rotation in radians; iterations end when no joint rotates by more
 _FEWEST = 50  # minimum number of pairs for fitting a pose
 _SMALLEST, _LARGEST = np.log(0.5), np.log(2.0)  # limits of the logarithms of limb scales
 
@@ -57,7 +57,7 @@ class Fitted:
     figure : Figure
         Figure with resized limbs.
     pose : Pose
-        DOFs are within their limits; the remainder is in the joints' quaternions.
+        DOFs are within their limits; the joints' quaternions contain the remaining rotation.
     similarity : Similarity
         Map from the posed figure to the target.
     rotated : (J, 3)

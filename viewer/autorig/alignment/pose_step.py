@@ -34,7 +34,8 @@ _HOLD = 0.2  # h: weight of point-to-point relative to point-to-plane distances
 _ROTATED, _GROWN = 3e-6, 3e-5
 _NOW = 1e-5  # penalty on rotations and growths within one iteration
 _WHOLE = 1e-7  # penalty on moving the whole figure, as a surface may slide along itself
-_MOST = 0.3  # maximum radians per joint and iteration, up to which the linearisation is valid
+# Maximum rotation of a joint per iteration for which the linearisation is valid, radians.
+_MOST = 0.3
 _GROWTH = 0.2  # maximum growth (logarithm) of the whole figure or a limb per iteration
 _FIXED = 1e6  # penalty on fixed unknowns
 

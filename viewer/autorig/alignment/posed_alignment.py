@@ -2,7 +2,7 @@
 
 People in scans have lowered arms and individual proportions, templates have outstretched arms: no
 similarity aligns one with the other. If the alignment leaves a large error, pose and proportions
-are therefore fitted too, and the fit is kept if it removes most of the error. A figure in a
+are therefore fitted too, and the fit is accepted if it removes most of the error. A figure in a
 different pose also looks nearly the same from behind: if the alignment is ambiguous, both facings
 are fitted.
 """
@@ -41,20 +41,20 @@ from viewer.rig.skinning import deform
 __all__ = ["PosedAlignment", "align_posed"]
 
 _CLOSE = 0.002  # ratio of misfit to size up to which joints are not rotated
-# Fraction of the misfit that may remain if rotated joints are to be kept: clothes fit a
-# little better with a bent body, but only a figure in a different pose fits much better.
+# Fraction of the misfit that rotated joints may leave to be accepted: clothes fit a little better
+# with a bent body, but only a figure in a different pose fits much better.
 _KEPT, _PART_KEPT = 0.65, 0.5
 # A misfit above the first value, after a joint was rotated by more than the second, indicates a
 # different kind of figure: a fox fitted to a pig bends its spine until its legs meet some surface.
 _POOR, _BENT = 0.01, np.radians(45.0)
-_SURE = 0.004  # misfit after the fit, over the size, up to which the opposite facing is not tried
+_SURE = 0.004  # ratio of misfit after the fit to size up to which the opposite facing is not tried
 _ALIKE = 1.5  # ratio of misfits up to which front and back are ambiguous
 _CLEARLY = 0.85  # fraction of the misfit that the opposite facing must reach after the fit
 _ROUNDS = 30  # number of iterations to align the template facing the other way
 _AXES_ROUNDS = 20
 _FOUND = ("search", "in place")  # origins of alignments that were not given by the user
-# Separate scales are tried if the error exceeds the first value, and kept if they reduce it to at
-# most the second fraction and differ by more than the third value.
+# Separate scales are tried if the error exceeds the first value, and accepted if they reduce it to
+# at most the second fraction and differ by more than the third value.
 _STRETCH_GAP, _STRETCH_LEFT, _STRETCH = 0.001, 0.5, 1.02
 
 
@@ -292,7 +292,7 @@ def _gap(after: float, before: float) -> Phrase:
 def _lines(found: Fitted) -> tuple[Diagnostic, ...]:
     """Return messages about the joint rotated most and the limb scaled most."""
     skeleton = found.figure.skeleton
-    assert skeleton is not None  # checked by the caller
+    assert skeleton is not None  # the caller checks this
     angle, name = _most_rotated(found)
     longest = int(np.abs(found.grown[0]).argmax())
     values = {

@@ -24,7 +24,7 @@ from viewer.rig.mesh import vertex_normals
 
 __all__ = ["MatchSettings", "Matches", "Template", "match", "sheet_normals"]
 
-_INSIDE_OUT = math.radians(120.0)  # a larger angle means "reversed" rather than "folded"
+_INSIDE_OUT = math.radians(120.0)  # angle above which a triangle is reversed rather than folded
 _MOST = 0.75  # fraction of an island's near vertices above which the island is reversed
 # Maximum angle between a normal and the centre of its group; see _sides.
 _TOGETHER = math.radians(80.0)
@@ -184,7 +184,7 @@ def _closest(template: Template, target: Welded) -> SurfacePoints:
 
 
 def _angles(template: Template, points: SurfacePoints, normals: Floats) -> Floats:
-    """Return the angles between normals (N, 3) and those of the template, 0 if undefined."""
+    """Return the angles between normals (N, 3) and the template's normals, 0 if undefined."""
     there = template.normals_at(points)
     cosines = np.clip(np.einsum("na,na->n", there, normals), -1.0, 1.0)
     return np.where(normals.any(axis=1), np.arccos(cosines), 0.0)

@@ -24,7 +24,7 @@ def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
     Returns
     -------
     vertices : (N,) int32
-        ``skin_rows(skin, vertices)`` is the target's skin.
+        ``skin_rows(skin, vertices)`` returns the target's skin.
     distances : (N,)
         Distance to each of these vertices.
 

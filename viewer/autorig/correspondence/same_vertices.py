@@ -2,9 +2,9 @@
 
 If a vertex was moved along the surface, its closest point has interpolated weights, whereas the
 original vertex has the exact ones. A target's vertex is identified with a vertex of the template if
-each is the other's nearest, it moved along the surface by less than half the length of its edges,
-and nearly all of its edges correspond to edges of the template. A different tessellation of the
-same surface has very few such vertices.
+each is the nearest vertex to the other, it moved along the surface by less than half the length of
+its edges, and nearly all of its edges correspond to edges of the template. A different tessellation
+of the same surface has very few such vertices.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["at_vertices", "same_vertices"]
 
 _EDGES = 0.8  # minimum fraction of a vertex's edges that are also edges of the template
 _SLID = 0.5  # maximum shift along the surface, relative to the mean length of a vertex's edges
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 def same_vertices(template: Welded, target: Welded, distances: Floats) -> Ints:

@@ -12,7 +12,8 @@ from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["cotangent_laplacian", "graph_laplacian", "laplacian", "voronoi_areas"]
 
-_STEEPEST = 100.0  # cotangent of 0.6 degrees; angles of thinner triangles are meaningless
+# Cotangent of 0.6 degrees; triangles with smaller angles are treated as equilateral.
+_STEEPEST = 100.0
 _FLAT = 1e-12  # minimum of twice a triangle's area over its squared longest edge
 _EVEN = 1.0 / np.sqrt(3.0)  # cotangent of 60 degrees
 _LIGHTEST = 1e-9  # minimum area of a vertex relative to the mean, as areas are divisors
@@ -76,7 +77,7 @@ def cotangent_laplacian(positions: Floats, triangles: Ints) -> Any:
     [1.0, -0.5, 0.0, -0.5]
     """
     halves = 0.5 * _steady(_cotangents(positions, triangles))
-    # The angle at corner k is opposite the edge of the other two.
+    # The angle at corner k is opposite the edge between the other two corners.
     links = triangles[:, [1, 2, 2, 0, 0, 1]].reshape(-1, 2)
     return _from_edges(len(positions), links, halves.ravel())
 
@@ -121,7 +122,7 @@ def voronoi_areas(positions: Floats, triangles: Ints) -> Floats:
     """
     cotangents = _cotangents(positions, triangles)
     corners = positions[triangles]
-    # Edge opposite each corner.
+    # The edge opposite each corner.
     offsets = np.roll(corners, -1, axis=1) - np.roll(corners, 1, axis=1)
     squares = np.einsum("tka,tka->tk", offsets, offsets)
     fractions = squares * cotangents / 8.0

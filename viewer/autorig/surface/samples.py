@@ -35,7 +35,7 @@ class SurfaceSamples:
 
 
 def triangle_normals(positions: Floats, triangles: Ints) -> Floats:
-    """Return unit normals of triangles, 0 for one without area: (T, 3)."""
+    """Return unit normals of triangles, 0 for triangles without area: (T, 3)."""
     a, b, c = (positions[triangles[:, corner]] for corner in range(3))
     return unit(np.cross(b - a, c - a))
 

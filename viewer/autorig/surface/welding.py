@@ -16,7 +16,8 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Welded", "edges", "islands", "non_manifold_edges", "weld"]
 
-# Fraction of the median edge; rounding in text files separates equal vertices by less.
+# Tolerance as a fraction of the median edge; rounding in text files separates equal vertices by
+# less.
 _NEAR = 1e-4
 
 
@@ -61,7 +62,7 @@ def weld(positions: Floats, triangles: Ints) -> Welded:
     Returns
     -------
     Welded
-        A triangle without area is kept if its corners differ: it closes a gap at a T-junction,
+        A triangle without area is preserved if its corners differ: it closes a gap at a T-junction,
         where only one side of an edge has a vertex.
 
     Raises
@@ -141,7 +142,7 @@ def _joined_exactly(positions: Floats) -> tuple[Any, Any]:
 
 
 def _joined_nearby(positions: Floats, tolerance: float) -> Any:
-    """Return a label for each position, the same for those within the tolerance.
+    """Return a label for each position; positions within the tolerance get the same label.
 
     Each round merges every position with its nearest neighbour, so the size of clusters at least
     halves per round; finding all pairs in one pass would take memory quadratic in a cluster's size.

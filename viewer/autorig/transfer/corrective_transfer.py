@@ -51,14 +51,14 @@ def transfer_correctives(
     Returns
     -------
     Correctives or None
-        None if it would have more than ``MOST_NUMBERS`` values.
+        None if the result would have more than ``MOST_NUMBERS`` values.
     """
     offsets = correctives.values()
     if len(offsets) * len(positions) * 3 > MOST_NUMBERS:
         return None
     factors = scale * _fade(matched, positions, target_triangles)
     transferred = np.empty((len(offsets), len(positions), 3))
-    # One corrective at a time, which bounds the memory of the temporaries.
+    # Correctives are processed one at a time, to bound the memory of temporary arrays.
     for row, direction in zip(transferred, offsets, strict=True):
         np.multiply(interpolate(points, triangles, direction), factors[:, None], out=row)
     return Correctives(transferred, correctives.feature)

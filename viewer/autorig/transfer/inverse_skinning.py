@@ -17,10 +17,10 @@ from viewer.rig.skinning.lbs import blended_matrices
 __all__ = ["SMALLEST_STRETCH", "InvertedSkinning", "invert_skinning", "repair_tears"]
 
 SMALLEST_STRETCH = 0.2
-"""Singular value below which a blended matrix is treated as singular: two joints rotated apart by
-an angle a with equal weights give cos(a / 2), and here a = 157 degrees."""
+"""Singular value below which a blended matrix is treated as singular: with equal weights, two
+joints rotated apart by an angle a have the value cos(a / 2), and here a = 157 degrees."""
 
-_RINGS = 2  # number of rings around guarded vertices whose vertices may move to repair a tear
+_RINGS = 2  # number of rings of vertices around guarded ones that may move to repair a tear
 _SMOOTH = 0.01  # weight of smoothness relative to reproducing the pose when a tear is repaired
 
 
@@ -95,9 +95,9 @@ def _is_singular(linear: Floats) -> Bools:
 def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> Floats:
     """Smooth the neighbourhoods of guarded vertices by least squares.
 
-    It minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices and their
-    two-ring, with all others fixed, with the graph Laplacian L and lambda = 0.01. The problem is
-    linear in x, so one linear system solves it.
+    The result minimises sum_v |B_v x_v + d_v - t_v|^2 + lambda |L x|^2 over the guarded vertices
+    and their two-ring, with all others fixed, with the graph Laplacian L and lambda = 0.01. The
+    problem is linear in x, so one linear system solves it.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def repair_tears(inverted: InvertedSkinning, posed: Floats, triangles: Ints) -> 
     Returns
     -------
     (V, 3)
-        Rest positions; those of ``inverted`` away from guarded vertices.
+        Rest positions, which equal those in ``inverted`` away from guarded vertices.
     """
     if not inverted.guarded.any():
         return inverted.positions

@@ -16,8 +16,10 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["leg_scale"]
 
-_LOW = 0.1  # fraction of the joints' vertical extent; joints this close to the lowest one are feet
-_LEGS = 0.2  # fraction of the vertical extent; if the root is closer to the feet, there are no legs
+# Maximum distance of feet from the lowest joint, as a fraction of the joints' vertical extent.
+_LOW = 0.1
+# Minimum distance of the root from the feet of a figure with legs, as a fraction of that extent.
+_LEGS = 0.2
 
 
 def leg_scale(before: Skeleton, after: Skeleton, up: str, otherwise: float) -> float:

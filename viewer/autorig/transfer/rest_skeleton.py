@@ -30,8 +30,8 @@ class RestSkeleton:
     Attributes
     ----------
     skeleton : Skeleton
-        Its rest pose is that of the template, in the template's axes and the target's
-        unit, so clips and poses of the template keep their meaning.
+        It has the template's rest pose in the template's axes and the target's unit, so clips and
+        poses of the template remain valid.
     inverse_bind : (J, 4, 4)
         Inverse bind matrices for the template's bind pose.
     pose : Pose
@@ -59,11 +59,11 @@ def fit_rest_skeleton(
 ) -> RestSkeleton:
     """Find rest offsets that put a posed skeleton's joints at given positions.
 
-    The target's joint j has the world linear part R P_j, where P_j is that of the template's pose
-    and R is the alignment's rotation. So the offset from its parent i is (R P_i)^-1 (p_j - p_i),
-    which includes the scaled translations of the DOFs. The rest root is that of the template,
-    scaled like the legs; the figure's translation moves it to the target, and R is included in the
-    root's rotation.
+    The target's joint j has the world linear part R P_j, where P_j is the joint's linear part in
+    the template's pose and R is the alignment's rotation. So the offset from its parent i is (R
+    P_i)^-1 (p_j - p_i), which includes the scaled translations of the DOFs. The rest root is the
+    template's, scaled like the legs; the figure's translation moves it to the target, and R is
+    included in the root's rotation.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ def _offsets(parents: Ints, world: Floats, joints: Floats) -> Floats:
     below = np.flatnonzero(parents >= 0)
     above = parents[below]
     ways = joints[below] - joints[above]
-    # Solved instead of multiplied by the transpose, as poses may scale joints.
+    # A linear system is solved, as the transpose is not the inverse if poses scale joints.
     offsets[below] = np.linalg.solve(world[above], ways[..., None])[..., 0]
     return offsets
 
@@ -218,8 +218,8 @@ def _rotate_roots(
         return skeleton, []
     limits = skeleton.dof_limits.copy()
     low, high = limits[rows[ball], 0], limits[rows[ball], 1]
-    # R(quaternion) R(DOFs) must give the target rotation: ball joints solve for the DOFs, other
-    # joints keep them and solve for the quaternion.
+    # R(quaternion) R(DOFs) must equal the target rotation: for ball joints, the DOFs are solved
+    # for; for other joints, the DOFs are unchanged and the quaternion is solved for.
     angles = _angles_within((np.swapaxes(beneath, 1, 2) @ wanted)[ball], low, high)
     pose.dofs[rows[ball]] = angles
     beyond = ((angles < low) | (angles > high)).any(axis=1)

@@ -24,8 +24,8 @@ __all__ = ["NEGLIGIBLE", "Report", "inpaint"]
 
 Report = Callable[[float, str], None]
 
-NEGLIGIBLE = 1e-6  # smaller solved weights are treated as 0, as solutions decay without reaching 0
-_BLOCK = 1 << 22  # unknowns per batch, 32 MB
+NEGLIGIBLE = 1e-6  # solved weight below which 0 is used, as solutions decay without reaching 0
+_BLOCK = 1 << 22  # number of unknowns per batch, 32 MB
 _TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
 _SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
 _STEPS = 2000  # maximum iterations of conjugate gradients
@@ -109,7 +109,7 @@ def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
 
 
 def _is_true(solve: _Solve, border: Any) -> bool:
-    """Return whether known weights of 1 everywhere give 1 everywhere, as they should."""
+    """Return whether known weights of 1 everywhere yield 1 everywhere, as they should."""
     ones = solve(-np.asarray(border.sum(axis=1)).reshape(-1, 1))
     return bool(np.isfinite(ones).all() and np.abs(ones - 1.0).max() <= _TRUE)
 

@@ -26,7 +26,7 @@ _FEW = 0.75  # fraction of matched vertices below which too many weights are est
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidIslands:
-    """Connected parts of a target that do not meet the template, and are attached to it rigidly.
+    """Connected parts of a target that do not meet the template and are attached rigidly.
 
     Attributes
     ----------
@@ -55,7 +55,7 @@ class WeightTransfer:
     starts, joints, weights
         As in ``Skin``: vertex v owns influences ``starts[v]`` up to ``starts[v + 1]``.
     matched : (V,) bool
-        Vertices whose weights are those of the template's surface.
+        Vertices whose weights come from the template's surface.
     inpainted : (V,) bool
         Vertices whose weights were inpainted. Vertices that are neither matched nor inpainted
         belong to a rigid island.

@@ -43,7 +43,7 @@ def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = ROUNDS) -
     both = both[active[both[:, 0]]]
     count = weights.shape[0]
     degrees = np.bincount(both[:, 0], minlength=count)
-    mixed = degrees > 0  # vertices without neighbours keep their weights
+    mixed = degrees > 0  # the weights of vertices without neighbours are unchanged
     mean = sparse.csr_array(
         (_FRACTION / degrees[both[:, 0]], (both[:, 0], both[:, 1])), shape=(count, count)
     )

@@ -13,7 +13,7 @@ from viewer.rig.skin import Skin, limit_influences
 
 __all__ = ["put_rows", "scaled_rows", "skin_of", "weight_matrix"]
 
-_NO_SUM = 1e-12  # weights whose sum is smaller cannot be normalised
+_NO_SUM = 1e-12  # minimum sum of weights that can be normalised
 
 
 def weight_matrix(skin: Skin, triangles: Ints) -> Any:
@@ -75,7 +75,7 @@ def scaled_rows(matrix: Any, factors: Floats) -> Any:
 
 
 def put_rows(rows: Any, where: Any, values: Any) -> Any:
-    """Return sparse rows with those at ``where``, unique indices, replaced by ``values``."""
+    """Return sparse rows; the rows at the unique indices ``where`` are replaced by ``values``."""
     sparse = scipy_part("sparse")
     kept = np.ones(rows.shape[0])
     kept[where] = 0.0

@@ -18,13 +18,13 @@ from viewer.data_classes import dataclass
 __all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
 
 IN_FLIGHT = 4
-"""Items handed out per worker, including the one that runs."""
+"""Number of items assigned to each worker, including the one that runs."""
 
 
 class Job(Protocol):
     """The job that is applied to each item: a callable that can be pickled.
 
-    It returns a result for any item, even for invalid input; see ``attempts.attempt``.
+    It returns a result for any item, even for invalid input; see ``execution.attempt``.
     """
 
     def __call__(self, item: Item) -> Result:

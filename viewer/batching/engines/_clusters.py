@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 __all__ = ["connected", "slurm_cluster"]
 
-_CONNECT = 10.0  # seconds
+_CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
 _MEMORY = 4 << 30  # bytes per worker that a SLURM job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
 _ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")

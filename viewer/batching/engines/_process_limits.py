@@ -16,8 +16,8 @@ def limit_memory(size: int) -> None:
         return
     import resource
 
-    # On Linux, the address space also includes mapped files and driver reservations, which use
-    # none.
+    # On Linux, the address space includes mapped files and driver reservations, which use no
+    # memory.
     kind = resource.RLIMIT_DATA if sys.platform == "linux" else resource.RLIMIT_AS
     soft, most = resource.getrlimit(kind)
     limit = size if most == resource.RLIM_INFINITY else min(size, most)

@@ -23,7 +23,7 @@ ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
 
 _SETTLE = 0.5  # seconds in which a worker that ends itself can send its last event
-_FAILED = 70  # exit code of such a worker
+_FAILED = 70  # exit code of a worker that ends itself
 
 # A worker runs one item at a time even if it has several threads: output is captured, and
 # diagnostics are recorded, for the process as a whole.

@@ -1,6 +1,6 @@
 """Items on the workers of a Dask cluster: on this machine, at an address, or in SLURM jobs.
 
-Only a few items per worker are handed out at a time, so that millions need no queue. If a worker
+Only a few items are assigned to each worker at a time, so that millions need no queue. If a worker
 dies, its items are run again elsewhere; an item that repeatedly kills its worker is reported.
 """
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
-_PER_WORKER = 3  # items handed out per worker: one runs while the next ones are transferred
+_PER_WORKER = 3  # items assigned to each worker: one runs while the next ones are transferred
 _COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leave
 _ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
@@ -73,14 +73,14 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item, and how many workers died while they ran it."""
+    """An item, and the number of workers that died while running it."""
 
     item: Item
     earlier: int = 0
 
 
 class _Flight:
-    """The attempts that have been handed to a cluster."""
+    """The attempts that have been submitted to a cluster."""
 
     def __init__(self, client: Client, job: Job, limits: Limits) -> None:
         import cloudpickle
@@ -101,7 +101,7 @@ class _Flight:
     def count_workers(self) -> None:
         """Update the number of workers, which changes while the batch runs.
 
-        Raises ViewerError if a scheduler has had none for a minute.
+        Raises ViewerError if a scheduler has had no workers for a minute.
         """
         now = time.monotonic()
         if now < self._counted + _COUNT_EVERY:
@@ -136,7 +136,7 @@ class _Flight:
         return self._is_stopping
 
     def start(self, attempt: _Attempt) -> None:
-        """Hand an item to the cluster."""
+        """Submit an item to the cluster."""
         import pickle
 
         number = next(self._numbers)

@@ -160,7 +160,7 @@ class _Workers:
         return self._is_stopping.is_set()
 
     def schedule(self, attempt: _Attempt) -> None:
-        """Hand an item to the pool."""
+        """Submit an item to the pool."""
         try:
             future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
         except RuntimeError:  # the pool broke after its last result
@@ -191,7 +191,7 @@ class _Workers:
     def close(self) -> None:
         """Terminate the workers and their items."""
         self._pool.stop()  # type: ignore[no-untyped-call]
-        # Before the queue is closed, because workers that are starting would report errors.
+        # Done before the queue is closed, because workers that are starting would report errors.
         self._context.end_workers()
         self._pool.join()
         self._context.is_closing = False
@@ -274,7 +274,7 @@ class _Workers:
 
 
 def _end_of(code: int | None) -> str:
-    """Return how a process ended, for a message."""
+    """Return a description of how a process ended, for a message."""
     if code is not None and code < 0:
         name = signal.Signals(-code).name if -code in signal.valid_signals() else str(-code)
         often = ", probably because the system ran out of memory" if -code == signal.SIGKILL else ""
@@ -290,7 +290,7 @@ _is_terminated = False
 
 
 def _prepare(job: Job, memory: int | None, stopping: Event) -> None:
-    """Begin a worker."""
+    """Initialise a worker process."""
     global _job, _stopping
     _job, _stopping = job, stopping
     # Between items, a worker may hold the lock of the queue, which would never be released: only

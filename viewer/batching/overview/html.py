@@ -9,7 +9,7 @@ from viewer.phrases import printable
 
 __all__ = ["bar", "document", "row", "table", "tag", "text_of"]
 
-_LONGEST = 1000  # maximum length of a text in characters
+_LONGEST = 1000  # maximum length of text in characters
 
 _STYLE = """
 :root { color-scheme: light dark; --back: #fff; --text: #1d2026; --soft: #626a77; --line: #dfe3e9;
@@ -44,7 +44,7 @@ img { display: block; max-width: 160px; max-height: 120px; border-radius: 4px; }
 
 
 def text_of(value: object) -> str:
-    """Return a text as HTML: one line, escaped.
+    """Return text as HTML: one line, escaped.
 
     >>> text_of("<b> & co")
     '&lt;b&gt; &amp; co'

@@ -21,7 +21,7 @@ __all__ = ["save_page"]
 _MOST_ROWS = 5_000
 _MOST_MESSAGES = 20  # maximum number of messages per item
 _MOST_THUMBNAILS = 400
-_THUMBNAIL = (160, 120)  # pixels
+_THUMBNAIL = (160, 120)  # maximum size of a thumbnail, pixels
 _SEVERITIES = ("error", "warning", "note")
 _FINISHED = ("done", "unchanged")
 
@@ -223,8 +223,8 @@ def _texts(job: str, result: Result) -> list[str]:
         return texts + [f"{one['code']} {one['message']}" for one in findings]
     if job == "diff":
         return texts + mismatches_of(result)
-    told = [one["message"] for one in result.diagnostics if one.get("message") not in texts]
-    return texts + told
+    others = [one["message"] for one in result.diagnostics if one.get("message") not in texts]
+    return texts + others
 
 
 def _message(job: str, result: Result) -> str:

@@ -21,7 +21,7 @@ PER_SHEET = 120
 MOST_SHEETS = 50
 """Maximum number of sheets; further items are not shown."""
 
-_CELL = (240, 320)  # pixels
+_CELL = (240, 320)  # maximum size of a picture, pixels
 _FINISHED = ("done", "unchanged")
 
 

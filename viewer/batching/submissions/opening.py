@@ -59,7 +59,7 @@ def opened(
     expected, alike : sequence of str
         Patterns of its files; see ``choose``.
     temporary : Path, optional
-        Folder for unpacked files; that of the system if omitted or missing.
+        Folder for unpacked files; the system's temporary folder if omitted or missing.
 
     Raises
     ------

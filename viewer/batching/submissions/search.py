@@ -16,7 +16,7 @@ _ARCHIVES = (".zip", ".rar", ".7z", ".tar", ".tgz", ".tar.gz", ".tar.bz2", ".tar
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """Submissions, and files that are not.
+    """Submissions, and other files.
 
     Attributes
     ----------

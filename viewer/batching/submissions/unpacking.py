@@ -23,10 +23,10 @@ from viewer.phrases import printable
 __all__ = ["MOST_BYTES", "MOST_FILES", "Archive", "open_archive"]
 
 MOST_BYTES = 2 << 30
-"""Bytes of all files that are unpacked from one archive."""
+"""Maximum number of bytes unpacked from one archive."""
 
 MOST_FILES = 5_000
-"""Files that are unpacked from one archive."""
+"""Maximum number of files unpacked from one archive."""
 
 _ENCRYPTED = 0x41  # bits 0 and 6 of the flags
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
@@ -147,7 +147,7 @@ def _path_of(info: zipfile.ZipInfo, shown: Path) -> str:
 
 
 def _is_full(problem: Exception) -> bool:
-    """Return whether the disk caused an error, and not the archive."""
+    """Return whether an error was caused by the disk instead of the archive."""
     return isinstance(problem, OSError) and problem.errno in _FULL
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from viewer.batching.attempts import FunctionJob
+from viewer.batching.execution import FunctionJob
 from viewer.batching.items import Item, Result
 from viewer.batching.running import run_batch
 from viewer.commands._batch.functions import identity_of
@@ -145,7 +145,7 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
     try:
         found = run_batch(plan.items, job, plan.settings, on_result)
     except Interrupted as stop:
-        # The caller's own handler handles it, as if the signal had arrived only now.
+        # The caller's own handler handles it, as if the signal had just arrived.
         signal.raise_signal(stop.number)
         raise KeyboardInterrupt from None
     if found.signal:

@@ -15,7 +15,7 @@ __all__ = ["identity_of"]
 
 
 def identity_of(function: Callable[..., Any]) -> str:
-    """Return a text that is the same in all processes, and changes if the function does.
+    """Return a string that is the same in all processes, and changes if the function does.
 
     It covers code, defaults, bound arguments, variables of enclosing functions and the program's
     version, but not the code of other functions that it calls.

@@ -9,7 +9,7 @@ from functools import cache, cached_property
 from importlib import import_module
 from pathlib import Path
 
-from viewer.batching.attempts import attempt
+from viewer.batching.execution import attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.naming import filled
 from viewer.batching.worker import worker_rank
@@ -33,7 +33,7 @@ class JobKind:
     ``suffix``: suffix of the outputs in a folder if ``--to`` is not given.
     ``writes``: ``always``, ``maybe`` or ``never``.
     ``prints``: whether its text is the result and is therefore printed.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
     """
 

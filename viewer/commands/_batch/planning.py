@@ -40,7 +40,7 @@ class Request:
 
     ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
-    ``few``: largest number of items for which no worker process is started.
+    ``few``: maximum number of items for which no worker process is started.
     ``memory``: bytes that a worker may use; None for no limit.
     ``notes``: messages about the paths.
     ``joint_map``: template for the joint map of each item.

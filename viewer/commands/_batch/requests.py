@@ -45,7 +45,6 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
-    limit = arguments.limit_memory
     paths, notes = _inputs(arguments)
     request = Request(
         paths=paths,
@@ -63,7 +62,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
-        memory=parse_bytes(limit, "--limit-memory") if limit else None,
+        memory=_memory(arguments),
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
@@ -97,6 +96,12 @@ def _inputs(arguments: argparse.Namespace) -> tuple[list[str], list[str]]:
     return [*map(str, found.submissions)], [note] if found.ignored else []
 
 
+def _memory(arguments: argparse.Namespace) -> int | None:
+    """Return the bytes that a worker may use; None for no limit."""
+    given = arguments.limit_memory
+    return parse_bytes(given, "--limit-memory") if given else None
+
+
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
     """Return the suffix of the outputs in a folder; a template has its own."""
     given: str = getattr(arguments, "to", "")
@@ -117,7 +122,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:
-    """Return a text that identifies job, options and version: equal texts give equal results."""
+    """Return a string that identifies job, options and version, on which results depend."""
     options = {name: value for name, value in vars(command).items() if name not in _NOT_RESULTS}
     return json.dumps([job, VERSION, options, *expected], sort_keys=True, default=str)
 
@@ -125,7 +130,7 @@ def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) ->
 def _files_in(command: argparse.Namespace) -> Iterator[str]:
     """Yield the files named by options, such as ``--model``."""
     for name, value in sorted(vars(command).items()):
-        if name in _NOT_RESULTS or name == "save_joint_map":  # an output
+        if name in _NOT_RESULTS or name == "save_joint_map":  # this file is an output
             continue
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":

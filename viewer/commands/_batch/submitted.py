@@ -12,8 +12,8 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from viewer.batching.attempts import attempt
 from viewer.batching.engines import Job
+from viewer.batching.execution import attempt
 from viewer.batching.inputs import is_recording
 from viewer.batching.items import Item, Result
 from viewer.batching.submissions import Submission, is_archive, opened
@@ -98,7 +98,7 @@ def _temporary_folder() -> str:
 
 
 def _replaced(value: Any, old: str, new: str) -> Any:
-    """Return JSON data with a substring replaced in all texts."""
+    """Return JSON data with a substring replaced in all strings."""
     if isinstance(value, str):
         return value.replace(old, new)
     if isinstance(value, dict):

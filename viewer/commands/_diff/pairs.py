@@ -45,9 +45,9 @@ def pair_actors(first: Sequence[Actor], second: Sequence[Actor]) -> Pairing:
 
     People of captures are paired by their number. Actors with the same name are paired first, of
     the same kind if there are several; then actors of the same kind, such as skinned figures; then
-    the rest, in order. Keyframed clips are assigned to any skeleton they fit when files are opened,
-    so a clip with the same name as the other actor's clip takes precedence, then the actor's own,
-    then one assigned to an unpaired actor.
+    the remaining ones, in order. Keyframed clips are assigned to any skeleton they fit when files
+    are opened, so a clip with the same name as the other actor's clip takes precedence, then the
+    actor's own, then one assigned to an unpaired actor.
 
     ``first``, ``second``: actors of the reference and of the other scene; not modified.
     """

@@ -12,7 +12,7 @@ from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.scene import Actor, Scene
 
-_SLOWEST, _FASTEST = 0.001, 100_000.0  # frames per second
+_SLOWEST, _FASTEST = 0.001, 100_000.0  # limits of frame rates, frames per second
 _LAST_NUMBER = 1_000_000_000
 
 
@@ -75,12 +75,12 @@ class Numbering:
         return self.start + (frame - self.first) / self.rate
 
     def checked_time(self, time: float) -> float:
-        """Return a time, checked to lie within the motions.
+        """Return a time after checking that it is within the motions.
 
         A capture's last frame is extended by half a frame's duration, because users rarely enter
         its exact time.
 
-        Raises ViewerError if the time lies outside the captures.
+        Raises ViewerError if the time is outside the captures.
         """
         if self.runs_on:
             return time
@@ -193,7 +193,7 @@ def rate(text: str) -> float:
 def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
     """Pose every actor that has a motion at the requested frame or time, in place.
 
-    Raises ViewerError if there is no motion, or the time lies outside the captures.
+    Raises ViewerError if there is no motion, or the time is outside the captures.
     """
     if arguments.frame is None and arguments.time is None:
         return

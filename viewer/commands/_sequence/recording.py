@@ -42,20 +42,21 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         const="",
         metavar="SECONDS|DEGREESdeg",
-        help="rotate the camera once, in the given seconds, or by the given degrees",
+        help="rotate the camera once within the given number of seconds, or by the given degrees",
     )
     group.add_argument(
         "--contact-sheet",
         type=int,
         metavar="N",
-        help="one image of N numbered frames, evenly spaced over the motion, at one scale and "
-        "with one ground line",
+        help="one image of N numbered frames, evenly spaced over the motion, with a common scale "
+        "and ground line",
     )
     group.add_argument(
         "--onion",
         type=int,
         metavar="N",
-        help="one image of N poses in place, evenly spaced over the motion, earlier ones fainter",
+        help="one image of N poses, each at its place, evenly spaced over the motion, with earlier "
+        "poses fainter",
     )
     group.add_argument(
         "--speed",

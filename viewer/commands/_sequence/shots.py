@@ -20,7 +20,7 @@ from viewer.rig.scene import Scene
 
 _MOST_FRAMES = 1_000_000
 _ROTATION_SECONDS = 6.0  # duration of a turntable of a still scene
-_FULL = 360.0  # degrees
+_FULL = 360.0  # full revolution, degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,7 @@ class Turntable:
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """Requested output, checked as far as possible before anything is opened.
+    """Requested output, checked as thoroughly as possible before anything is opened.
 
     Attributes
     ----------
@@ -91,7 +91,7 @@ class Shots:
 
 
 def parse_turntable(text: str) -> Turntable:
-    """Parse ``6``, ``6s``, ``90deg`` or an empty text.
+    """Parse ``6``, ``6s``, ``90deg`` or an empty string.
 
     >>> parse_turntable(""), parse_turntable("4s"), parse_turntable("-90deg")
     (Turntable(degrees=360.0, seconds=None), Turntable(degrees=360.0, seconds=4.0), \
@@ -112,7 +112,7 @@ Turntable(degrees=-90.0, seconds=None))
 
 
 def shots_of(request: Request, arguments: argparse.Namespace, scene: Scene) -> Shots:
-    """Return the frames to draw of a scene.
+    """Return the frames of a scene to draw.
 
     Raises ViewerError if nothing moves, or there are no frames or too many.
     """

@@ -147,13 +147,13 @@ def write_motions(
 ) -> list[Diagnostic]:
     """Write every actor's motion; return notes about what was written and what was lost.
 
-    Formats that hold several figures get one file, also with the figures that do not move. If one
-    pose is requested, or nothing moves, a motion of one frame is written. People absent
+    Formats that hold several figures get one file, which includes the figures that do not move. If
+    one pose is requested, or nothing moves, a motion of one frame is written. People absent
     from all frames are omitted, and the others keep their file names. ``check`` is called with
     all files before the first is written, and raises if one of them must not be replaced.
 
-    Raises ViewerError if no actor has a motion that the format can store, or nobody is present
-      in the frames; nothing is written then.
+    Raises ViewerError if no actor has a motion that the format can store, or no person is present
+    in the frames; in that case, nothing is written.
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
@@ -171,7 +171,7 @@ def write_motions(
         parts.append(_Part(actor, animation, up, path))
     there = [part for part in parts if part.present.any()]
     if not there:
-        raise RigError(f"nobody is present in {parts[0].span}: there is nothing to write")
+        raise RigError(f"no person is present in {parts[0].span}: there is nothing to write")
     still = [each for each in scene.actors if is_one and each.clip is None and each not in actors]
     if is_one and len(there) + len(still) > 1:
         notes = _write_together(there, scene, output, options, still, check)
@@ -189,7 +189,7 @@ def _whole_animation(
     arguments: argparse.Namespace, key: str, options: MotionOptions, scene: Scene, actor: Actor
 ) -> tuple[SampledAnimation | SampledPoints, str]:
     """Return the requested frames of an actor, and their up axis."""
-    frames, fills = _frames(arguments, actor), bool(arguments.interpolate_gaps)
+    frames, fills = requested_frames(arguments, actor), bool(arguments.interpolate_gaps)
     if not isinstance(actor.clip, PointClip):
         return animation_for(key, options, scene, actor, arguments.fps, frames, fills)
     if options.gaps not in ("", "interpolate"):
@@ -316,7 +316,7 @@ def _exporter(arguments: argparse.Namespace, output: Path, scene: Scene) -> str:
     return suited_exporter(output, actors[0].figure)
 
 
-def _frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
+def requested_frames(arguments: argparse.Namespace, actor: Actor) -> tuple[int, int | None] | None:
     """Return the requested range, counted from 0: its first frame and one past its last."""
     if arguments.frames is None:
         return None

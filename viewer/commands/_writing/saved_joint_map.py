@@ -48,7 +48,8 @@ def saving_joint_map(arguments: argparse.Namespace, scene: Scene) -> Iterator[No
             texts.setdefault(joint_map_text(full_map(actor.drive, actor.figure), titles), actor)
     if not texts:
         raise RigError(
-            "--save-joint-map: expected a motion that drives a figure with other joints, found none"
+            "--save-joint-map: expected a motion that drives a figure with different joints, found "
+            "none"
         )
     files = motion_paths(Path(arguments.save_joint_map), [*texts.values()])
     check_targets(files, inputs_of(arguments, scene), arguments.force)

@@ -10,8 +10,11 @@ from viewer.export import VrmMeta
 from viewer.phrases import printable
 
 
-def add_vrm_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the options that name a character, its authors and its licence."""
+def add_vrm_arguments(parser: argparse.ArgumentParser, upgrades: bool = False) -> None:
+    """Add the options that name a character, its authors and its licence.
+
+    ``upgrades``: whether the command can convert VRM 0.x to 1.0.
+    """
     group = parser.add_argument_group("writing VRM characters")
     group.add_argument("--vrm-name", metavar="NAME", help="name of the character")
     group.add_argument(
@@ -26,6 +29,12 @@ def add_vrm_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="URL",
         help="address of the licence; required for figures from other formats",
     )
+    if upgrades:
+        group.add_argument(
+            "--vrm-version",
+            choices=("1.0",),
+            help="write characters from VRM 0.x files as VRM 1.0 (default: the file's version)",
+        )
 
 
 def vrm_meta(arguments: argparse.Namespace, output: Path | None) -> VrmMeta:
@@ -38,10 +47,15 @@ def vrm_meta(arguments: argparse.Namespace, output: Path | None) -> VrmMeta:
         "--vrm-author": arguments.vrm_author,
         "--vrm-licence": arguments.vrm_licence,
     }
+    version = getattr(arguments, "vrm_version", None)
+    given["--vrm-version"] = version
     named = next((option for option, value in given.items() if value), "")
     if named and (output is None or output.suffix.lower() != ".vrm"):
         suffix = printable(output.suffix) if output is not None and output.suffix else "no suffix"
         raise ViewerError(f"{named}: expected an output with .vrm, found {suffix}")
     return VrmMeta(
-        arguments.vrm_name or "", tuple(arguments.vrm_author), arguments.vrm_licence or ""
+        arguments.vrm_name or "",
+        tuple(arguments.vrm_author),
+        arguments.vrm_licence or "",
+        upgrades=version is not None,
     )

@@ -37,7 +37,7 @@ MESSAGES = {
     # MHR
     "F002.mhr-folder": "expected rig.npz and lod*.npz in the folder: MHR's `convert_assets.py` "
     "writes them, and its `download_assets.py --lod 1` downloads them",
-    "F002.mhr-no-lod": "expected lod0.npz to lod6.npz beside rig.npz, found none",
+    "F002.mhr-no-lod": "expected lod0.npz to lod6.npz next to rig.npz, found none",
     "F002.mhr-lod": "--lod: no level of detail {found:quoted}; available levels: {known:list12}",
     "F002.mhr-keys": "expected MHR's portable files; keys missing: {missing:list12}; keys found: "
     "{found:list12}",

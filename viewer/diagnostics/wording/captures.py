@@ -30,14 +30,14 @@ MESSAGES = {
     "F007.records": "{name:text}: {n:#more error} in frame files",
     "F007.record-untracked": 'untracked people (id -1) are named "untracked" and numbered '
     "within each frame: they cannot be matched between frames",
-    "F007.record-no-id": "people without id: numbered in list order",
-    "F007.record-ids": "people with different id and personID: id is used",
+    "F007.record-no-id": "people without an id are numbered in list order",
+    "F007.record-ids": "id and personID of people differ: id is used",
     "F007.record-points": "keypoints3d in this record and in the folder keypoints3d: those in the "
     "folder are used",
     "F007.record-poses": "poses in this record and in a separate folder: those in the folder are "
     "used",
-    "F007.record-vertices": "vertices are not needed: ignored",
-    "F007.record-first": "no earlier record has {keys:or}: 0 is used until one does",
+    "F007.record-vertices": "vertices are ignored: they are not needed",
+    "F007.record-first": "no earlier record has {keys:or}: 0 is used until a record does",
     "F007.record-last": "no {item} in this record: the person's last known values are used",
     "F007.record-no-last": "no {item} in this or earlier records of the same person: 0 is used",
     "F007.record-unseen": "{name:text}: no keypoint of {people:list} is ever visible: every "
@@ -53,7 +53,8 @@ MESSAGES = {
     "F003.camera-limit": "{item:text}: expected numbers within ±{limit:g}, found {found:g}",
     "F002.camera-rotation": "{item:text}: not a rotation matrix",
     "F002.camera-no-key": "{item:text}: key not found",
-    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found no matrix of numbers",
+    "F002.camera-other": "{item:text}: expected {shape:axes} numbers, found a value that is not a "
+    "numeric matrix",
     "F002.camera-shape": "{item:text}: expected {shape:axes} numbers, found {found:axes}",
     "F002.camera-twice": 'expected unique keys, found "{found:text}" again',
     "F002.camera-value": "expected `name: value`, found {found:quoted}",

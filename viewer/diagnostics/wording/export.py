@@ -97,6 +97,8 @@ MESSAGES = {
     "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
     "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
+    "X003.vrm-upgrade": "{n:#member} of the VRM 0.x file {n:?has|have} no counterpart in VRM 1.0: "
+    "{names:list8}",
     "X003.vrma-joints": "{n:#joint} without a human bone {n:?is|are} omitted",
     "X003.points": "captured points are not exported: {names:all}",
     "X003.of-person": "{person}: {remark}",
@@ -226,6 +228,8 @@ PHRASES = {
     # Parts of a figure
     "part-blend-shapes": "{n:#blend shape}",
     "part-expressions": "{n:#expression} (combinations of morph targets, as in VRM)",
+    "part-toon": "toon shading of {n:#material} (unlit in the file)",
+    "part-material-binds": "changes of materials by {n:#expression}",
     "part-humanoid": "the humanoid bone map",
     "part-vrm-meta": "authors and licence of the VRM character",
     "part-springs": "{n:#spring chain}",

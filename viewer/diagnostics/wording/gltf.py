@@ -31,7 +31,7 @@ MESSAGES = {
     "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
     "F007.vrma-look": "gaze direction is not shown",
     "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
-    "F007.vrm-materials": "changes of materials by expressions are not shown: {names:list12}",
+    "F007.vrm-materials": "changes of materials by expressions without effect: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
     "F002.gltf-version": "expected glTF 2.0, found version {found}",

@@ -10,8 +10,8 @@ MESSAGES = {
     "F007.gltf-not-drawn": "{extension:text} not drawn ({n:#material})",
     "F007.gltf-glossiness": "KHR_materials_pbrSpecularGlossiness is approximated by metallic and "
     "roughness ({n:#material})",
-    "F007.gltf-toon": "{n:#toon material} drawn with lit and shade colour, without rim "
-    "light or outline",
+    "F007.gltf-toon": "{n:#toon material|is|are} lit by the white key light only{names:+; not "
+    "drawn: {:list}}",
 }
 
 PHRASES: dict[str, str] = {}

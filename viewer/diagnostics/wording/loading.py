@@ -70,8 +70,8 @@ MESSAGES = {
     "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the others; --unit "
     "overrides it",
     "F007.up-judged": "{up} up, estimated from the poses; --up overrides it",
-    "F007.up-judged-over": "{up} up, estimated from the poses: the scene is turned upside down; "
-    "--up overrides it",
+    "F007.up-judged-over": "{up} up, estimated from the poses: the capture is upside down and is "
+    "rotated upright; --up overrides it",
     "F007.up-taken": "{note}; --up overrides it",
 }
 

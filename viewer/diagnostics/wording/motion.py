@@ -44,8 +44,8 @@ MESSAGES = {
     "its feet is assumed; --source-rest overrides it",
     "F007.feet-planted": "feet of {figure:text} planted during {n:#contact} of {motion:text}: they "
     "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
-    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}; --feet off "
-    "disables this",
+    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}{ground:+; the "
+    "ground moves at {}}; --feet off disables this",
     "F007.feet-kept": "feet of {figure:text} not planted: they already slide as little as "
     "those of {motion:text}",
     "F007.feet-no-contacts": "feet of {figure:text} not planted: no ground contacts found in "

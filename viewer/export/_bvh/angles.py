@@ -49,7 +49,7 @@ def unrolled(angles: Floats, order: str) -> Floats:
     Returns (N, ..., 3): radians, not limited to one revolution.
     """
     result, unroller = np.empty_like(angles), Unroller(order)
-    # Some frames at a time, so that their arrays fit into the processor's cache.
+    # Frames are processed in blocks whose arrays fit into the processor's cache.
     for start in range(0, len(angles), _BLOCK):
         rows = slice(start, start + _BLOCK)
         result[rows] = unroller.following(angles[rows])
@@ -57,7 +57,7 @@ def unrolled(angles: Floats, order: str) -> Floats:
 
 
 class Unroller:
-    """Unwrapping of angles over time, some frames after others; see ``unrolled``.
+    """Unwrapping of angles over time, block by block; see ``unrolled``.
 
     ``order``: order of the axes.
     """
@@ -65,9 +65,11 @@ class Unroller:
     def __init__(self, order: str) -> None:
         self._sign = _sign(order)
         self._first: Floats | None = None  # first angle of the last frame without gimbal lock
-        self._last = self._chosen = np.zeros(0)  # last frame: as given, and in the chosen form
-        self._is_other: Bools = np.zeros(0, dtype=np.bool_)  # whether that is the other form
-        self._turns = np.zeros(0)  # revolutions so far
+        # Angles of the last frame: as given, and in the chosen form.
+        self._last = self._chosen = np.zeros(0)
+        # Whether the chosen form is the other one.
+        self._is_other: Bools = np.zeros(0, dtype=np.bool_)
+        self._turns = np.zeros(0)  # accumulated revolutions
 
     def following(self, angles: Floats) -> Floats:
         """Return the angles (N, ..., 3) of the next frames, unwrapped."""

@@ -100,14 +100,14 @@ def body_of(figure: Figure, frames: Frames, reference: int, order: str, space: S
 
 
 class Conversion:
-    """Conversion of a figure's frames to channels, some frames after others.
+    """Conversion of a figure's frames to channels, block by block.
 
     Parameters
     ----------
     figure, reference, order, space
         As for ``body_of``.
     frames : Frames
-        All frames; or some, if these have the scales and shapes of all.
+        All frames, or some frames that have the scales and shapes of all.
     """
 
     def __init__(
@@ -145,7 +145,7 @@ class Conversion:
     def bones(self) -> tuple[Floats, Bools]:
         """Return offsets with constant translations, and which joints move: (J, 3), (J,).
 
-        Both follow from all frames whose channels have been computed.
+        Both depend on all frames whose channels have been computed.
         """
         noise = _NOISE * (self._size + 1e-3 * self._farthest)
         is_moved = ((self._high - self._low) > noise).any(axis=1)

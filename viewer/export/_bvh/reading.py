@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.export._bvh.body import Space, rest_matrices
-from viewer.export._losses.skinned import Poses, Side, anchored, figure_side
+from viewer.export._losses.skinned import Poses, Side, anchored, bare_poses, figure_side
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import (
@@ -29,6 +29,7 @@ from viewer.rig.motion.evaluation import (
     rest_translations_of,
     world_frames,
 )
+from viewer.rig.motion.joint_positions import joint_positions
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skinning import Skinning
@@ -51,7 +52,7 @@ class BvhFile:
     reference : int
         Frame that defines the shape and scale of the file's bones.
     ahead : int
-        Index of the animation's first frame in this motion; negative if that begins later.
+        Index of the animation's first frame in this motion; negative if the motion begins later.
     """
 
     motion: SkeletonMotion
@@ -86,20 +87,22 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
 
     def poses(rows: Rows) -> Poses:
         times = (rows + file.ahead) / clip.timing.frame_rate
-        found = world_frames(motion.figure, frames_of(motion.figure, clip, times))[:, order]
+        read = frames_of(motion.figure, clip, times)
+        if body is None:
+            places = joint_positions(motion.figure, read)[:, order] @ space.world / space.factor
+            return bare_poses(places, frames_between(frames, rows))
+        found = world_frames(motion.figure, read)[:, order]
         world = np.zeros(found.shape)
         world[..., 3, 3] = 1.0
         world[..., :3, 3] = found[..., :3, 3] @ space.world / space.factor
-        if body is not None:
-            world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
+        world[..., :3, :3] = space.world.T @ found[..., :3, :3] @ own
         places = world[..., :3, 3].copy()
         shifts = frames_between(frames, rows).figure_translations
         world[..., :3, 3] -= shifts[:, None]
         corrective_rotations = np.zeros((len(rows), 0))
-        if body is not None and body.correctives is not None:
+        if body.correctives is not None:
             corrective_rotations = _corrective_rotations(figure, world / scale)
-        matrices = world[:, :0] if body is None else world @ bound
-        palette = anchored(matrices, np.full(len(rows), scale))
+        palette = anchored(world @ bound, np.full(len(rows), scale))
         return Poses(places, palette, shifts, np.zeros((1, 0)), corrective_rotations)
 
     return Side(body, poses)

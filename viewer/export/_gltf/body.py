@@ -89,7 +89,7 @@ def add_body(
         document, figure.name, up, figure.unit, figure.skeleton, pose, still, fixes, bare
     )
     if record is not None:
-        add_record(document, record, tree.joints)
+        add_record(document, record, tree.joints, figure.name)
     scene, counts, meshes = [tree.root], list[Phrase](), list[Placed]()
     errors: dict[str, float] = {}
     materials: dict[int, int] = {}
@@ -125,7 +125,7 @@ def _encoding(document: Document, body: Body, optimizes: bool) -> Encoding:
 def _add_meshes(
     encoding: Encoding, body: Body, tree: Tree, color: Color | None
 ) -> tuple[list[Placed], dict[int, int]]:
-    """Add the parts of a figure, each with its node; return also the written materials."""
+    """Add the parts of a figure, each with its node; also return the written materials."""
     figure, meshes, document = body.figure, list[Placed](), encoding.document
     record = figure.record
     materials = Materials(document, figure.require_mesh(), color, record is not None)

@@ -40,10 +40,13 @@ class Document:
     ----------
     root : dict
         The JSON.
+    extras : list of (str, Any)
+        Name and application data of each figure whose file has some.
     """
 
     def __init__(self, name: str) -> None:
         self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
+        self.extras: list[tuple[str, Any]] = []
         self._name = name
         self._parts: list[bytes] = []
         self._size = 0

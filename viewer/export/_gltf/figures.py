@@ -93,7 +93,7 @@ def place_figures(
     """Place several figures as in their scene; return the nodes that move them.
 
     ``actors``: the figures, each upright in its own space.
-    ``built``: their contents of the file.
+    ``built``: their contents in the file.
     ``to_file`` (4, 4): scene space to the space of the file.
     """
     roots, placing = document.root["scenes"][0]["nodes"], list[int]()

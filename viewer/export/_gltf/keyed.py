@@ -28,7 +28,7 @@ _RATE = 60.0  # frames per second at which channels of different interpolation a
 
 
 class Clips:
-    """The animations of a file: clips of its figures with equal name and range are one.
+    """The animations of a file: clips of its figures with equal name and range are merged.
 
     Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
 
@@ -72,7 +72,7 @@ class Clips:
         return added
 
     def _put(self, clip: TransformClip, keys: _Keys, taken: Collection[int]) -> int:
-        """Add keys to the animation that another figure has in common, or to a new one."""
+        """Add keys to the animation shared with another figure, or to a new one."""
         name = (clip.name, clip.start, clip.end, first_time(clip))
         known = self._known.setdefault(name, [])
         common = next((index for index in known if index not in taken), -1)

@@ -57,7 +57,7 @@ class Written:
 
     @property
     def sources(self) -> Ints:
-        """Indices of the figure's vertices that the file's vertices are copies of."""
+        """Indices of the figure's vertices, one for each vertex of the file that copies it."""
         return np.concatenate([placed.part.sources for placed in self.meshes])
 
 
@@ -135,7 +135,7 @@ def first_set_note(
 ) -> list[Diagnostic]:
     """Return a note about the error in programs that read only four influences per vertex.
 
-    Empty if no vertex has more. ``expected``, ``read``: from ``sides``.
+    The list is empty if no vertex has more. ``expected``, ``read``: from ``sides``.
     """
     if influences is None or influences.most <= PER_SET or expected.body is None:
         return []
@@ -202,6 +202,7 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
         lost.append(Phrase("part-blend-shapes", n=unused))
     if mixed and shape.baked is None and not is_vrm:
         lost.append(Phrase("part-expressions", n=mixed))
+    lost += [] if is_vrm else _lost_looks(figure)
     if skeleton is not None and skeleton.humanoid is not None and not is_vrm:
         lost.append(Phrase("part-humanoid"))
     if skeleton is not None and skeleton.springs is not None and not is_vrm:
@@ -216,6 +217,19 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))
     return not_held_note("glTF", lost)
+
+
+def _lost_looks(figure: Figure) -> list[Phrase]:
+    """Return toon shading, and changes of materials by expressions."""
+    shapes, found = figure.blend_shapes, list[Phrase]()
+    materials = () if figure.mesh is None else figure.mesh.materials
+    n_toon = sum(material.shade_color is not None for material in materials)
+    if n_toon:
+        found.append(Phrase("part-toon", n=n_toon))
+    if shapes is not None and shapes.material_binds is not None:
+        count = len(shapes.material_binds.n_materials)
+        found.append(Phrase("part-material-binds", n=count))
+    return found
 
 
 def _is_limited(skeleton: Skeleton) -> bool:

@@ -29,8 +29,8 @@ class Part:
     name, mesh_name : str
         Names of the node and of the mesh.
     joint : int
-        Joint whose node has the mesh, because all vertices follow it rigidly; -1 if a skin moves
-        them.
+        Joint whose node contains the mesh, because all vertices follow it rigidly; -1 if a skin
+        moves them.
     sources, uv_indices : (R,) int32
         Vertex and texture coordinate of the figure that each written vertex copies.
     triangles : (T, 3) int32
@@ -56,7 +56,7 @@ class Part:
 
 
 def parts_of(name: str, shape: Shape, influences: Influences | None) -> list[Part]:
-    """Return the parts of a figure; a mesh without parts is one.
+    """Return the parts of a figure; a mesh without parts is a single part.
 
     A part whose vertices all follow the joint of its name is attached to that joint's node, as in
     its original file; others are skinned.
@@ -116,7 +116,7 @@ def _rows(mesh: Mesh, triangles: Ints, count: int) -> dict[int, Ints]:
 
 
 def _joint_of(figure: Figure, influences: Influences, index: int, sources: Ints) -> int:
-    """Return the joint whose node has a part of the mesh, -1 for none."""
+    """Return the joint whose node contains a part of the mesh, -1 for none."""
     skin, skeleton = influences.skin, figure.require_skeleton()
     if not (influence_counts(skin)[sources] == 1).all():
         return -1

@@ -1,4 +1,4 @@
-"""Reader of glTF files written here: arrays, nodes in every frame, the mesh and its skin.
+"""Reader of glTF files written by this program: arrays, nodes in every frame, mesh and skin.
 
 Only the output of ``viewer.export.gltf`` is supported: one buffer without strides. Joints and
 vertices are returned in the figure's space, below the node that rotates and scales the whole

@@ -47,7 +47,7 @@ class PlacedMotion:
     Attributes
     ----------
     actor : Actor
-        The actor of ``placed_actor``.
+        The actor, as returned by ``placed_actor``.
     animation : SampledAnimation
         Its frames.
     up : "y" or "z"
@@ -100,7 +100,7 @@ def placed_actor(scene: Scene, actor: Actor) -> Actor:
 
 
 def common_name(parts: Sequence[PlacedMotion], stem: str) -> str:
-    """Return the name that all motions have, or else the file's."""
+    """Return the name that all motions share, or else the file's name."""
     names = {part.animation.motion.name for part in parts}
     return names.pop() if len(names) == 1 and "" not in names else stem
 

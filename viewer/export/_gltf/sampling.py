@@ -1,4 +1,4 @@
-"""Evaluation of the animations of a glTF file written here.
+"""Evaluation of the animations of a glTF file written by this program.
 
 The evaluation follows glTF 2.0, section 3.11 and appendix C, in double precision, and shares no
 code with other parts of the program.

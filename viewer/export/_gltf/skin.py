@@ -79,7 +79,7 @@ def influences_of(skin: Skin) -> Influences:
         int(counts.max(initial=0)),
     )
     if found.n_joints > _MOST_JOINTS:
-        raise RigError(f"glTF numbers at most {_MOST_JOINTS} joints, found {found.n_joints}")
+        raise RigError(f"glTF supports at most {_MOST_JOINTS} joints, found {found.n_joints}")
     return found
 
 
@@ -91,7 +91,7 @@ def influence_sets(
     ``influences``: influences of V vertices.
     ``sources`` (R,): the vertices, or copies of them, that are written.
     Yields ``joints`` (R, 4) uint8 or uint16: indices into the skin's list of joints; the last joint
-      is the node of fixed vertices. 0 in unused slots, as the specification requires.
+      is the node of fixed vertices. Unused slots are 0, as the specification requires.
     Yields ``weights`` (R, 4): 0 in unused slots.
     """
     skin = influences.skin

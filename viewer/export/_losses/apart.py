@@ -23,6 +23,7 @@ from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import joint_label
 
 _BLOCK = 128  # poses per block, whose matrices fit into the processor's cache
+_BARE_BLOCK = 512  # poses per block of skeletons without a mesh
 _CHUNK = 128  # poses per single-precision estimate
 _LIKELY = 4  # poses per chunk whose farthest vertex is measured first
 _SMALL = 0.05  # if joints add less than this fraction of the rest meshes' distance, skip skinning
@@ -72,14 +73,29 @@ def negligible(figure: Figure, frames: Frames, rows: Rows) -> float:
       distance, since numbers have larger rounding errors there, up to five times the usual one.
     ``rows`` (F,): the frames to use.
     """
-    size, reach = 0.0, 0.0
+    some = frames_between(frames, rows[:: sampling(len(rows))])
+    return tolerance(figure, reach_of(figure, some))
+
+
+def sampling(count: int) -> int:
+    """Return the step between the frames whose distance from the origin is measured."""
+    return max(1, count // _SIZED)
+
+
+def reach_of(figure: Figure, frames: Frames) -> float:
+    """Return the largest coordinate of a joint in frames; 0 without joints."""
+    if figure.skeleton is None:
+        return 0.0
+    return float(np.abs(world_frames(figure, frames)[..., :3, 3]).max(initial=0.0))
+
+
+def tolerance(figure: Figure, reach: float) -> float:
+    """Return ``negligible`` for the largest coordinate of the joints."""
+    size = 0.0
     if figure.mesh is not None and figure.mesh.n_vertices:
         size = box_size(bounding_box(figure.mesh.positions))
     elif figure.skeleton is not None:
         size = float(np.linalg.norm(figure.skeleton.rest_translations, axis=1).sum())
-    if figure.skeleton is not None:
-        some = frames_between(frames, rows[:: max(1, len(rows) // _SIZED)])
-        reach = float(np.abs(world_frames(figure, some)[..., :3, 3]).max(initial=0.0))
     return min(_FAR * _ROUNDING * size, max(_ROUNDING * size, _EPSILON * reach))
 
 
@@ -87,7 +103,7 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     """Return the largest distances between joints and vertices of two sides over all poses.
 
     Poses and vertices that cannot have the largest distance are skipped: the result is exact,
-    although only few vertices are skinned in double precision.
+    although only a few vertices are skinned in double precision.
 
     ``first``, ``second``: sides with the same joints and vertices, in the same space.
     ``rows`` (F,): frames of the first side.
@@ -100,17 +116,18 @@ def apart(first: Side, second: Side, rows: Rows, least: float, frames: Rows | No
     joints, search = Farthest(least, -1, -1), None
     if first.body is not None and second.body is not None:
         search = _Search(first.body, second.body, least)
-    for start in range(0, len(rows), _BLOCK):
+    size = _BARE_BLOCK if search is None else _BLOCK
+    for start in range(0, len(rows), size):
         report(start, len(rows), "frames", "comparing with the original")
-        part = rows[start : start + _BLOCK]
-        one, other = first.poses(part), second.poses(others[start : start + _BLOCK])
+        part = rows[start : start + size]
+        one, other = first.poses(part), second.poses(others[start : start + size])
         off = one.places - other.places
         # Three times as fast as np.linalg.norm.
         joints = _farther(joints, np.sqrt(np.einsum("fja,fja->fj", off, off)), part)
         if search is not None:
             search.look(one, other, part)
-    worst = None if search is None else _told(search.worst)
-    return Apart(_told(joints), worst, len(rows), len(rows))
+    worst = None if search is None else _if_found(search.worst)
+    return Apart(_if_found(joints), worst, len(rows), len(rows))
 
 
 def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthest:
@@ -121,7 +138,7 @@ def _farther(known: Farthest, off: NDArray[np.floating], frames: Rows) -> Farthe
     return Farthest(float(off[row, index]), int(index), int(frames[row]))
 
 
-def _told(found: Farthest) -> Farthest | None:
+def _if_found(found: Farthest) -> Farthest | None:
     return found if found.index >= 0 else None
 
 
@@ -191,7 +208,7 @@ def _apart_one_by_one(first: Side, second: Side, rows: Rows, others: Rows, least
     for row, other in zip(rows[chosen].tolist(), others[chosen].tolist(), strict=True):
         off = np.linalg.norm(_vertices(first, row) - _vertices(second, other), axis=1)
         worst = _farther(worst, off[None], np.array([row]))
-    return Apart(joints, _told(worst), count, len(rows))
+    return Apart(joints, _if_found(worst), count, len(rows))
 
 
 def _vertices(side: Side, row: int) -> Floats:

@@ -101,7 +101,7 @@ def between_losses(
 
 
 def _own_times(animation: SampledAnimation, motion: SampledClip) -> Floats:
-    """Return the times of a capture's frames that lie between frames of an animation, seconds."""
+    """Return the times of a capture's frames that are between frames of an animation, seconds."""
     own = motion.start + np.arange(motion.timing.n_frames) / motion.timing.frame_rate
     place = (own - animation.frames.times[0]) * animation.frame_rate
     is_between = np.abs(place - np.round(place)) > _ON_FRAME

@@ -8,10 +8,20 @@ from pathlib import Path
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.export._losses.apart import apart, apart_notes, negligible
+from viewer.export._losses.apart import (
+    Apart,
+    Farthest,
+    apart,
+    apart_notes,
+    negligible,
+    reach_of,
+    sampling,
+    tolerance,
+)
 from viewer.export._losses.skinned import Side, changing, figure_side
 from viewer.rig.arrays import Floats
-from viewer.rig.motion.evaluation import Frames
+from viewer.rig.figure import Figure
+from viewer.rig.motion.evaluation import Frames, frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.skinning import Skinning
 
@@ -47,6 +57,42 @@ def driven_losses(
     return apart_notes(path, animation.figure, found, first, vertices="driven-vertices")
 
 
+class JointLosses:
+    """Largest error of a file, found part by part; neither the figure nor the file has a mesh.
+
+    The result is that of ``driven_losses``.
+
+    ``how``: skinning, as for ``driven_losses``.
+    ``n_frames``: number of all frames.
+    """
+
+    def __init__(self, how: Skinning, n_frames: int) -> None:
+        self._how, self._n_frames = replace(how, method="lbs"), n_frames
+        self._n_seen, self._reach = 0, 0.0
+        self._worst: Farthest | None = None
+
+    def look(self, part: SampledAnimation, written: Side, shape: Floats) -> None:
+        """Compare all frames of the next part with those in the file."""
+        figure, frames = part.figure, part.frames
+        rows = np.arange(frames.n_frames)
+        expected = figure_side(figure, frames, self._how, shape)
+        found = apart(expected, written, rows, 0.0).joints
+        if found is not None and (self._worst is None or found.distance > self._worst.distance):
+            self._worst = replace(found, frame=found.frame + self._n_seen)
+        sized = rows[(rows + self._n_seen) % sampling(self._n_frames) == 0]
+        if len(sized):
+            self._reach = max(self._reach, reach_of(figure, frames_between(frames, sized)))
+        self._n_seen += frames.n_frames
+
+    def notes(self, path: Path, figure: Figure, first_frame: int) -> list[Diagnostic]:
+        """Return a note with the largest error, if there is one."""
+        worst = self._worst
+        if worst is not None and worst.distance <= tolerance(figure, self._reach):
+            worst = None
+        found = Apart(worst, None, self._n_seen, self._n_seen)
+        return apart_notes(path, figure, found, first_frame, vertices="driven-vertices")
+
+
 def frames_losses(
     path: Path,
     animation: SampledAnimation,
@@ -63,7 +109,7 @@ def frames_losses(
     ``how``: skinning of the mesh; for both motions LBS replaces its method.
     ``span``: half-open range of frames in the file; all if
       omitted.
-    ``is_between``: whether the times of these poses lie between the frames.
+    ``is_between``: whether the times of these poses are between the frames.
     """
     figure, frames = animation.figure, animation.frames
     first, stop = (0, frames.n_frames) if span is None else span

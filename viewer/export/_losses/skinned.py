@@ -20,6 +20,7 @@ from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.evaluation import Frames, frames_between, pose_of, world_frames
+from viewer.rig.motion.joint_positions import joint_positions
 from viewer.rig.shape import joint_shifts
 from viewer.rig.skin import Skin, has_influence, owners, skin_from_entries, skin_rows
 from viewer.rig.skinning import Skinning, deform, skin_used
@@ -116,6 +117,8 @@ def figure_side(
 
     def poses(rows: Rows) -> Poses:
         part = frames_between(frames, rows)
+        if body is None and figure.skeleton is not None:
+            return bare_poses(joint_positions(figure, part), part)
         shifts = part.figure_translations
         world = np.zeros((len(rows), 0, 4, 4))
         if figure.skeleton is not None:
@@ -137,6 +140,13 @@ def figure_side(
     is_linear = how.method == "lbs" or not figure.is_attached
     is_linear &= shapes is None or shapes.is_linear or len(chosen) == 0
     return Side(body, poses, None if is_linear or body is None else exact)
+
+
+def bare_poses(places: Floats, frames: Frames) -> Poses:
+    """Return poses without a mesh: positions of joints (F, J, 3) in some frames."""
+    palette = anchored(np.zeros((len(places), 0, 4, 4)), frames.figure_scales)
+    none = np.zeros((len(places), 0))
+    return Poses(places, palette, frames.figure_translations, none, none)
 
 
 def changing(frames: Frames, still: Floats) -> Rows:

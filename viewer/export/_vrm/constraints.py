@@ -16,7 +16,7 @@ def constraint_items(
 ) -> dict[int, dict[str, Any]]:
     """Return the extension of each constrained node.
 
-    ``constraints``: of a skeleton.
+    ``constraints``: those of a skeleton.
     ``joints`` (J,): nodes of its joints.
     """
     return {

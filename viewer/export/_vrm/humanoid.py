@@ -33,7 +33,7 @@ _PHALANGES = {"Proximal": "Hand", "Intermediate": "Proximal", "Distal": "Interme
 def human_bones(figure: Figure) -> dict[str, int]:
     """Return the joint of each human bone, by its name in VRM 1.0.
 
-    Optional bones whose hierarchy VRM does not allow are left out.
+    Optional bones whose hierarchy VRM does not allow are omitted.
 
     ``figure``: figure with a skeleton, whose humanoid or joint names identify the bones.
     Raises RigError if a required bone is missing.

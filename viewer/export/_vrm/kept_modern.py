@@ -23,50 +23,50 @@ _BINDS = {
 
 def kept_modern(maps: Maps) -> dict[str, Any]:
     """Return the root extensions ``VRMC_vrm`` and ``VRMC_springBone`` of a character."""
-    told = maps.record.extensions
-    found = {"VRMC_vrm": _character(told["VRMC_vrm"], maps)}
-    if isinstance(told.get(_SPRINGS), dict):
-        found[_SPRINGS] = _springs(told[_SPRINGS], maps)
+    data = maps.record.extensions
+    found = {"VRMC_vrm": _character(data["VRMC_vrm"], maps)}
+    if isinstance(data.get(_SPRINGS), dict):
+        found[_SPRINGS] = _springs(data[_SPRINGS], maps)
     return found
 
 
-def _character(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    result = dict(told)
-    bones = part(told, "humanoid", "humanBones")
+def _character(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    result = dict(data)
+    bones = part(data, "humanoid", "humanBones")
     given = bones.items() if isinstance(bones, dict) else ()
     result["humanoid"] = {
-        **(told["humanoid"] if isinstance(told.get("humanoid"), dict) else {}),
+        **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
         "humanBones": {
             bone: {**each, "node": node}
             for bone, each in given
             if (node := maps.joint(part(each, "node"), "bones")) is not None
         },
     }
-    meta = dict(told["meta"]) if isinstance(told.get("meta"), dict) else {}
+    meta = dict(data["meta"]) if isinstance(data.get("meta"), dict) else {}
     if "thumbnailImage" in meta:
         image = maps.image(meta.pop("thumbnailImage"), "textures")
         meta |= {} if image is None else {"thumbnailImage": image}
     result["meta"] = meta
-    if isinstance(part(told, "firstPerson"), dict):
+    if isinstance(part(data, "firstPerson"), dict):
         notes = _rows(
-            part(told, "firstPerson", "meshAnnotations"),
+            part(data, "firstPerson", "meshAnnotations"),
             "node",
             lambda node: maps.drawn(node, "annotations"),
         )
-        result["firstPerson"] = {**told["firstPerson"], "meshAnnotations": notes}
-    if isinstance(part(told, "expressions"), dict):
+        result["firstPerson"] = {**data["firstPerson"], "meshAnnotations": notes}
+    if isinstance(part(data, "expressions"), dict):
         result["expressions"] = {
             kind: {name: _expression(each, maps) for name, each in listed.items()}
             if isinstance(listed, dict) and kind in ("preset", "custom")
             else listed
-            for kind, listed in told["expressions"].items()
+            for kind, listed in data["expressions"].items()
         }
     return result
 
 
-def _rows(told: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
+def _rows(data: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]:
     """Return the objects of a list with translated indices, except those whose index is lost."""
-    rows = told if isinstance(told, list) else []
+    rows = data if isinstance(data, list) else []
     return [
         {**each, name: index}
         for each in rows
@@ -74,21 +74,21 @@ def _rows(told: Any, name: str, found: Callable[[Any], int | None]) -> list[Any]
     ]
 
 
-def _expression(told: Any, maps: Maps) -> Any:
-    if not isinstance(told, dict):
-        return told
-    result = dict(told)
+def _expression(data: Any, maps: Maps) -> Any:
+    if not isinstance(data, dict):
+        return data
+    result = dict(data)
     for key, (name, kind) in _BINDS.items():
-        if key in told:
+        if key in data:
             found = maps.drawn if name == "node" else maps.material
-            result[key] = _rows(told[key], name, lambda index: found(index, kind))  # noqa: B023
+            result[key] = _rows(data[key], name, lambda index: found(index, kind))  # noqa: B023
     return result
 
 
-def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the spring bones; chains with a lost joint are left out as a whole."""
-    result, places, colliders = dict(told), dict[int, int](), list[Any]()
-    for index, each in enumerate(listed(told, "colliders")):
+def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the spring bones; chains with a lost joint are omitted as a whole."""
+    result, places, colliders = dict(data), dict[int, int](), list[Any]()
+    for index, each in enumerate(listed(data, "colliders")):
         node = maps.joint(part(each, "node"), "colliders")
         if node is not None:
             places[index] = len(colliders)
@@ -102,7 +102,7 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
                     places[i] for i in listed(each, "colliders") if type(i) is int and i in places
                 ],
             }
-            for each in listed(told, "colliderGroups")
+            for each in listed(data, "colliderGroups")
             if isinstance(each, dict)
         ]
     else:
@@ -110,20 +110,20 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
         result.pop("colliderGroups", None)
     springs = [
         spring
-        for each in listed(told, "springs")
+        for each in listed(data, "springs")
         if isinstance(each, dict) and (spring := _spring(each, maps, bool(colliders)))
     ]
     return {**result, "springs": springs}
 
 
-def _spring(told: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, Any]:
+def _spring(data: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, Any]:
     """Return one chain; an empty one if a joint is lost."""
-    listed = told.get("joints")
+    listed = data.get("joints")
     joints = _rows(listed, "node", lambda node: maps.joint(node, "spring-joints"))
     if not isinstance(listed, list) or len(joints) < len(listed):
         return {}
-    result = {**told, "joints": joints}
-    if "center" in told:
+    result = {**data, "joints": joints}
+    if "center" in data:
         center = maps.joint(result.pop("center"), "centers")
         result |= {} if center is None else {"center": center}
     if not has_colliders:
@@ -131,10 +131,10 @@ def _spring(told: dict[str, Any], maps: Maps, has_colliders: bool) -> dict[str, 
     return result
 
 
-def kept_toon(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the toon shading of a material; textures that cannot be read are left out."""
+def kept_toon(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the toon shading of a material; textures that cannot be read are omitted."""
     result = {}
-    for name, each in told.items():
+    for name, each in data.items():
         if name.endswith("Texture") and isinstance(each, dict):
             index = maps.texture(each.get("index"), "textures")
             if index is not None:

@@ -29,33 +29,33 @@ def kept_old(maps: Maps, names: list[str]) -> dict[str, Any]:
 
     ``names``: names of the written materials.
     """
-    told = maps.record.extensions["VRM"]
-    result = dict(told)
-    bones = listed(told, "humanoid", "humanBones")
+    data = maps.record.extensions["VRM"]
+    result = dict(data)
+    bones = listed(data, "humanoid", "humanBones")
     result["humanoid"] = {
-        **(told["humanoid"] if isinstance(told.get("humanoid"), dict) else {}),
+        **(data["humanoid"] if isinstance(data.get("humanoid"), dict) else {}),
         "humanBones": _nodes(bones, maps, "bones"),
     }
-    meta = dict(told["meta"]) if isinstance(told.get("meta"), dict) else {}
+    meta = dict(data["meta"]) if isinstance(data.get("meta"), dict) else {}
     if meta.get("texture", -1) != -1:
         texture = maps.texture(meta.pop("texture"), "textures")
         meta |= {} if texture is None else {"texture": texture}
     result["meta"] = meta
-    if isinstance(told.get("firstPerson"), dict):
-        result["firstPerson"] = _first_person(told["firstPerson"], maps)
-    groups = listed(told, "blendShapeMaster", "blendShapeGroups")
+    if isinstance(data.get("firstPerson"), dict):
+        result["firstPerson"] = _first_person(data["firstPerson"], maps)
+    groups = listed(data, "blendShapeMaster", "blendShapeGroups")
     if groups:
         result["blendShapeMaster"] = {
-            **told["blendShapeMaster"],
+            **data["blendShapeMaster"],
             "blendShapeGroups": [
                 {**each, "binds": _of_meshes(each.get("binds"), maps, "morph-binds")}
                 for each in groups
                 if isinstance(each, dict)
             ],
         }
-    if isinstance(told.get("secondaryAnimation"), dict):
-        result["secondaryAnimation"] = _springs(told["secondaryAnimation"], maps)
-    result["materialProperties"] = _materials(listed(told, "materialProperties"), maps, names)
+    if isinstance(data.get("secondaryAnimation"), dict):
+        result["secondaryAnimation"] = _springs(data["secondaryAnimation"], maps)
+    result["materialProperties"] = _materials(listed(data, "materialProperties"), maps, names)
     return {"VRM": result}
 
 
@@ -78,19 +78,19 @@ def _of_meshes(rows: Any, maps: Maps, kind: str) -> list[Any]:
     ]
 
 
-def _first_person(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    result = dict(told)
-    if told.get("firstPersonBone", -1) != -1:
-        bone = maps.joint(told["firstPersonBone"], "bones")
+def _first_person(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    result = dict(data)
+    if data.get("firstPersonBone", -1) != -1:
+        bone = maps.joint(data["firstPersonBone"], "bones")
         result["firstPersonBone"] = -1 if bone is None else bone
-    notes = _of_meshes(told.get("meshAnnotations"), maps, "annotations")
+    notes = _of_meshes(data.get("meshAnnotations"), maps, "annotations")
     return {**result, "meshAnnotations": notes}
 
 
-def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
-    """Return the springs; groups of colliders keep their places, because springs index them."""
+def _springs(data: dict[str, Any], maps: Maps) -> dict[str, Any]:
+    """Return the springs; groups of colliders keep their indices, because springs refer to them."""
     groups = []
-    for each in listed(told, "boneGroups"):
+    for each in listed(data, "boneGroups"):
         if not isinstance(each, dict):
             continue
         bones = [maps.joint(bone, "spring-joints") for bone in listed(each, "bones")]
@@ -100,22 +100,22 @@ def _springs(told: dict[str, Any], maps: Maps) -> dict[str, Any]:
             group["center"] = -1 if center is None else center
         groups.append(group)
     colliders = []
-    for each in listed(told, "colliderGroups"):
+    for each in listed(data, "colliderGroups"):
         node = maps.joint(part(each, "node"), "colliders")
         # A group without a joint would be invalid: it moves to the first joint, without colliders.
         empty = {"node": maps.first_joint, "colliders": []}
         is_kept = node is not None and isinstance(each, dict)
         colliders.append({**each, "node": node} if is_kept else empty)
-    return {**told, "boneGroups": groups, "colliderGroups": colliders}
+    return {**data, "boneGroups": groups, "colliderGroups": colliders}
 
 
-def _materials(told: list[Any], maps: Maps, names: list[str]) -> list[Any]:
+def _materials(data: list[Any], maps: Maps, names: list[str]) -> list[Any]:
     """Return the properties of each written material, in their order."""
     result: list[Any] = [{"name": name, **_PLAIN} for name in names]
     for own, written in maps.materials.items():
-        if own >= len(told) or not isinstance(told[own], dict):
+        if own >= len(data) or not isinstance(data[own], dict):
             continue
-        each = dict(told[own])
+        each = dict(data[own])
         textures = part(each, "textureProperties")
         given = textures.items() if isinstance(textures, dict) else ()
         each["textureProperties"] = {

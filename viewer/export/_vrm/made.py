@@ -37,7 +37,7 @@ def made_character(
     ``bones``: joint of each human bone.
     ``meta``: from ``checked_meta``.
     """
-    told: dict[str, Any] = {
+    data: dict[str, Any] = {
         "specVersion": "1.0",
         "meta": meta,
         "humanoid": {
@@ -48,11 +48,11 @@ def made_character(
     }
     expressions = _expressions(built)
     if expressions:
-        told["expressions"] = {"preset": expressions}
+        data["expressions"] = {"preset": expressions}
     views = [] if body.figure.mesh is None else _views(body.figure.mesh, built)
     if views:
-        told["firstPerson"] = {"meshAnnotations": views}
-    return told
+        data["firstPerson"] = {"meshAnnotations": views}
+    return data
 
 
 def _expressions(built: Built) -> dict[str, Any]:

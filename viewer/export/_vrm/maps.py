@@ -58,7 +58,7 @@ class Maps:
 
     @property
     def materials(self) -> dict[int, int]:
-        """The written material of each material of the file that is used."""
+        """Written materials, by material of the original file; only those in use."""
         return self._materials
 
     def meshes(self, mesh: Any, kind: str) -> list[int]:
@@ -83,15 +83,15 @@ class Maps:
         """Return a written texture; None, counted as lost, if its image cannot be read."""
         stored = self.record.textures
         listed = () if stored is None else stored.textures
-        told = listed[index] if is_index(index, len(listed)) else None
-        if not isinstance(told, dict):
+        texture = listed[index] if is_index(index, len(listed)) else None
+        if not isinstance(texture, dict):
             self.lost[kind] += 1
             return None
-        source = self.image(told.get("source"), kind)
+        source = self.image(texture.get("source"), kind)
         if source is None:
             return None
         item = {"source": source}
-        sampler, samplers = told.get("sampler"), () if stored is None else stored.samplers
+        sampler, samplers = texture.get("sampler"), () if stored is None else stored.samplers
         if isinstance(sampler, int) and is_index(sampler, len(samplers)):
             item = {"sampler": self._same("samplers", samplers[sampler]), **item}
         return self._same("textures", item)

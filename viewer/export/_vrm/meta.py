@@ -34,15 +34,15 @@ def checked_meta(meta: VrmMeta, figure: str) -> dict[str, Any]:
     }
 
 
-def changed_meta(told: dict[str, Any], meta: VrmMeta, version: int) -> dict[str, Any]:
+def changed_meta(data: dict[str, Any], meta: VrmMeta, version: int) -> dict[str, Any]:
     """Return the meta data of a file with the requested changes.
 
-    ``told``: meta data of the file.
+    ``data``: meta data of the file.
     ``meta``: requested values; empty ones keep those of the file.
     ``version``: 0 or 1; the names of the fields differ.
     """
     names = ("title", "author") if version == 0 else ("name", "authors")
-    changed = dict(told)
+    changed = dict(data)
     if meta.name:
         changed[names[0]] = text_of(meta.name)
     listed = [text_of(author) for author in meta.authors if author]

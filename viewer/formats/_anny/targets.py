@@ -45,7 +45,7 @@ ACTIONS = tuple(sorted([*(a + s for a in _SIDED for s in ("Left", "Right")), *_M
 """Facial actions, named as in ARKit."""
 
 Target = tuple[str, tuple[str, ...]]
-"""A target's file, and the variations of phenotypes that it belongs to."""
+"""A target's file, and the variations of phenotypes to which it belongs."""
 
 
 def phenotype_targets(package: Package) -> list[Target]:

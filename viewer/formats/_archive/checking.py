@@ -30,7 +30,7 @@ _ROWS = {
 
 
 def archive_of(source: Source) -> Archive:
-    """Return the archive of a source, opened once; raises as ``open_archive`` does."""
+    """Return the archive of a source, opened once; errors as of ``open_archive``."""
     return source.once(open_archive)
 
 
@@ -65,7 +65,7 @@ def finite(
     Raises
     ------
     FormatError
-        If a number is not finite; the message gives the key and the number.
+        If a number is not finite; the message states the key and the number.
     """
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
@@ -112,7 +112,7 @@ def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
         lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
         if part == "frames":
             return held_rows(numbers, lost)
-        # The whole matrix is replaced: a single 0 would give a different transform.
+        # The whole matrix is replaced, as a single 0 would result in a different transform.
         return np.where(lost[:, None, None], np.eye(4), numbers)
     return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
 
@@ -134,7 +134,7 @@ def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int
     Raises
     ------
     FormatError
-        If an index is not from 0 to V - 1; if the file is not refused, another corner of the
+        If an index is not between 0 and V - 1; if the file is not refused, another corner of the
         triangle replaces it.
     """
     if are_indices(values, n_vertices):

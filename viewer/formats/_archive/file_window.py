@@ -9,8 +9,8 @@ from viewer.formats._archive.stored_file import StoredFile
 
 __all__ = ["Data", "FileWindow"]
 
-_PAGE = 1 << 16  # bytes read at a time for small values
-_PIECE = 1 << 20  # bytes read at a time for arrays
+_PAGE = 1 << 16  # number of bytes read at a time for small values
+_PIECE = 1 << 20  # number of bytes read at a time for arrays
 
 
 class FileWindow:
@@ -54,7 +54,7 @@ class FileWindow:
             found = self[start:end].find(wanted)
             if found >= 0:
                 return start + found
-            # The bytes may lie across the end of a piece.
+            # The bytes may extend across the end of a piece.
             start = end if end == stop else end - len(wanted) + 1
         return -1
 

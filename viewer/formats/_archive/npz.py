@@ -13,10 +13,11 @@ numpy's reader would evaluate it as Python code, and warns about files of Python
 
 from __future__ import annotations
 
+import math
 import re
 import struct
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import IO, Any
 
@@ -61,12 +62,19 @@ class _Header:
     n_items: int
     offset: int  # position of the values, in bytes
 
-    def deferred(self, load: Callable[[], NDArray[Any]]) -> Deferred:
-        return Deferred(self.shape, self.dtype.newbyteorder("="), load)
+    def deferred(
+        self,
+        load: Callable[[], NDArray[Any]],
+        blocks: Callable[[int], Iterator[NDArray[Any]]] | None = None,
+    ) -> Deferred:
+        has_rows = bool(self.shape) and not self.is_fortran and self.dtype.isnative
+        return Deferred(
+            self.shape, self.dtype.newbyteorder("="), load, blocks if has_rows else None
+        )
 
 
 def open_npz(directory: ZipDirectory) -> Archive:
-    """Open an ``.npz`` file; raises as ``open_archive`` does."""
+    """Open an ``.npz`` file; errors as of ``open_archive``."""
     directory.check(_key)
     members = directory.members
     values = {_key(member): _open_member(directory, member) for member in members}
@@ -117,7 +125,8 @@ def _open_member(directory: ZipDirectory, member: zipfile.ZipInfo) -> Value:
         header = _read_header(storage, key, stream, member.file_size)
     if isinstance(header, Opaque):
         return header
-    return header.deferred(partial(_load_member, storage, member, header))
+    how = storage, member, header
+    return header.deferred(partial(_load_member, *how), partial(_member_blocks, *how))
 
 
 def _read_header(storage: StoredFile, key: str, stream: IO[bytes], size: int) -> _Header | Opaque:
@@ -184,6 +193,29 @@ def _load_member(storage: StoredFile, member: zipfile.ZipInfo, header: _Header) 
         raise _damaged(storage, key, problem) from None
 
 
+def _member_blocks(
+    storage: StoredFile, member: zipfile.ZipInfo, header: _Header, count: int
+) -> Iterator[NDArray[Any]]:
+    """Yield blocks of rows, all in the same memory."""
+    key = _key(member)
+    row = math.prod(header.shape[1:])
+    try:
+        with (
+            storage.open() as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(member) as stream,
+        ):
+            stream.read(header.offset)
+            flat = np.empty(min(count, header.shape[0]) * row, header.dtype)
+            for start in range(0, header.shape[0], count):
+                n_rows = min(count, header.shape[0] - start)
+                part = flat[: n_rows * row]
+                _fill(storage, key, part, stream)
+                yield part.reshape(n_rows, *header.shape[1:])
+    except DAMAGE as problem:
+        raise _damaged(storage, key, problem) from None
+
+
 def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[Any]:
     try:
         with storage.open() as stream:
@@ -203,7 +235,16 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
         flat = np.empty(header.n_items, header.dtype)
     except MemoryError:
         raise storage.fault(key, Phrase("npy-memory", size=size)) from None
-    # The data is read in chunks, because reading it as a whole would need twice the memory.
+    _fill(storage, key, flat, stream)
+    try:
+        return shaped(flat, header.shape, header.is_fortran)
+    except MisfitError as problem:
+        raise storage.fault(key, problem.problem) from None
+
+
+def _fill(storage: StoredFile, key: str, flat: NDArray[Any], stream: IO[bytes]) -> None:
+    """Read the values of an array in chunks: as a whole they would need twice the memory."""
+    size = flat.nbytes
     room = flat.view(np.uint8) if size else np.empty(0, np.uint8)
     done = 0
     while done < size:
@@ -212,7 +253,3 @@ def _load(storage: StoredFile, key: str, header: _Header, stream: IO[bytes]) -> 
             raise storage.fault(key, Phrase("npy-cut", expected=size, found=done))
         room[done : done + len(chunk)] = np.frombuffer(chunk, np.uint8)
         done += len(chunk)
-    try:
-        return shaped(flat, header.shape, header.is_fortran)
-    except MisfitError as problem:
-        raise storage.fault(key, problem.problem) from None

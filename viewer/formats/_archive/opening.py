@@ -11,7 +11,7 @@ from viewer.formats._source import Source
 
 __all__ = ["is_archive", "open_archive"]
 
-_LARGE = 32 << 20  # bytes; smaller pickles are read as a whole
+_LARGE = 32 << 20  # bytes up to which pickles are read as a whole
 _ZIP = (b"PK\x03\x04", b"PK\x05\x06")
 _NPY = b"\x93NUMPY"
 _LFS = b"version https://git-lfs"
@@ -68,7 +68,7 @@ def open_archive(source: Source) -> Archive:
 
 
 def _pickle_data(source: Source) -> Data:
-    """Return the bytes of a pickle; those of a large file are read on demand."""
+    """Return the bytes of a pickle; the bytes of a large file are read on demand."""
     from viewer.formats._archive.stored_file import StoredFile
 
     if source._data is None:

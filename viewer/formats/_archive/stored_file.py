@@ -54,7 +54,7 @@ class StoredFile:
             self._data, self.size = None, self._stamp[0]
 
     def _is_in_file(self) -> bool:
-        """Return whether the bytes are those of the file, apart from a final Ctrl-Z."""
+        """Return whether the bytes are the file's bytes, apart from a final Ctrl-Z."""
         if self._data is None:
             return True
         with self.path.open("rb") as file:
@@ -78,7 +78,7 @@ class StoredFile:
         return file
 
     def fault(self, key: str, problem: Phrase) -> FormatError:
-        """Return an error that gives the file and the key."""
+        """Return an error that states the file and the key."""
         values = {"item": printable(key, 60), "problem": problem}
         return FormatError(Diagnostic("F002.archive-value", self.path, values=values))
 

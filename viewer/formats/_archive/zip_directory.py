@@ -33,7 +33,7 @@ MAX_RATIO = 100
 """Largest ratio of unpacked to packed size; smooth motions reach 10 to 20."""
 
 SMALL = 64 << 20
-"""Bytes; below this any ratio is accepted, as arrays of zeros compress well."""
+"""Unpacked size in bytes below which any ratio is accepted, as arrays of zeros compress well."""
 
 _ENCRYPTED = 0x41  # flag bits 0 and 6
 _METHODS = {12: "bzip2", 14: "LZMA", 93: "Zstandard"}
@@ -90,7 +90,7 @@ class ZipDirectory:
 
 @contextmanager
 def open_directory(source: Source) -> Iterator[ZipDirectory]:
-    """Open a zip archive; damage found meanwhile is an error of the source.
+    """Open a zip archive; damage found while it is open is an error of the source.
 
     Raises
     ------

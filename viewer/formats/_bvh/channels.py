@@ -23,7 +23,7 @@ __all__ = [
     "translations_of",
 ]
 
-_CHUNK = 256  # frames at a time, so that their numbers fit into the processor's cache
+_CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +33,8 @@ class Table:
     names: tuple[str, ...]
     parents: list[int]
     offsets: Floats  # (J, 3)
-    columns: list[list[tuple[int, int]]]  # per joint: code of the channel, column
-    ends: list[tuple[int, list[float]]]  # joint, offset of an End Site
+    columns: list[list[tuple[int, int]]]  # code and column of each channel, per joint
+    ends: list[tuple[int, list[float]]]  # joint and offset of each End Site
     n_channels: int
 
     @property
@@ -92,7 +92,7 @@ def table_of(source: Source, joints: list[BvhJoint]) -> Table:
 
 
 def rotations_of(table: Table, values: Floats) -> Floats:
-    """Multiply each joint's rotation channels, all joints with the same axes at once: (N, J, 4)."""
+    """Multiply each joint's rotation channels, joints with the same axes together: (N, J, 4)."""
     rotations = np.empty((len(values), len(table.names), 4))
     groups: dict[tuple[int, ...], list[int]] = {}
     turns = [[(code, column) for code, column in row if code >= 3] for row in table.columns]

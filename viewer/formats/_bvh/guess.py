@@ -26,7 +26,7 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
-_LONG = 2.0  # ratio of the z extent to the y extent above which z is up
+_LONG = 2.0  # ratio of z extent to y extent above which z is up
 _UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
 _LOOKS = 16  # number of frames to examine
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
@@ -57,7 +57,7 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
 
 
 def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
-    """Return the figure's unit, facts and a note about it.
+    """Return the figure's unit, and facts and a note about it.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
     Returns
     -------
     unit : str
-        As in ``Figure.unit``: metres, centimetres or millimetres, whichever gives a plausible human
-        height; empty if none does.
+        As in ``Figure.unit``: metres, centimetres or millimetres, whichever results in a plausible
+        human height; empty if none does.
     facts : tuple of (str, str)
         As in ``Figure.facts``: ``("unit", "cm, estimated from …")``.
     note : Phrase or None

@@ -152,7 +152,7 @@ def _held_frames(source: Source, start: int, width: int, declared: int | None) -
     words = read_words(source.data, start, len(source.data))
     begins, sizes = words.rows()
     rest = 0
-    if (sizes == width).sum() * 2 > len(sizes):  # one frame per line
+    if (sizes == width).sum() * 2 > len(sizes):  # the file has one frame per line
         begins, sizes, rest = _without_rest(words, begins, sizes, width)
         begins, sizes = begins[:declared], sizes[:declared]
     else:

@@ -1,8 +1,8 @@
 """Part-by-part reading of long ``.bvh`` files, in memory that does not depend on their length.
 
-A file can be streamed if it is regular: all frames are declared, each is on a line of its own, and
-there is nothing to report about them. Any other file must be read as a whole by ``bvh.read``, which
-finds and reports all errors.
+A file can be streamed if it is regular: the number of frames is declared, each frame has its own
+line, and there is nothing to report about the frames. Any other file must be read as a whole by
+``bvh.read``, which finds and reports all errors.
 """
 
 from __future__ import annotations
@@ -38,14 +38,14 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["BvhStream", "Irregular", "open_stream"]
 
-_HEAD = 1 << 20  # bytes that must contain the hierarchy
-_PART = 1 << 19  # bytes that are parsed at once, plus the rest of the last line
-_LONGEST = 1 << 24  # bytes of a line
+_HEAD = 1 << 20  # maximum number of bytes up to the end of the hierarchy
+_PART = 1 << 19  # bytes per part, which is extended to the end of its last line
+_LONGEST = 1 << 24  # maximum length of a line, bytes
 _MARK = b"\xef\xbb\xbf"  # byte order mark, which Source removes
 
 
-class Irregular(Exception):  # noqa: N818 - it is no error
-    """The file must be read as a whole."""
+class Irregular(Exception):  # noqa: N818 - it is not an error
+    """Raised if a file is not regular, so that it must be read as a whole."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +62,7 @@ class BvhStream:
         Offset of the first frame in the file.
     motion : SkeletonMotion
         The skeleton, with the few frames that the estimates need. The timing of its clip has all
-        frames, each with the row of one of these.
+        frames, each of which refers to the row of one of these few.
     """
 
     path: Path
@@ -80,19 +80,23 @@ class BvhStream:
         """Whether a joint with a parent has position channels."""
         return bool(inner_moves(self.table))
 
-    def clips(self) -> Iterator[SampledClip]:
-        """Yield the frames as clips of consecutive parts, each of which starts at 0 seconds.
+    def clips(self, first: int, stop: int) -> Iterator[SampledClip]:
+        """Yield a range of frames as clips of consecutive parts, each starting at 0 seconds.
 
-        Raises Irregular if a part is invalid, also after other parts have been yielded.
+        Raises Irregular if any part of the file is invalid, even if parts have already been
+        yielded.
         """
-        clip, count = self.motion.clip, 0
-        is_zero = True
+        clip, count, is_zero = self.motion.clip, 0, True
         for part in _parts(self.path, self.start):
             values = parsed_rows(part, self.table.n_channels)
             is_zero = is_zero and not _moves_inner(self.table, values)
+            chosen = values[max(first - count, 0) : max(stop - count, 0)]
             count += len(values)
-            yield clip_of(self.table, values, clip.name, clip.timing.frame_rate)
-        # The whole reader reports position channels of inner joints that are all zero.
+            if len(chosen):
+                yield clip_of(self.table, chosen, clip.name, clip.timing.frame_rate)
+            if len(chosen) < len(values):
+                _check_reach(self.table, values)
+        # Reading the whole file reports position channels of inner joints that are all zero.
         base = offsets_replaced(self.table)
         if count != self.n_frames or (is_zero and base[inner_moves(self.table)].any()):
             raise Irregular
@@ -179,12 +183,17 @@ def clip_of(table: Table, values: Floats, name: str, rate: float) -> SampledClip
     """Return frames as a clip; raises Irregular if a translation is beyond the limit."""
     translations = None
     if table.moves:
-        shifts = shifts_of(table, values, offsets_replaced(table))
-        if is_beyond(shifts).any():
-            raise Irregular
-        translations = placed(table, shifts)
+        translations = placed(table, _check_reach(table, values))
     rows = np.arange(len(values), dtype=np.int32)
     return SampledClip(name, Timing(rate, rows), rotations_of(table, values), translations)
+
+
+def _check_reach(table: Table, values: Floats) -> Floats:
+    """Return the translations of frames: (N, M); raises Irregular if one is beyond the limit."""
+    shifts = shifts_of(table, values, offsets_replaced(table))
+    if is_beyond(shifts).any():
+        raise Irregular
+    return shifts
 
 
 def _moves_inner(table: Table, values: Floats) -> bool:

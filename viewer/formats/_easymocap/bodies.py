@@ -153,7 +153,8 @@ class Rows:
 
     frames: list[int] = field(default_factory=list)
     paths: list[str] = field(default_factory=list)
-    places: list[int] = field(default_factory=list)  # indices in the files' lists of people
+    # Indices of the records in the files' lists of people.
+    places: list[int] = field(default_factory=list)
 
     def keep_origin(self, frame: int, path: str, place: int) -> None:
         """Store the origin of an accepted record."""
@@ -164,7 +165,7 @@ class Rows:
     def timing(
         self, n_frames: int, rate: float, first_frame: int, keep: Bools | None = None
     ) -> Timing:
-        """Return the timing of the kept rows; the person is absent in all other frames."""
+        """Return the timing of the valid rows; the person is absent in all other frames."""
         rows = np.full(n_frames, -1, dtype=np.int32)
         frames = np.array(self.frames, dtype=np.int64)
         frames = frames if keep is None else frames[keep]

@@ -48,7 +48,7 @@ _PART = re.compile(rb"[ \t]+(rows|cols|dt|data)[ \t]*:[ \t]*(.*)")
 _ITEM = re.compile(rb"[ \t]*-[ \t]*(.*)")
 _MOST = 100_000  # maximum number of elements of a matrix
 _NEAR = 1e-3  # tolerance for a rotation matrix; calibrations have few digits
-_LARGEST = 1e9  # limit of pixels in a calibration, and of a camera's distance in scene units
+_LARGEST = 1e9  # maximum pixels in a calibration, and maximum distance of a camera in scene units
 _SHORTEST = 1e-3  # minimum focal length, pixels
 _MOST_BENT = 1e6  # maximum distortion coefficient
 
@@ -208,7 +208,7 @@ def _pixels(value: Value | None) -> int:
 
 @dataclass(slots=True)
 class _Matrix:
-    """A matrix being read line by line."""
+    """A matrix that is being read line by line."""
 
     key: str
     line: int

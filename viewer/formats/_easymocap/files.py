@@ -148,7 +148,7 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
 
 
 def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
-    """Assign a frame to every file: numbered files keep their gaps, others are consecutive."""
+    """Assign a frame to every file: by number, with gaps, if possible; otherwise consecutively."""
     stems = {name: name[: -len(_SUFFIX)] for names in found for name in names}
     files = FrameFiles(folders)
     place: dict[str, int] = {}

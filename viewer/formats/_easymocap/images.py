@@ -74,7 +74,7 @@ class ImageFolders:
         return picture_dimensions(files[min(files)]) if files else None
 
     def sized(self, view: CameraView) -> CameraView:
-        """Return a camera with the size of its images if the calibration does not give it."""
+        """Return a camera with the size of its images if the calibration does not state it."""
         size = None if view.size is not None else self.size_of(view.name)
         return view if size is None else replace(view, size=size)
 
@@ -118,7 +118,7 @@ def find_images(
     Raises
     ------
     FormatError
-        If the given folder has images of none of the cameras.
+        If the given folder has no images of any camera.
     """
     for parent in [given] if given is not None else [each / _FOLDER for each in parents]:
         folders = {view.name: parent / view.name for view in views if _is_name(view.name)}
@@ -144,7 +144,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
     try:
         files = sorted(folder.iterdir())
     except OSError:
-        return {}  # reported as missing frames
+        return {}  # all frames are then reported as missing
     pictures = [path for path in files if path.suffix.lower() in _SUFFIXES]
     plain = {int(path.stem): path for path in pictures if _PLAIN.fullmatch(path.stem)}
     ends = ((_ENDING.search(path.stem), path) for path in pictures)

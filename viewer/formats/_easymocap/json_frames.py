@@ -61,7 +61,7 @@ class RecordError(MisfitError):
 
 
 class _RepeatedKeyError(ValueError):
-    """An object with a repeated key, which is the text of the error."""
+    """Error about an object with a repeated key, which is the error's text."""
 
 
 def _unique(pairs: list[tuple[str, Any]]) -> Record:
@@ -263,7 +263,7 @@ def take_row(record: Record, key: str, count: int, put: Any) -> None:
             put(values)
             return
     except (KeyError, TypeError, ValueError, OverflowError):
-        pass  # reported below
+        pass  # the error is reported below
     values = row_of(record, key)
     if len(values) != count:
         raise RecordError(key, Phrase("record-count", expected=count, found=len(values)))

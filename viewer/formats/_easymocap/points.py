@@ -140,7 +140,7 @@ class PointRows(Rows):
                     self.buffer.fromlist(list(chain.from_iterable(certain)))
                     return
         except (TypeError, ValueError, OverflowError):
-            pass  # reported below
+            pass  # the error is reported below
         if not isinstance(rows, list):
             raise RecordError(key, Phrase("record-points", expected=count, found=describe(rows)))
         if len(rows) != count:
@@ -156,7 +156,7 @@ class PointRows(Rows):
             (int(row), "", RecordError(KEY, Phrase("record-unseen", n=int(is_odd[row].sum()))))
             for row in np.flatnonzero(is_odd.any(axis=1))
         ]
-        points.flags.writeable = False  # so that it is not copied again
+        points.flags.writeable = False  # a read-only array is not copied again
         return points, faults
 
     def _rows(self) -> Floats:

@@ -132,7 +132,7 @@ class Reading:
             except RecordError as problem:
                 self._fault_of(path, place, problem, problem.key)
                 continue
-            if person < 0:  # The identity is unknown: the number is unique only within the frame.
+            if person < 0:  # the identity is unknown: the number is unique only within the frame
                 person = min(seen) - 1 if -1 in seen else -1
                 self.note("F007.record-untracked", path)
             if person in seen:

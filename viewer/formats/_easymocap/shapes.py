@@ -23,7 +23,7 @@ def hold(rows: Floats, is_given: Bools, known: Floats | None) -> Floats:
     is_given : (N,) bool
         True for rows in the file. Non-finite rows are preserved, but not repeated.
     known : (C,) or None
-        The last valid row before all of these; None stands for 0.
+        The last valid row before all of these; None means 0.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""The child process that reads an ``.fbx``: its limits, and the errors with which it can end."""
+"""Child process that reads an ``.fbx``: its limits, and the errors with which it can end."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from viewer.formats._source import Source
 
 __all__ = ["run_worker"]
 
-_SECONDS = 60.0  # time limit of the smallest files
+_SECONDS = 60.0  # time limit for the smallest files, seconds
 _STEP = 1 << 20  # bytes per step, which take about 0.1 s to read
 _SECONDS_PER_STEP = 2.0  # seconds added to the time limit for each step
 _MEMORY = 4 << 30  # bytes that the child may use for the smallest files

@@ -71,7 +71,7 @@ def node_file(source: Source) -> NodeFile:
 
 def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints) -> NodeTree:
     local, parents = arrays["local"], arrays["parents"]
-    # The root has no name in the file; the FBX SDK calls it that.
+    # The root has no name in the file; this is its name in the FBX SDK.
     named = (
         name or ("RootNode" if parent < 0 else "")
         for name, parent in zip(names, parents.tolist(), strict=True)

@@ -89,7 +89,7 @@ def _has_alpha(image: Bytes | None) -> bool:
 
 
 def _picture_name(source: Source, names: list[str]) -> str:
-    """Return the first path at which the picture exists, else the first path stated."""
+    """Return the first path at which the picture exists; if there is none, its bare file name."""
     folder = source.path.parent
     stated = [name.replace("\\", "/") for name in names if name]
     bare = PurePosixPath(stated[0]).name if stated else ""
@@ -102,7 +102,7 @@ def _picture_name(source: Source, names: list[str]) -> str:
 
 
 def _picture(source: Source, content: bytes, name: str) -> Bytes | None:
-    """Return the pixels of a picture embedded in the file, or else of one below its folder."""
+    """Return the pixels of a picture that is embedded in the file or lies below its folder."""
     if not content:
         return load_image(source, name, None) if name else None
     try:

@@ -174,7 +174,7 @@ def _targets(offsets: list[Floats]) -> MorphTargets | None:
 
 
 def _normal_targets(rows: list[Floats], linear: Floats) -> MorphTargets | None:
-    """Return the offsets of normals; None if the file has none; they are then recomputed."""
+    """Return the offsets of normals; None if the file has none, so that they are recomputed."""
     if not any(each.any() for each in rows):
         return None
     return _targets([_turned(each, linear, unit=False) for each in rows])

@@ -23,7 +23,7 @@ _LIGHT = 1e-6  # relative rounding error of a unit stated by an exporter
 
 
 def main(arguments: list[str]) -> None:
-    """Read a file, write the message, and exit without any clean-up."""
+    """Read a file, write the message, and exit without cleaning up."""
     _limit_memory()
     gc.disable()
     import ufbx

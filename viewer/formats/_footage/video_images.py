@@ -80,5 +80,5 @@ class VideoImages:
 
 
 def video_rate(path: Path) -> float:
-    """Return the frames per second of a video; raises as ``VideoImages`` does."""
+    """Return the frames per second of a video; errors as of ``VideoImages``."""
     return VideoFrames(path).rate

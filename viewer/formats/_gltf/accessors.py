@@ -195,8 +195,9 @@ class Accessors:
     def components(self, index: int) -> Floats | None:
         """Return the components of an accessor as stored, not normalised: (N, C).
 
-        None if the data is elsewhere: compressed with Draco, for instance. As the caller does not
-        store them, they are not counted as decoded data, although they must fit within the limit.
+        None if the data is stored elsewhere, for instance compressed with Draco. As the caller does
+        not store them, they are not counted as decoded data, although they must fit within the
+        limit.
 
         Raises
         ------

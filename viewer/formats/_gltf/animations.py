@@ -18,7 +18,7 @@ from viewer.formats._nodes.content import NodeAnimation, NodeChannel
 
 __all__ = ["read_animations"]
 
-_SAME_TIME = 1e-4  # seconds; rounding error of times in JSON
+_SAME_TIME = 1e-4  # rounding error of times in JSON, seconds
 
 
 @dataclass(slots=True)
@@ -34,7 +34,7 @@ def read_animations(document: Document, targets: Targets) -> tuple[NodeAnimation
     """Return the animations that are valid, except for keys that are read later.
 
     An invalid animation is omitted with a warning. The keys of the first one are read, because it
-    is played by default; if errors are kept, all keys are read.
+    is played by default; if errors are only recorded, all keys are read.
     """
     table = document.table("animations")
     unused = _Unused()
@@ -97,7 +97,7 @@ def _plain_channels(
     """Return the nodes and the time accessors of channels; None if any is invalid or unusual.
 
     Files may have tens of thousands of channels, nearly all in the form that is handled here.
-    Handling them takes less time than parsing the JSON.
+    This function takes less time than parsing the JSON.
     """
     try:
         moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}

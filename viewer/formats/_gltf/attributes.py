@@ -34,7 +34,7 @@ class Attributes:
     n_vertices : int
         Number of elements that each accessor must have.
     rows : (V,) int32 or None
-        Vertices to read, if other primitives use the rest; None for all.
+        Vertices to read, if other primitives use the remaining ones; None for all.
     decoded : dict
         Components of the attributes that are compressed with Draco.
     """
@@ -70,7 +70,7 @@ class Attributes:
         return index
 
     def floats(self, name: str, *kinds: str) -> Floats | None:
-        """Return an attribute, (V, C); None if it is missing. Raises as ``accessor`` does."""
+        """Return an attribute, (V, C); None if it is missing; errors as of ``accessor``."""
         index = self.accessor(name)
         if index < 0:
             return None
@@ -158,7 +158,7 @@ def read_uvs(attributes: Attributes) -> tuple[Floats, ...]:
         name = f"TEXCOORD_{number}"
         uvs = attributes.floats(name, "VEC2")
         if uvs is None:
-            # Materials refer to sets by number, so a gap in the numbers is kept.
+            # Materials refer to sets by number, so gaps in the numbers are preserved.
             uvs = np.zeros((attributes.n_rows, 2))
         uvs = attributes.finite(name, uvs)
         found.append(np.column_stack([uvs[:, 0], 1.0 - uvs[:, 1]]))
@@ -177,7 +177,7 @@ def read_colors(attributes: Attributes) -> Floats | None:
 
 
 def _is_finite(values: NDArray[Any]) -> bool:
-    """Return whether all numbers are finite and their squares do not overflow in sum."""
+    """Return whether all numbers are finite and the sum of their squares does not overflow."""
     flat = values.ravel()
     with np.errstate(over="ignore", invalid="ignore"):
         return bool(np.isfinite(np.dot(flat, flat)))

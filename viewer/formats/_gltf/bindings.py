@@ -23,8 +23,8 @@ def checked_bindings(
     Raises
     ------
     FormatError
-        If a vertex refers to a joint that the skin does not have. If errors are kept, the weight
-        of such an influence is set to 0.
+        If a vertex refers to a joint that the skin does not have. If errors are only recorded, the
+        weight of such an influence is set to 0.
     """
     limits: dict[int, tuple[int, int]] = {}
     for node in np.nonzero((tree.meshes >= 0) & (tree.skins >= 0))[0].tolist():

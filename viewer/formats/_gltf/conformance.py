@@ -15,7 +15,7 @@ __all__ = ["check_conformance"]
 
 _ROUNDING = 1e-5  # tolerance of declared bounds, relative to the largest component
 _UNIT = 1e-3  # tolerance of the deviation of a quaternion's length from 1
-# Normalised integers that stand for 1, by component type.
+# Normalised integers that represent 1, by component type.
 _ONES = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 
 
@@ -41,7 +41,7 @@ def check_conformance(
     for index in range(len(animations)):
         try:
             _check_animation(document, animations[index])
-        except FormatError:  # reported when it was read
+        except FormatError:  # the error was reported when the item was read
             continue
 
 
@@ -52,7 +52,8 @@ def _check_bounds(document: Document) -> None:
             accessor = document.accessors[index]
             if accessor.has("min") or accessor.has("max"):
                 _compare_bounds(accessor, document.accessors.components(index))
-        except FormatError:  # reported when it was read, or not used
+        # The error was reported when the accessor was read, or the accessor is not used.
+        except FormatError:
             continue
 
 
@@ -84,7 +85,7 @@ def _check_primitives(document: Document) -> None:
                 attributes = primitives[place].part("attributes")
                 if attributes is not None:
                     _check_attributes(document, attributes)
-        except FormatError:  # reported when it was read
+        except FormatError:  # the error was reported when the item was read
             continue
 
 

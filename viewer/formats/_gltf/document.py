@@ -16,7 +16,7 @@ __all__ = ["Document", "open_document"]
 
 Content = TypeVar("Content")
 
-_FREE_BYTES = 256 << 20  # number of decoded bytes that is allowed for every file
+_FREE_BYTES = 256 << 20  # number of decoded bytes that every file may have
 _MOST_GROWTH = 64  # maximum decoded bytes per byte of the file; 20 is usual for compressed data
 
 
@@ -71,12 +71,12 @@ class Document:
         self._decoded = size
 
     def kept(self, read: Callable[[], Content], neutral: Content) -> Content:
-        """Return the result of a function; after an error, a neutral value if errors are kept.
+        """Return the result of a function, or a neutral value if its error is only recorded.
 
         Raises
         ------
         FormatError
-            The function's error, unless errors are kept.
+            The function's error, unless the source continues after errors.
         """
         try:
             return read()
@@ -107,6 +107,10 @@ def _check_version(root: Element) -> None:
     if asset is None:
         root.warn("G001.no-asset")
         return
+    stated = asset.values.get("version")
+    # Some files of glTF 0.8 and 1.0 state the version as a number.
+    if isinstance(stated, int | float) and not isinstance(stated, bool) and stated < 2:
+        raise asset.fault("F002.gltf-version", "version", found=stated)
     version = asset.text("version", "2.0")
     if version.partition(".")[0] != "2":
         raise asset.fault("F002.gltf-version", "version", found=version)

@@ -86,7 +86,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else, or is missing and has no default.
+            If the member has any other value, or is missing and has no default.
         """
         value = self.values.get(name)
         if value is None and default is not None and name not in self.values:
@@ -105,14 +105,14 @@ class Element:
         name : str
             Name of the member.
         count : int
-            Number of elements that it can refer to.
+            Number of elements to which it can refer.
         what : str
             Name of these elements in the root: ``"nodes"``.
 
         Raises
         ------
         FormatError
-            If the member is anything else.
+            If the member has any other value.
         """
         if name not in self.values:
             return -1
@@ -137,7 +137,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else, or is missing and has no default.
+            If the member has any other value, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -159,7 +159,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else.
+            If the member has any other value.
         """
         if name not in self.values:
             return None
@@ -182,7 +182,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else, or is missing and has no default.
+            If the member has any other value, or is missing and has no default.
         """
         if name not in self.values and default is not None:
             return default
@@ -197,7 +197,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else.
+            If the member has any other value.
         """
         value = self.values.get(name, default)
         if type(value) is not str:
@@ -210,7 +210,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else.
+            If the member has any other value.
         """
         value = self.values.get(name, default)
         if type(value) is not bool:
@@ -223,7 +223,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else.
+            If the member has any other value.
         """
         if name not in self.values:
             return None
@@ -251,7 +251,7 @@ class Element:
         Raises
         ------
         FormatError
-            If the member is anything else; see ``index``.
+            If the member has any other value; see ``index``.
         """
         items = self.values.get(name, [])
         if type(items) is not list:

@@ -1,4 +1,4 @@
-"""Influences of the vertices of a primitive: all sets of joints and weights side by side."""
+"""Influences of the vertices of a primitive: all sets of joints and weights in one table."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def read_influences(attributes: Attributes) -> tuple[Ints, Floats] | tuple[None,
 
 
 def _finite(attributes: Attributes, number: int, weights: Floats) -> Floats:
-    """Return weights; non-finite ones become 0 if errors are kept, else raise FormatError."""
+    """Return weights; non-finite ones are errors, and become 0 if errors are only recorded."""
     bad = ~np.isfinite(weights)
     if bad.any():
         row, column = (int(axis[0]) for axis in np.nonzero(bad))

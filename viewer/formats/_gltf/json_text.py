@@ -16,7 +16,7 @@ __all__ = ["parsed"]
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_BYTES = 512 << 20  # maximum size of the text; parsing takes three times as much memory
-_THOROUGH = 1 << 20  # bytes; shorter texts are always searched for repeated keys
+_THOROUGH = 1 << 20  # bytes up to which texts are always searched for repeated keys
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -66,7 +66,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
         raise source.fault("F002.gltf-json", place, reason=reason, at=problem.pos) from None
     except RecursionError:
         raise source.fault("F002.json-nesting") from None
-    except ValueError:  # raised only for numbers with too many digits
+    except ValueError:  # the error is raised only for numbers with too many digits
         raise source.fault("F002.gltf-digits", most=MOST_DIGITS) from None
     if type(root) is not dict:
         raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))

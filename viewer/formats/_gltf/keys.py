@@ -20,7 +20,7 @@ _INTERPOLATIONS: dict[str, Interpolation] = {
 }
 _KINDS = {"translation": "VEC3", "rotation": "VEC4", "scale": "VEC3", "weights": "SCALAR"}
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
-_TINY = 1e-12  # shorter quaternions have no direction
+_TINY = 1e-12  # minimum length of a quaternion with a direction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,13 +87,13 @@ def read_keys(
     per_key = 3 if interpolation == "cubic" else 1
     expected = len(times) * per_key * width
     if rows.size != expected:
-        # Counted in elements of the accessor: vectors, or single weights.
+        # The count is in elements of the accessor: vectors, or single weights.
         raise _wrong_count(sampler, expected // rows.shape[1], len(rows), len(times))
     keys = rows.reshape(len(times), per_key, width)
     _check_finite(sampler, keys)
     if path == "rotation":
         keys = _rotations(sampler, keys, _is_whole(document, accessor))
-    # Stored as in-tangent, value, out-tangent; tangents are slopes per second (3.11.3.3).
+    # Each key has an in-tangent, value and out-tangent; tangents are slopes per second (3.11.3.3).
     tangents = keys[:, (0, 2)] if per_key == 3 else None
     return _without_equal(Keys(times, keys[:, per_key // 2], interpolation, tangents))
 

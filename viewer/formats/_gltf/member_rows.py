@@ -51,7 +51,7 @@ def member_rows(table: Table, name: str, width: int) -> tuple[Ints, Floats]:
 
 
 def _array(items: list[Any], width: int) -> Floats | None:
-    """Return lists of numbers as an array; None if any item is anything else."""
+    """Return lists of numbers as an array; None if any item is not such a list."""
     if set(map(type, items)) - {list} or set(map(len, items)) - {width}:
         return None
     if items and set(map(type, chain.from_iterable(items))) not in _NUMBERS:
@@ -69,7 +69,7 @@ def member_indices(table: Table, name: str, count: int, what: str) -> Ints:
     Raises
     ------
     FormatError
-        If a member is anything else; see ``Element.index``.
+        If a member is not such an index; see ``Element.index``.
     """
     result = np.full(len(table), -1, dtype=np.int32)
     for place, values in enumerate(table.items):

@@ -99,7 +99,7 @@ def _primitive(reading: _Reading, primitive: Element) -> Primitive | None:
         reading.undrawn = reading.undrawn or primitive.pointer
         return None
     if not element.has("POSITION"):
-        # Valid: an unsupported extension may provide the vertices.
+        # This is valid: an unsupported extension may provide the vertices.
         element.warn("G002.no-positions")
         return None
     document = reading.document

@@ -16,11 +16,11 @@ from viewer.rig.geometry.rotation import (
 
 __all__ = ["Transforms", "node_transforms"]
 
-_UNIT = 1e-3  # larger deviations of a quaternion's length from 1 are reported
-_TINY = 1e-12  # shorter quaternions have no direction
+_UNIT = 1e-3  # maximum deviation of a quaternion's length from 1 that is not reported
+_TINY = 1e-12  # minimum length of a quaternion with a direction
 # Relative error of T R S compared with the matrix: the rounding of a few products in float32.
 _EXACT = 1e-6
-_LAST_ROW = 1e-5  # smaller deviations of the last row from 0 0 0 1 are rounding
+_LAST_ROW = 1e-5  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +110,7 @@ def _decomposed(linear: Floats) -> tuple[Floats, Floats, np.ndarray]:
     """
     scales = np.linalg.norm(linear, axis=1)
     scales[:, 0] *= np.where(np.linalg.det(linear) < 0.0, -1.0, 1.0)
-    # Columns of length 0 are completed to a rotation.
+    # Columns of length 0 are replaced so that the matrix is a rotation.
     columns = linear / np.where(scales == 0.0, 1.0, scales)[:, None, :]
     turns, _ = nearest_rotations(columns)
     rotations = matrix_to_quaternion(turns)

@@ -65,7 +65,7 @@ def _weights(table: Table) -> dict[int, Any]:
 
 
 def _kept(table: Table, name: str) -> dict[int, Any]:
-    """Return a member of the nodes that have it, as parsed."""
+    """Return the parsed values of a member, for the nodes that have it."""
     return {place: values[name] for place, values in enumerate(table.items) if name in values}
 
 
@@ -91,7 +91,7 @@ def _parents(table: Table) -> Ints:
 
 
 def _check_cycles(table: Table, parents: Ints) -> None:
-    """Refuse nodes that are their own ancestors; break the cycles if errors are kept."""
+    """Refuse nodes that are their own ancestors; if errors are only recorded, break the cycles."""
     members = cycle_members(parents)
     left = np.nonzero(members)[0].tolist()
     seen: set[int] = set()

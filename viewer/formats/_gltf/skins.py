@@ -14,7 +14,7 @@ from viewer.rig.arrays import Floats
 __all__ = ["read_skins"]
 
 _EMPTY = NodeSkin("", np.zeros(0, dtype=np.int32), np.zeros((0, 4, 4)))
-_LAST_ROW = 1e-4  # smaller deviations of the last row from 0 0 0 1 are rounding
+_LAST_ROW = 1e-4  # maximum deviation of the last row from 0 0 0 1 that is due to rounding
 
 
 def read_skins(document: Document) -> tuple[NodeSkin, ...]:

@@ -106,7 +106,7 @@ class Targets:
             return Moved(path, (node,) if self.moves(node, path) else ())
         if match := _MESH_POINTER.fullmatch(pointer):
             mesh = int(match[1])
-            # Weights of a node override those of its mesh.
+            # Weights of a node override the weights of its mesh.
             users = (node for node in self._with_shapes if self._tree.meshes[node] == mesh)
             nodes = (node for node in users if node not in self._tree.shape_weights)
             return Moved("weights", tuple(sorted(nodes)))

@@ -86,7 +86,7 @@ def shape_weights(mesh: Element, count: int) -> Floats:
 def node_weights(
     document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]
 ) -> dict[int, Floats]:
-    """Return the weights by which nodes override those of their meshes: (S,) each."""
+    """Return the weights by which nodes override their meshes' weights: (S,) each."""
     nodes = document.table("nodes")
     return {
         node: _fitted(nodes[node], weights, len(meshes[tree.meshes[node]].target_names))

@@ -13,7 +13,7 @@ __all__ = ["TRIANGLES", "read_triangles"]
 
 _LIST, _STRIP, _FAN = 4, 5, 6
 TRIANGLES = (_LIST, _STRIP, _FAN)
-"""Modes that draw triangles; the others are points and lines."""
+"""Modes that draw triangles; all others draw points or lines."""
 
 
 def read_triangles(

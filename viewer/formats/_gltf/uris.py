@@ -1,4 +1,4 @@
-"""URIs of buffers and images: data inside the file, or files below its folder."""
+"""URIs of buffers and images: data inside the file, or files in or below its folder."""
 
 from __future__ import annotations
 

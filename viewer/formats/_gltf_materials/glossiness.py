@@ -33,7 +33,7 @@ __all__ = ["Glossiness", "from_glossiness", "read_glossiness"]
 
 _DIELECTRIC = 0.04
 _BRIGHTNESS = np.array([0.299, 0.587, 0.114], dtype=np.float32)
-_ROWS = 256  # rows of an image that are converted together
+_ROWS = 256  # number of rows of an image that are converted together
 
 Reals = NDArray[np.float32]
 

@@ -1,6 +1,6 @@
 """Images of a glTF document: PNG, JPEG and WebP, embedded or in files below its folder.
 
-Only images that textures use are read. They are decoded together, each once, in parallel.
+Only images that textures use are read. They are decoded in parallel, each only once.
 """
 
 from __future__ import annotations

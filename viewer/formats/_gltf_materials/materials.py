@@ -107,7 +107,7 @@ def _slots(stated: _Stated) -> list[Slot]:
 
 
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
-    """Return the properties of a material; ``toon`` contains those of VRM, if any."""
+    """Return the properties of a material; ``toon`` contains VRM's properties, if any."""
     source = document.source
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
@@ -136,7 +136,7 @@ def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
         "normal_texture": read_slot(document, element, "normalTexture"),
         "occlusion_texture": read_slot(document, element, "occlusionTexture"),
         "emissive_texture": read_slot(document, element, "emissiveTexture"),
-        "shade_texture": None if toon is None else toon.shade,
+        **({} if toon is None else toon.slots),
     }
     normal, occlusion = (element.part(name) if slots[field] else None for name, field in _FACTORED)
     if normal is not None:
@@ -165,7 +165,11 @@ def _material(stated: _Stated, images: dict[int, DecodedImage]) -> Material:
     if packed is not None:
         textures["metallic_texture"] = replace(packed, channel=2)
         textures["roughness_texture"] = replace(packed, channel=1)
-    values = stated.values | textures
+    values = stated.values | {name: one for name, one in textures.items() if "." not in name}
+    for name, texture in textures.items():
+        owner, _, field = name.partition(".")
+        if field:
+            values[owner] = replace(values[owner], **{field: texture})
     if stated.glossiness is not None:
         values |= from_glossiness(stated.glossiness, images)
     return Material(**values)

@@ -147,7 +147,7 @@ def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     Parameters
     ----------
     offset, scale : (2,)
-        Of texture coordinates from 0 to 1.
+        Offset and scale of texture coordinates from 0 to 1.
     angle : float
         Radians.
 
@@ -162,7 +162,7 @@ def transform_matrix(offset: Floats, angle: float, scale: Floats) -> Floats:
     cos, sin = math.cos(angle), math.sin(angle)
     (a, b), (c, d) = np.array([[cos, sin], [-sin, cos]]) * scale
     u, v = offset
-    # Adding 0 makes negative zeros positive.
+    # Adding 0 replaces -0 by 0.
     return np.array([[a, -b, b + u], [-c, d, 1.0 - d - v]]) + 0.0
 
 

@@ -1,12 +1,12 @@
-"""Toon materials of VRM characters: the colours of the lit side and of the side in shade.
+"""Toon materials of VRM characters: lit and shade colour, rim light, outline.
 
 ::
 
     VRM 1.0  materials[i].extensions.VRMC_materials_mtoon: shadeColorFactor, shadeMultiplyTexture,
-             shadingToonyFactor, shadingShiftFactor
+             shadingToonyFactor, shadingShiftFactor; parametricRim…, rim…, matcap…; outline…
     VRM 0.x  extensions.VRM.materialProperties[i].shader: "VRM/MToon", "VRM/UnlitTexture", …;
              vectorProperties._ShadeColor (sRGB), textureProperties._ShadeTexture,
-             floatProperties._ShadeToony, ._ShadeShift
+             floatProperties._ShadeToony, ._ShadeShift, …, which are translated to version 1.0
 
 Exporters also write the lit side's base colour, texture and opacity to the core material. With the
 cosine c of the angle of incidence, the fraction of the lit colour rises linearly from 0 to 1
@@ -15,6 +15,7 @@ between c = toony - 1 - shift and c = 1 - toony - shift.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import field
 from typing import Any
 
@@ -22,16 +23,34 @@ from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
+from viewer.formats._vrm.json_parts import part
 from viewer.formats._vrm.numbers import rows_of, value_of
-from viewer.rig.srgb import decode_srgb
+from viewer.formats._vrm.old_toon import modern_toon
+from viewer.rig.materials.toon import Outline, Rim
 
 __all__ = ["MTOON", "Toon", "read_toon"]
 
 MTOON = "VRMC_materials_mtoon"
 _SHADER = "VRM/MToon"
 _UNLIT = "VRM/Unlit"
-_OLD_COLOR = (0.97, 0.81, 0.86, 1.0)
 _TOONY = 0.9
+_LARGEST = 1e4
+_MODES = {"worldCoordinates": "world", "screenCoordinates": "screen"}
+_SLOTS = {
+    "shade_texture": "shadeMultiplyTexture",
+    "rim.texture": "rimMultiplyTexture",
+    "rim.matcap": "matcapTexture",
+    "outline.texture": "outlineWidthMultiplyTexture",
+}
+# Members that are not drawn, with the value that has no effect.
+_NOT_DRAWN = {
+    "uvAnimationScrollXSpeedFactor": 0.0,
+    "uvAnimationScrollYSpeedFactor": 0.0,
+    "uvAnimationRotationSpeedFactor": 0.0,
+    "shadingShiftTexture": None,
+    "transparentWithZWrite": False,
+    "renderQueueOffsetNumber": 0,
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,12 +61,13 @@ class Toon:
     ----------
     values : dict
         Fields of ``Material``.
-    shade : Slot or None
-        Texture that multiplies the colour in shade.
+    slots : mapping of Slot
+        Textures by field of ``Material``, or by fields of its rim light and outline:
+        ``"rim.texture"``.
     """
 
     values: dict[str, Any] = field(default_factory=dict)
-    shade: Slot | None = None
+    slots: Mapping[str, Slot] = field(default_factory=dict)
 
 
 def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
@@ -61,61 +81,83 @@ def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
         Its materials.
     """
     found: dict[int, Toon] = {}
-    told = _member(_member(document.root.values, "extensions"), "VRM")
-    listed = _member(told, "materialProperties")
+    omitted: dict[str, None] = {}
+    listed = part(document.root.values, "extensions", "VRM", "materialProperties")
     for index, each in enumerate(listed[: len(elements)] if isinstance(listed, list) else ()):
-        shader = _member(each, "shader")
+        shader = part(each, "shader")
         if shader == _SHADER:
-            found[index] = _old_toon(document, each, elements[index])
+            told, lost = modern_toon(each)
+            element = Element(document.source, told, elements[index].pointer)
+            found[index] = _toon(document, element)
+            omitted |= dict.fromkeys([*lost, *_omitted(told)])
         elif isinstance(shader, str) and shader.startswith(_UNLIT):
             found[index] = Toon()
     for index, element in enumerate(elements):
-        modern = _member(_member(element.values, "extensions"), MTOON)
+        modern = part(element.values, "extensions", MTOON)
         if isinstance(modern, dict):
             pointer = element.at("extensions", MTOON)
             found[index] = _toon(document, Element(document.source, modern, pointer))
+            omitted |= dict.fromkeys(_omitted(modern))
     count = sum(bool(toon.values) for toon in found.values())
     if count:
-        document.source.warn("F007.gltf-toon", "/materials", n=count)
+        document.source.warn("F007.gltf-toon", "/materials", n=count, names=[*omitted])
     return found
 
 
+def _omitted(told: Mapping[str, Any]) -> list[str]:
+    """Return the members with an effect that is not drawn."""
+    return [name for name, idle in _NOT_DRAWN.items() if told.get(name, idle) != idle]
+
+
 def _toon(document: Document, element: Element) -> Toon:
-    """Return the toon shading of version 1.0."""
+    """Return the toon shading of version 1.0; an invalid shade colour means no shade."""
     told = element.values
-    toony, shift = told.get("shadingToonyFactor"), told.get("shadingShiftFactor")
-    color = rows_of(told.get("shadeColorFactor"), (0.0, 0.0, 0.0))
-    values = _values(color, value_of(toony, _TOONY), value_of(shift, 0.0))
-    return Toon(values, read_slot(document, element, "shadeMultiplyTexture"))
-
-
-def _old_toon(document: Document, told: Any, element: Element) -> Toon:
-    """Return the toon shading of version 0.x, whose thresholds are converted to version 1.0."""
-    color = rows_of(_member(_member(told, "vectorProperties"), "_ShadeColor"), _OLD_COLOR)
-    numbers = _member(told, "floatProperties")
-    toony = value_of(_member(numbers, "_ShadeToony"), _TOONY)
-    shift = value_of(_member(numbers, "_ShadeShift"), 0.0)
-    texture = _member(_member(told, "textureProperties"), "_ShadeTexture")
-    shade = None
-    if isinstance(texture, int):
-        named = Element(document.source, {"shade": {"index": texture}}, element.pointer)
-        shade = read_slot(document, named, "shade")
-    if color is not None:
-        color = decode_srgb(color[:3].clip(0.0, 1.0))
-    if toony is not None and shift is not None:
-        toony += (1.0 - toony) * (0.5 + 0.5 * shift)
-        shift = -shift - (1.0 - toony)
-    return Toon(_values(color, toony, shift), shade)
-
-
-def _values(color: Any, toony: float | None, shift: float | None) -> dict[str, Any]:
-    """Return the fields of a material; invalid values are those of a material without shade."""
+    toony = value_of(told.get("shadingToonyFactor"), _TOONY)
+    shift = value_of(told.get("shadingShiftFactor"), 0.0)
     toony = _TOONY if toony is None else min(max(toony, 0.0), 1.0)
     shift = 0.0 if shift is None else shift
-    shade = (1.0, 1.0, 1.0) if color is None else tuple(min(max(c, 0.0), 1.0) for c in color)
-    return {"shade_color": shade, "shade_range": (toony - 1.0 - shift, 1.0 - toony - shift)}
+    color = rows_of(told.get("shadeColorFactor"), (0.0, 0.0, 0.0))
+    slots = {field: read_slot(document, element, name) for field, name in _SLOTS.items()}
+    outline = _outline(told)
+    values = {
+        "shade_color": (1.0, 1.0, 1.0) if color is None else tuple(color.clip(0.0, 1.0).tolist()),
+        "shade_range": (toony - 1.0 - shift, 1.0 - toony - shift),
+        "rim": _rim(told),
+        "outline": outline,
+    }
+    used = {name: slot for name, slot in slots.items() if slot is not None}
+    if outline is None:
+        used.pop("outline.texture", None)
+    return Toon(values, used)
 
 
-def _member(value: Any, name: str) -> Any:
-    """Return a member of parsed JSON; None if it is missing or not in an object."""
-    return value.get(name) if isinstance(value, dict) else None
+def _rim(told: Mapping[str, Any]) -> Rim:
+    """Return the rim light; invalid values are replaced by the extension's defaults."""
+
+    def color(name: str, default: tuple[float, float, float]) -> Any:
+        value = rows_of(told.get(name), default)
+        return default if value is None else tuple(value.clip(0.0, _LARGEST).tolist())
+
+    def number(name: str, default: float, low: float, high: float) -> float:
+        value = value_of(told.get(name), default)
+        return default if value is None else min(max(value, low), high)
+
+    return Rim(
+        color=color("parametricRimColorFactor", (0.0, 0.0, 0.0)),
+        power=number("parametricRimFresnelPowerFactor", 5.0, 0.0, _LARGEST),
+        lift=number("parametricRimLiftFactor", 0.0, -_LARGEST, _LARGEST),
+        mix=number("rimLightingMixFactor", 1.0, 0.0, 1.0),
+        matcap_factor=color("matcapFactor", (1.0, 1.0, 1.0)),
+    )
+
+
+def _outline(told: Mapping[str, Any]) -> Outline | None:
+    """Return the outline; None if there is none."""
+    mode = _MODES.get(str(told.get("outlineWidthMode")), "")
+    width = value_of(told.get("outlineWidthFactor"), 0.0)
+    if not mode or width is None or width <= 0.0:
+        return None
+    color = rows_of(told.get("outlineColorFactor"), (0.0, 0.0, 0.0))
+    mix = value_of(told.get("outlineLightingMixFactor"), 1.0)
+    r, g, b = (0.0, 0.0, 0.0) if color is None else color.clip(0.0, 1.0).tolist()
+    return Outline(width, mode, (r, g, b), 1.0 if mix is None else min(max(mix, 0.0), 1.0))

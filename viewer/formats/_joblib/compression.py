@@ -16,10 +16,10 @@ from viewer.phrases import printable
 
 __all__ = ["is_compressed", "unpacked"]
 
-_SHORTEST = 12  # bytes; minimum size of a compressed pickle
-_PIECE = 1 << 20  # bytes unpacked at a time
+_SHORTEST = 12  # minimum size of a compressed pickle, bytes
+_PIECE = 1 << 20  # number of bytes unpacked at a time
 _PICKLE = re.compile(rb"\x80[\x02-\x05]|[(}\]c]")
-# The header of zlib may be letters, but a text has no control characters after them.
+# The header of zlib may consist of letters, but in a text no control characters follow them.
 _ZLIB = re.compile(rb"x[\x01\x5e\x9c\xda](?=[\s\S]*[\x00-\x08\x0e-\x1f\x80-\xff])")
 _KINDS: dict[str, re.Pattern[bytes]] = {
     "zlib": _ZLIB,
@@ -43,7 +43,7 @@ class _Unpacker(Protocol):
 
 
 class _Zlib:
-    """The decompressor of zlib with the interface of those of bz2 and lzma."""
+    """The decompressor of zlib with the interface of the decompressors of bz2 and lzma."""
 
     def __init__(self, window: int) -> None:
         self._inner = zlib.decompressobj(window)
@@ -84,7 +84,7 @@ def is_compressed(head: bytes) -> bool:
         begin = _UNPACKERS[method]().decompress(head, _SHORTEST)
     except _DAMAGE:
         return False
-    # A block may be longer than the head, and is then unpacked when the file is opened.
+    # A block longer than the head is unpacked when the file is opened.
     return not begin or _PICKLE.match(begin) is not None
 
 

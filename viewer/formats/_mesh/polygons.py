@@ -11,14 +11,15 @@ __all__ = ["Picks", "first_known", "picked", "triangles_of", "triangulate"]
 
 Picks = NDArray[np.integer]
 
-_MOST_CORNERS = 400  # larger polygons become fans, as ear clipping would take seconds
+# Maximum for ear clipping, which would take seconds for larger polygons; they become fans.
+_MOST_CORNERS = 400
 _CHUNK = 4_000_000  # (corner, corner) pairs per batch
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
     """Triangulate polygons, keeping their order and winding.
 
-    A quad is split along the diagonal for which both halves face the same way as the whole; a
+    A quad is split along the diagonal for which both halves face the same way as the quad; a
     larger polygon becomes a fan if all corners are visible from the first, otherwise its ears are
     clipped one by one (Meisters 1975), in the plane of its area vector (Newell).
 

@@ -22,7 +22,7 @@ _SIZES = {3: "triangle", 4: "quad"}
 def filled_normals(
     source: Source, normals: Floats | None, positions: Floats, triangles: Ints
 ) -> Floats:
-    """Return a normal for every vertex: that of the file, or a computed one.
+    """Return a normal for every vertex, from the file or computed.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def polygon_text(counts: NDArray[np.integer], n_triangles: int) -> str:
 
 
 def stated_up(comment: str) -> Literal["y", "z"]:
-    """Return the up axis stated by a comment in this program's notation; y by default."""
+    """Return the up axis stated by a comment that this program wrote; y by default."""
     return "z" if re.search(r"\bz up\b", comment) else "y"
 
 

@@ -12,7 +12,7 @@ __all__ = ["load_image", "read_picture"]
 
 
 def load_image(source: Source, name: str, offset: int | str | None) -> Bytes | None:
-    """Return a texture's pixels, or None with a warning that gives its resolved path.
+    """Return a texture's pixels, or None with a warning that states its resolved path.
 
     Parameters
     ----------

@@ -27,15 +27,15 @@ from viewer.rig.arrays import Bytes
 
 __all__ = ["decoded_attributes"]
 
-_GROUP = 16  # elements
-_LARGEST_BLOCK = 256  # elements
+_GROUP = 16  # number of elements per group
+_LARGEST_BLOCK = 256  # maximum number of elements per block
 _BLOCK_BYTES = 8192
 _ZERO, _LITERAL = 2, 3  # control modes: no data, and one byte per element
 # Bits per delta of the four group modes: in version 0, and for control modes 0 and 1.
 _BITS = ((0, 2, 4, 8), (0, 1, 2, 4), (1, 2, 4, 8))
 # The four group modes in a byte of header bits.
 _MODES = tuple(tuple(byte >> shift & 3 for shift in (0, 2, 4, 6)) for byte in range(256))
-_PADDING = (32, 24)  # minimum size of the tail, by version
+_PADDING = (32, 24)  # minimum size of the tail in bytes, by version
 
 
 @dataclass(slots=True)

@@ -14,10 +14,10 @@ from viewer.rig.arrays import Bytes
 __all__ = ["decoded_indices", "decoded_triangles"]
 
 _TRIANGLES, _INDICES = 0xE1, 0xD1  # first bytes of the streams
-_TABLE = 16  # bytes of the table at the end of triangles
-_TAIL = 4  # bytes at the end of indices
+_TABLE = 16  # size of the table at the end of the triangles, bytes
+_TAIL = 4  # size of the tail at the end of the indices, bytes
 _WRAP = 0xFFFFFFFF
-_MOST_BYTES = 5  # maximum length of a number with 7 bits per byte
+_MOST_BYTES = 5  # maximum length of a number with 7 bits per byte, bytes
 _KEPT = 1 << 16  # maximum length of a queue; then its oldest entries are dropped, as 16 are in use
 
 
@@ -80,7 +80,7 @@ def decoded_triangles(data: Bytes, count: int, stride: int) -> Bytes | None:
 
 
 def _corners(codes: bytes, numbers: _Numbers, table: bytes) -> list[int]:
-    """Return the vertex indices of all triangles; raises IndexError if the stream is damaged."""
+    """Return the vertex indices of all triangles; raise IndexError if the stream is damaged."""
     corners: list[int] = []
     vertices: list[int] = []
     edges: list[tuple[int, int]] = []

@@ -1,1 +1,1 @@
-"""The parts of MHR's portable files: the rig, and meshes at several levels of detail."""
+"""Parts of MHR's portable files: the rig, and meshes at several levels of detail."""

@@ -1,10 +1,10 @@
 """Inverse bind matrices: one per joint, for all skins and rigid meshes of a figure.
 
-A figure has one inverse bind matrix per joint, but each skin of a file has its own, and meshes
-attached to a node have none. Their vertices are transformed into one binding space by a matrix A
-with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a second
-time, through an auxiliary joint. Binding space is the space of the scene: A of the first skin
-undoes quantisation, and the units and axes of the mesh.
+A figure has one inverse bind matrix per joint, but each skin of a file has separate ones, and
+meshes attached to a node have none. Their vertices are transformed into one binding space by a
+matrix A with IBM_s[j] = IBM[j] A for all joints j of skin s. Joints without such an A are bound a
+second time, through an auxiliary joint. Binding space is the space of the scene: A of the first
+skin undoes quantisation, and the units and axes of the mesh.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ __all__ = ["Bindings", "bind_rigid", "bind_skins", "inverse_binds"]
 
 # float32 rounding of the entries of a product of two matrices, relative to the largest
 _SAME = 1e-6
-# Worse conditioned matrices are not inverted, because baking would lose too many digits.
+# Matrices with a worse condition are not inverted, because baking would lose too many digits.
 _WORST_CONDITION = 1e5
 _MOST_CANDIDATES = 8
 # If the first A is closer to the identity, the vertices keep the file's coordinates.

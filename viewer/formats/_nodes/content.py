@@ -98,7 +98,7 @@ class Primitive:
     colors : (V, 4) or None
         Linear vertex colours with opacity, which multiply the material's base colour.
     joints, weights : (V, K) int32, (V, K) or None
-        Influences of all sets side by side: indices into the skin's joints. Weights are as
+        Influences of all sets in one table: indices into the skin's joints. Weights are as
         stored, unused slots are 0.
     material : int
         Index into ``NodeFile.materials``, -1 for none.
@@ -262,6 +262,8 @@ class NodeExpression:
         Key of ``PROCEDURAL``; empty for other expressions.
     overrides : dict of str
         Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
+    materials : tuple of (int, str, (4,))
+        Material, kind and target of each change of a material; see ``MaterialBinds``.
     """
 
     name: str
@@ -269,6 +271,7 @@ class NodeExpression:
     is_binary: bool = False
     kind: str = ""
     overrides: Mapping[str, str] = field(default_factory=dict)
+    materials: tuple[tuple[int, str, Floats], ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

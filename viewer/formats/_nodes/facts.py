@@ -31,7 +31,7 @@ def facts_of(file: NodeFile, pieces: list[Piece]) -> tuple[tuple[str, str], ...]
     if isinstance(licence, str):
         facts.append(("licence", licence[:_LONGEST]))
     sums = max((piece.influences.deviation for piece in pieces), default=0.0)
-    # Smaller deviations are float32 rounding.
+    # Smaller deviations are rounding errors of float32.
     if sums > 1e-6:
         facts.append(("weight sums", f"within {sums:.2g} of 1, divided by their sum"))
     return (*facts, *file.facts)

@@ -46,7 +46,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     """
     groups = group_nodes(file)
     if not groups:
-        raise source.fault("F002.no-figure")
+        raise source.fault("F002.no-triangles" if _is_undrawn(file, source) else "F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     found = [_figure(file, members, readers, source) for members in groups]
@@ -58,6 +58,12 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
+
+
+def _is_undrawn(file: NodeFile, source: Source) -> bool:
+    """Return whether the file has meshes, but none with triangles, although all are valid."""
+    has_triangles = any(mesh.primitives for mesh in file.meshes)
+    return bool(file.meshes) and not has_triangles and not source.diagnostics.errors
 
 
 def _figure(
@@ -121,7 +127,7 @@ def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:
-    """Record sums of weights that are not 1, and vertices without weights, at the first one."""
+    """Record sums of weights that are not 1, and vertices without weights, located at the first."""
     odd = [piece for piece in pieces if piece.influences.n_deviating]
     if odd:
         n = sum(piece.influences.n_deviating for piece in odd)

@@ -30,11 +30,11 @@ def flat_shaded(positions: Floats, triangles: Ints) -> tuple[Ints, Ints, Floats,
     Returns
     -------
     sources : (R,) int32
-        Original of each split vertex; vertices without triangles are kept.
+        Original of each split vertex; vertices without triangles are included.
     triangles : (T, 3) int32
         Indices into the split vertices.
     normals : (R, 3)
-        Of unit length.
+        Unit normals.
     is_flat : bool
         Whether the vertices were split.
     """

@@ -31,7 +31,7 @@ class Members:
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str
-        Name of the topmost node that is in no other figure; empty for the only figure of a file.
+        Name of the topmost node that is not in another figure; empty for the only figure of a file.
     """
 
     nodes: list[int] = field(default_factory=list)
@@ -122,7 +122,7 @@ class _Grouping:
         return order + _preorder(self.tree, sorted(more - set(tops)))
 
     def _skins(self) -> list[int]:
-        """Return the skins of the meshes, then others whose joints are all in the scene."""
+        """Return the skins of the meshes, then other skins whose joints are all in the scene."""
         used = dict.fromkeys(int(self.tree.skins[node]) for node in self.mesh_nodes)
         used.pop(-1, None)
         rest = (n for n in range(len(self.file.skins)) if n not in used)
@@ -213,7 +213,7 @@ class _Grouping:
         return None
 
     def _merge(self, keys: list[tuple[str, int]]) -> None:
-        """Merge figures into the first of them."""
+        """Merge figures into the first one."""
         into, wanted = self.figures[keys[0]], self.wanted[keys[0]]
         for key in keys[1:]:
             figure = self.figures.pop(key)
@@ -287,7 +287,7 @@ def _preorder(tree: NodeTree, tops: Iterable[int]) -> list[int]:
     """Return the nodes of some trees in preorder, with children in file order."""
     order = np.argsort(tree.parents, kind="stable")
     starts = np.searchsorted(tree.parents[order], np.arange(tree.n_nodes + 1)).tolist()
-    # Reversed, so that the first child is taken from the stack first.
+    # Children are pushed in reverse order, so that the first child is popped first.
     children = order.tolist()
     found: list[int] = []
     stack = [*tops][::-1]

@@ -10,7 +10,7 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Influences", "divided", "of_rows", "on_joint"]
 
-_NO_SUM = 1e-12  # sums of weights smaller than this are not scaled to 1
+_NO_SUM = 1e-12  # minimum sum of weights that is scaled to 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)

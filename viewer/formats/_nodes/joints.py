@@ -128,7 +128,7 @@ def sheared(linear: Floats) -> tuple[Floats, Floats, Floats]:
     Returns
     -------
     left, scales, right : (3, 3), (3,), (3, 3)
-        U, the diagonal of S, and V^T.
+        The matrix U, the diagonal of S, and the matrix V^T.
     """
     left, scales, right = np.linalg.svd(linear)
     if np.linalg.det(left) < 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -10,10 +11,18 @@ from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._nodes.content import NodeExpression, NodeFile, NodeMesh
 from viewer.formats._nodes.motions import Reader
-from viewer.formats._nodes.surfaces import Piece, normal_matrix, normal_scales, part_name
+from viewer.formats._nodes.surfaces import (
+    Piece,
+    normal_matrix,
+    normal_scales,
+    part_name,
+    used_materials,
+)
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.blendshapes import BlendShapes, SummedOffsets
+from viewer.rig.blendshapes import BlendShapes
+from viewer.rig.bodies.deferred_offsets import DeferredOffsets
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL, ExpressionRules
+from viewer.rig.materials.material_binds import MaterialBinds
 
 __all__ = ["blend_shapes_of", "shape_columns"]
 
@@ -47,7 +56,7 @@ def shape_columns(file: NodeFile, nodes: list[int], readers: list[Reader]) -> di
     count = 0
     for node in shaped:
         names = _mesh(file, node).target_names
-        # Targets without names need not correspond.
+        # Targets without names do not necessarily correspond.
         is_alone = counts[looks[node]] == 1 or not all(names)
         key = (node,) if is_alone else (*looks[node], _keys(file, node, readers))
         if key not in known:
@@ -105,7 +114,8 @@ def blend_shapes_of(
     pieces : list of Piece
         The primitives, whose targets are transformed to binding space.
     """
-    if not columns:
+    slots = {material: slot for slot, material in enumerate(used_materials(pieces))}
+    if not columns and not any(_binds_of(each, slots) for each in file.expressions):
         return None
     owners: dict[int, int] = {}
     for node, own in columns.items():
@@ -114,11 +124,11 @@ def blend_shapes_of(
     targets = [_target(file, columns, column, node) for column, node in sorted(owners.items())]
     counts = Counter(target.name for target in targets)
     count = sum(piece.n_vertices for piece in pieces)
-    mixed, sums = _expressions(file, columns, len(targets))
+    mixed, sums = _expressions(file, columns, len(targets), slots)
     shape = len(targets) + len(mixed), count, 3
 
-    def offsets(of_normals: bool) -> SummedOffsets:
-        return SummedOffsets(
+    def offsets(of_normals: bool) -> DeferredOffsets:
+        return DeferredOffsets(
             shape,
             lambda: _offsets(columns, pieces, count, of_normals, sums),
             lambda weights: _sum(columns, pieces, count, of_normals, sums, weights),
@@ -134,11 +144,36 @@ def blend_shapes_of(
         normal_offsets=offsets(of_normals=True) if has_normals else None,
         rest_weights=np.array([*(target.weight for target in targets), *(0.0 for _ in mixed)]),
         rules=_rules(mixed, len(targets)) if mixed else None,
+        material_binds=_material_binds(mixed, len(targets), slots),
     )
 
 
+def _binds_of(
+    expression: NodeExpression, slots: Mapping[int, int]
+) -> list[tuple[int, str, Floats]]:
+    """Return the changes of materials that a figure has, by the index in its mesh."""
+    return [
+        (slots[index], kind, target)
+        for index, kind, target in expression.materials
+        if index in slots
+    ]
+
+
+def _material_binds(
+    mixed: list[NodeExpression], first: int, slots: Mapping[int, int]
+) -> MaterialBinds | None:
+    """Return the changes of materials by expressions, whose blend shapes begin at ``first``."""
+    rows = [
+        (shape, *bind) for shape, each in enumerate(mixed, first) for bind in _binds_of(each, slots)
+    ]
+    if not rows:
+        return None
+    shapes, materials, kinds, targets = zip(*rows, strict=True)
+    return MaterialBinds(np.array(shapes), np.array(materials), kinds, np.array(targets))
+
+
 def _expressions(
-    file: NodeFile, columns: dict[int, Ints], n_targets: int
+    file: NodeFile, columns: dict[int, Ints], n_targets: int, slots: Mapping[int, int]
 ) -> tuple[list[NodeExpression], Floats]:
     """Return the figure's expressions, and their weights of its S morph targets: (E, S)."""
     found: list[NodeExpression] = []
@@ -150,7 +185,7 @@ def _expressions(
                 # An expression binds each of the nodes that share a target.
                 column = columns[node][index]
                 row[column] = max(row[column], weight, key=abs)
-        if row.any():
+        if row.any() or _binds_of(each, slots):
             found.append(each)
             sums.append(row)
     return found, np.array(sums).reshape(len(found), n_targets)
@@ -174,7 +209,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
 
 @dataclass(frozen=True, slots=True)
 class _Target:
-    """Name, name with that of its part, and default weight of a morph target."""
+    """Name, name prefixed by its part's name, and default weight of a morph target."""
 
     name: str
     full_name: str
@@ -193,7 +228,7 @@ def _offsets(
 ) -> Floats:
     """Return the offsets of all vertices, or of their normals, in binding space: (S + E, V, 3).
 
-    ``sums`` (E, S): weights of the expressions, which follow the S morph targets.
+    ``sums`` (E, S) are the weights of the expressions, which follow the S morph targets.
     """
     offsets = np.zeros((sums.shape[1], count, 3))
     first = 0

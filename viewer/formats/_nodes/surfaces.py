@@ -33,7 +33,7 @@ class Piece:
     influences : Influences
         Influences of the V vertices.
     sources : (V,) int32
-        Vertex of the primitive that each vertex copies, because flat shading splits vertices.
+        Original vertex of each vertex in the primitive, because flat shading splits vertices.
     triangles : (T, 3) int32
         Indices of the piece's vertices, counter-clockwise from outside in binding space.
     normals : (V, 3)
@@ -144,7 +144,7 @@ def mesh_of(file: NodeFile, nodes: list[int], pieces: list[Piece]) -> Mesh:
 
 
 def used_materials(pieces: list[Piece]) -> list[int]:
-    """Return the materials of a figure, as indices into those of its file."""
+    """Return the materials of a figure, as indices into the file's materials."""
     return sorted({piece.primitive.material for piece in pieces} - {-1})
 
 
@@ -155,7 +155,7 @@ def _part_views(file: NodeFile, nodes: list[int]) -> tuple[PartView, ...]:
 
 
 def part_name(file: NodeFile, node: int) -> str:
-    """Return the name of a node's part: the node's name, or else its mesh's."""
+    """Return the name of a node's part: the name of the node or, if it has none, of its mesh."""
     return file.tree.names[node] or file.meshes[int(file.tree.meshes[node])].name
 
 

@@ -16,7 +16,7 @@ from viewer.rig.geometry.rotation import nearest_rotations
 __all__ = ["views_of"]
 
 _HEIGHT = 1080  # height of a view, pixels
-_ASPECT = 16.0 / 9.0  # aspect ratio of cameras that use the window's
+_ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none
 # Converts x right, y up, z backwards to x right, y down, z forward.
 _TO_OPENCV = np.diag([1.0, -1.0, -1.0])
 
@@ -61,7 +61,7 @@ def views_of(
 
 
 def _view(name: str, world: Floats, vertical_angle: float, aspect: float) -> CameraView:
-    """Return a view with square pixels; scales of its ancestors are ignored."""
+    """Return a view with square pixels; scales of the node's ancestors are ignored."""
     size = max(1, round(_HEIGHT * aspect)), _HEIGHT
     focal = 0.5 * _HEIGHT / math.tan(0.5 * vertical_angle)
     rotation = _TO_OPENCV @ nearest_rotations(world[:3, :3])[0].T

@@ -103,7 +103,7 @@ def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
     """
     text = rows.body.replace(b"/", b" ")
     values, bad = parse_numbers(text, 0, len(text), is_kept=False)
-    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index, and means "missing" below
+    if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
         return None
     slashes = np.flatnonzero(rows.letters == _SLASH)
     if len(slashes) == 0:
@@ -154,7 +154,7 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
 
 
 def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Corners | None:
-    """Arrange the numbers of corners in rows of three; with a gap, the second becomes the third."""
+    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
     # Larger numbers are out of range; the function for invalid faces reads them again.
     whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
     if (whole != values).any():

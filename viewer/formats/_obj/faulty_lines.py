@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._mesh.polygons import first_known, triangles_of
@@ -158,15 +159,19 @@ def _corners(rows: Rows, begins: Places) -> tuple[Places, Bools]:
     return whole, lost
 
 
-def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int]) -> Places:
+def checked_corners(
+    source: Source, faces: FaceRows, faults: list[CornerFault], ends: dict[str, int]
+) -> NDArray[np.integer]:
     """Return the corners of all faces, with invalid corners replaced by others of their face.
 
     Parameters
     ----------
     source : Source
         The file, which records the errors.
-    faces : list of FaceRows
-        All faces of the file.
+    faces : FaceRows
+        All faces of the file; their corners are changed.
+    faults : list of CornerFault
+        Errors in these faces, which the caller records.
     ends : dict of str to int
         Number of lines with each keyword.
 
@@ -175,33 +180,23 @@ def checked_corners(source: Source, faces: list[FaceRows], ends: dict[str, int])
     (C, 3)
         Corners; -1 for invalid indices of texture coordinates and normals.
     """
-    corners = np.concatenate([np.zeros((0, 3), np.int32), *(rows.corners for rows in faces)])
+    corners, counts = faces.corners, faces.counts
     limits = np.array([ends[keyword] for keyword in CORNER_KINDS])
     largest = [column.max(initial=-1) for column in corners.T]
-    if not any(rows.faults for rows in faces) and (largest < limits).all():
+    if not faults and (largest < limits).all():
         return corners
-    counts = np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in faces)])
-    offsets = np.concatenate([np.zeros(0, np.int64), *(rows.offsets for rows in faces)])
-    first = 0
-    for rows in faces:
-        for fault in rows.faults:
-            triangles = triangles_of(counts, fault.faces + first)
-            source.refuse(
-                fault.key,
-                fault.offset,
-                len(fault.faces),
-                "triangles",
-                triangles,
-                **fault.values,
-            )
-        first += len(rows.counts)
+    for fault in faults:
+        triangles = triangles_of(counts, fault.faces)
+        source.refuse(
+            fault.key, fault.offset, len(fault.faces), "triangles", triangles, **fault.values
+        )
     owners = np.repeat(np.arange(len(counts)), counts)
     for column, keyword in enumerate(CORNER_KINDS):
         wrong = np.flatnonzero(corners[:, column] >= ends[keyword])
         if len(wrong):
             source.refuse(
                 f"F002.obj-{keyword}-range" if ends[keyword] else f"F002.obj-{keyword}-none",
-                int(offsets[owners[wrong[0]]]),
+                int(faces.offsets[owners[wrong[0]]]),
                 len(wrong),
                 "triangles" if column == 0 else "",
                 triangles_of(counts, owners[wrong]),

@@ -10,7 +10,7 @@ __all__ = ["is_cut_out", "is_normal_map"]
 
 _SAMPLES = 128  # maximum number of rows and columns that are sampled
 _ERROR = 0.2  # tolerance of a normal's length, for 8-bit and compressed images
-_MOST = 0.95  # minimum fraction of the pixels
+_MOST = 0.95  # minimum fraction of pixels that fulfil a criterion
 _SOLID = 16, 239  # opacities below and above are treated as 0 and 1
 
 

@@ -1,7 +1,7 @@
 """Lines of an ``.obj``, grouped by keyword, in pieces of a few hundred thousand bytes.
 
 All lines of a piece with the same keyword are parsed together. Pieces that fit into the processor's
-cache make this several times faster than parsing the whole file together.
+cache make this several times faster than parsing whole files.
 """
 
 from __future__ import annotations

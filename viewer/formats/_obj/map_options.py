@@ -55,7 +55,7 @@ def map_options(text: str) -> MapOptions:
         option, behind = _first_word(rest)
         option = option.lower()
         if option not in _VECTORS and option not in _OPTIONS:
-            # A file whose name begins with "-".
+            # This is a file whose name begins with "-".
             return MapOptions(text)
         rest = behind
         values = found[option] = []

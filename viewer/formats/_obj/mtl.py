@@ -12,7 +12,7 @@
 ``Pr``, ``Pm`` and ``norm`` are those of the PBR extension (Burley and others, 2013, as Blender and
 tinyobjloader write it). An option is a word that begins with ``-`` and its values: ``-o`` and
 ``-s`` offset and scale the image, ``-clamp`` clamps it at its edges, ``-bm`` scales a normal map,
-``-imfchan`` picks a channel. ``map_Ka`` is used if there is no ``map_Kd``. A bump map is drawn if
+``-imfchan`` selects a channel. ``map_Ka`` is used if there is no ``map_Kd``. A bump map is drawn if
 its image contains normals; heights, specular and reflection maps and the rest of the extension are
 not drawn. Programs differ in details, see ``_REPLACING``, ``name_here`` and ``image_kinds``.
 """
@@ -88,7 +88,7 @@ def read_libraries(
     Parameters
     ----------
     source : Source
-        The ``.obj``; warned of libraries, materials and images that are missing.
+        The ``.obj``; warnings about missing libraries, materials and images are added to it.
     libraries : list of (bytes, int)
         Text after each ``mtllib``, and its offset.
     names : list of str
@@ -117,7 +117,9 @@ def _opened(source: Source, text: bytes, offset: int) -> list[Source]:
     """Return the libraries of one ``mtllib``: a file whose name may contain spaces, or several."""
     whole = text.decode("utf-8", "surrogateescape")
     folder = source.path.parent
-    names = whole.split() if " " in whole and name_here(folder, whole) is None else [whole]
+    # A single suffix means a single name, even if the file is missing.
+    is_one = whole.lower().count(".mtl") == 1 or name_here(folder, whole) is not None
+    names = [whole] if is_one else whole.split()
     found = []
     for written in names:
         name = name_here(folder, written) or written
@@ -232,7 +234,7 @@ def _material(name: str, stated: _Statements, load: _Load) -> Material:
             alpha_mode = "blend" if opacity < 1.0 else "opaque"
         else:
             whole = textures["base_texture"] = _with_opacity(base, cut)
-            assert whole.image is not None  # made from images
+            assert whole.image is not None  # the texture was made from images
             if opacity == 1.0 and is_cut_out(whole.image[..., 3]):
                 alpha_mode = "mask"
     parts: dict[str, Any] = dict(textures)

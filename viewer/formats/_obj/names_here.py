@@ -12,8 +12,8 @@ __all__ = ["name_here"]
 def name_here(folder: Path, written: str) -> str | None:
     """Return the name under which a referenced file exists in a folder, None if it does not.
 
-    The following are tried in turn, ignoring case as Windows does: the name without quotes, and
-    its last part, since many programs write the path that the file had when it was exported.
+    The name without quotes and its last component are tried in turn, ignoring case as Windows does,
+    since many programs write the path that the file had when it was exported.
 
     Parameters
     ----------

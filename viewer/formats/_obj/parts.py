@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.formats._obj.faces import FaceRows, read_faces
+from viewer.formats._obj.faces import FEWEST, CornerFault, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
+from viewer.formats._obj.growing import GrowingTable
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
@@ -20,7 +22,9 @@ __all__ = ["ObjParts", "read_parts"]
 # Smoothing groups, and keywords that a viewer does not need.
 _QUIET = frozenset((b"s", b"lod", b"vp", b"shadow_obj", b"trace_obj", b"bevel"))
 _SHAPES = {b"l": "line", b"p": "point"}
+_WIDTHS = {"v": 3, "vt": 2, "vn": 3}  # number of values of an element
 _RUNS = (b"usemtl", b"g", b"o")
+_NO_FACES = FaceRows(np.zeros(0, np.int64), np.zeros((0, 3), np.int64), np.zeros(0, np.int64))
 
 
 @dataclass(slots=True)
@@ -52,7 +56,7 @@ class ObjParts:
     uvs: Floats
     colors: Floats | None
     counts: Places
-    corners: Places
+    corners: NDArray[np.integer]
     offsets: Places
     runs: dict[bytes, list[tuple[int, str]]]
     libraries: list[tuple[bytes, int]]
@@ -62,9 +66,15 @@ class ObjParts:
 class _Gathered:
     """Parts of a file that is being read, piece by piece."""
 
-    tables: dict[str, list[Floats]] = field(default_factory=lambda: {k: [] for k in KEYWORDS})
-    faces: list[FaceRows] = field(default_factory=list)
-    vertices: list[Places] = field(default_factory=list)
+    tables: dict[str, GrowingTable] = field(
+        default_factory=lambda: {k: GrowingTable((n,), np.float64) for k, n in _WIDTHS.items()}
+    )
+    counts: GrowingTable = field(default_factory=GrowingTable)
+    corners: GrowingTable = field(default_factory=lambda: GrowingTable((3,), np.int32))
+    offsets: GrowingTable = field(default_factory=GrowingTable)
+    faults: list[CornerFault] = field(default_factory=list)
+    n_faces: int = 0
+    vertices: GrowingTable = field(default_factory=GrowingTable)
     before: dict[str, int] = field(default_factory=lambda: dict.fromkeys(KEYWORDS, 0))
     runs: dict[bytes, list[tuple[int, str]]] = field(
         default_factory=lambda: {word: [] for word in _RUNS}
@@ -74,7 +84,7 @@ class _Gathered:
     # Vertices with colours; opacity is NaN if it is missing.
     colored: list[Places] = field(default_factory=list)
     colors: list[Floats] = field(default_factory=list)
-    # Ignored data: the number of vertices, and the offset of the first.
+    # Number of vertices with ignored data, and the offset of the first.
     unused: dict[str, list[int]] = field(default_factory=dict)
 
     def leave_out(self, what: str, count: int, offset: int) -> None:
@@ -103,17 +113,18 @@ def read_parts(source: Source) -> ObjParts:
     for keyword, name in _SHAPES.items():
         if gathered.odd[keyword]:
             source.warn(f"F007.obj-{name}s", n=gathered.odd[keyword])
-    vertices = np.concatenate([np.zeros(0, np.int64), *gathered.vertices])
+    vertices = gathered.vertices.rows()
     source.remember("positions", lambda vertex: int(vertices[vertex]))
-    offsets = [rows.offsets for rows in gathered.faces]
+    tables = {keyword: table.rows() for keyword, table in gathered.tables.items()}
+    faces = FaceRows(gathered.counts.rows(), gathered.corners.rows(), gathered.offsets.rows())
     return ObjParts(
-        positions=_stacked(gathered.tables["v"], 3),
-        normals=_stacked(gathered.tables["vn"], 3),
-        uvs=_stacked(gathered.tables["vt"], 2),
+        positions=tables["v"],
+        normals=tables["vn"],
+        uvs=tables["vt"],
         colors=_colors(gathered),
-        counts=np.concatenate([np.zeros(0, np.int64), *(rows.counts for rows in gathered.faces)]),
-        corners=checked_corners(source, gathered.faces, gathered.before),
-        offsets=np.concatenate([np.zeros(0, np.int64), *offsets]),
+        counts=faces.counts,
+        corners=checked_corners(source, faces, gathered.faults, gathered.before),
+        offsets=faces.offsets,
         runs=gathered.runs,
         libraries=gathered.libraries,
     )
@@ -134,20 +145,39 @@ def _colors(gathered: _Gathered) -> Floats | None:
     return colors
 
 
-def _stacked(tables: list[Floats], width: int) -> Floats:
-    return np.concatenate([np.zeros((0, width)), *tables])
-
-
 def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
     for keyword, read in (("v", _positions), ("vt", _uvs), ("vn", _normals)):
         if len(lines.of[keyword]):
-            gathered.tables[keyword].append(read(source, lines, gathered))
+            gathered.tables[keyword].add(read(source, lines, gathered))
     if len(lines.of["f"]):
         faces = read_faces(lines, gathered.before)
-        gathered.faces.append(faces or faulty_faces(source, lines, gathered.before))
+        if faces is None:
+            lines = _without_edges(lines, gathered)
+            faces = read_faces(lines, gathered.before) if len(lines.of["f"]) else _NO_FACES
+        _add_faces(gathered, faces or faulty_faces(source, lines, gathered.before))
     _read_others(source, lines, gathered)
     for keyword, found in lines.of.items():
         gathered.before[keyword] += len(found)
+
+
+def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
+    """Return lines without faces of one or two corners, once Blender's form of loose edges."""
+    counts = np.array([len(lines.text(line).split()) - 1 for line in lines.of["f"].tolist()])
+    is_edge = (counts > 0) & (counts < FEWEST)
+    if not is_edge.any():
+        return lines
+    first = lines.base + int(lines.starts[lines.of["f"][is_edge.argmax()]])
+    gathered.leave_out("edges", int(is_edge.sum()), first)
+    return replace(lines, of={**lines.of, "f": lines.of["f"][~is_edge]})
+
+
+def _add_faces(gathered: _Gathered, faces: FaceRows) -> None:
+    first = gathered.n_faces
+    gathered.n_faces += len(faces.counts)
+    gathered.faults += [replace(fault, faces=fault.faces + first) for fault in faces.faults]
+    gathered.counts.add(faces.counts)
+    gathered.corners.add(faces.corners)
+    gathered.offsets.add(faces.offsets)
 
 
 def _rows(
@@ -159,7 +189,7 @@ def _rows(
 
 def _positions(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
     table, counts, values, rows = _rows(source, lines, gathered, "v", 3)
-    gathered.vertices.append(rows.origins - 1)
+    gathered.vertices.add(rows.origins - 1)
     if len(values) == table.size:
         return table
     wrong = np.flatnonzero((counts == 5) | (counts > 7))
@@ -196,7 +226,7 @@ def _normals(source: Source, lines: Lines, gathered: _Gathered) -> Floats:
 
 
 def _read_others(source: Source, lines: Lines, gathered: _Gathered) -> None:
-    """Record names of materials, groups and objects; warn of unknown keywords."""
+    """Record names of materials, groups and objects; warn about unknown keywords."""
     for line in lines.others.tolist():
         words = lines.text(line).split(None, 1)
         rest = words[1] if len(words) > 1 else b""

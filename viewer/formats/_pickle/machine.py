@@ -46,8 +46,8 @@ class Machine:
     depth : int
         Number of pickles that contain this one.
     persistent, load_bytes : callable or None
-        Return the value of a persistent id, and that of torch's storages saved as bytes; None if
-        the file must not contain any.
+        Functions that return the value of a persistent id, and the value of torch's storages saved
+        as bytes; None if the file must not contain these.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Machine:
             raise self.fail(Phrase("pickle-steps", most=self._most))
 
     def nested(self, data: Data, start: int, end: int) -> Machine:
-        """Return a machine for a pickle inside this one, which continues its budget.
+        """Return a machine for a pickle inside this one; it continues with the same budget.
 
         Raises
         ------
@@ -104,7 +104,7 @@ class Machine:
         """Continue with the budget that a nested machine has left."""
         self._budget = inner._budget
 
-    # Reading bytes.
+    # Methods that read bytes.
 
     def number(self, size: int, *, is_signed: bool = False) -> int:
         """Read an integer of ``size`` bytes, least significant first."""
@@ -156,7 +156,7 @@ class Machine:
         """Return the error for a file damaged by a text-mode transfer."""
         return self.source.fault("F002.pickle-line-ends")
 
-    # The stack.
+    # Methods of the stack.
 
     def push(self, value: object) -> None:
         """Push a value onto the stack."""
@@ -195,7 +195,7 @@ class Machine:
         else:
             self.pop()
 
-    # The memo.
+    # Methods of the memo.
 
     def remember(self, index: int) -> None:
         """Store the topmost value in the memo."""

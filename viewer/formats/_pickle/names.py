@@ -53,7 +53,7 @@ _ROLES = {
     ("builtins", "object"): "object",
     ("__builtin__", "set"): "set",
     ("builtins", "set"): "set",
-    ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" like this in old protocols
+    ("__builtin__", "bytes"): "bytes",  # Python 3 writes b"" in this form in old protocols
     ("builtins", "bytes"): "bytes",
     ("collections", "OrderedDict"): "dict",
     ("collections", "defaultdict"): "defaultdict",

@@ -37,7 +37,7 @@ def warn_of_rest(machine: Machine) -> None:
 
 
 def named_archive(source: Source, kind: str, size: int, whole: object) -> Archive:
-    """Return the values that a pickle built as an archive.
+    """Return the values that a pickle builds, as an archive.
 
     Parameters
     ----------

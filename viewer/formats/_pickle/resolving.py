@@ -1,7 +1,7 @@
 """Conversion of the values that a pickle builds to those of an archive, one key at a time.
 
 Values are converted on demand, so a key that is not needed costs nothing and cannot invalidate the
-others. Shared and self-containing values are traversed within a budget and a depth.
+others. Shared and self-containing values are traversed within limits of budget and depth.
 """
 
 from __future__ import annotations

@@ -53,7 +53,7 @@ def run(machine: Machine) -> object:
 
 
 def _guarded(machine: Machine, action: Callable[[], Result]) -> Result:
-    """Convert refusals of names, arguments and strings to errors that give the file."""
+    """Convert refusals of names, arguments and strings to errors that name the file."""
     try:
         return action()
     except UnicodeError:

@@ -2,7 +2,7 @@
 
 A tensor is ``_rebuild_tensor_v2(storage, offset, size, stride, …)``: element (i, j, …) is at offset
 + i stride[0] + j stride[1] + … of the storage. Several tensors may share a storage, and expanded
-tensors have strides of 0. Everything is checked against the storage before it is read.
+tensors have strides of 0. All values are checked against the storage before it is read.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Inert values on the stack of the pickle machine that represent classes and objects.
 
-Numbers, None, lists, tuples and dicts are Python's own. Everything that a pickle names is an
-instance of a class in this module, created for each file, so that no pickle can affect another.
+Numbers, None, lists, tuples and dicts are plain Python objects. Everything that a pickle names is
+an instance of a class in this module, created for each file, so that no pickle can affect another.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ from viewer.rig.arrays import Deferred
 __all__ = ["Array", "Dtype", "Instance", "Span", "StandIn", "is_sizes", "noun"]
 
 _MOST_AXES = 32
-_PIECE = 1 << 20  # bytes converted at a time
-_LONGEST_SIDE = 1 << 62  # limits products of sizes, so that they can be printed
+_PIECE = 1 << 20  # number of bytes converted at a time
+_LONGEST_SIDE = 1 << 62  # maximum length of an axis, so that products of sizes can be printed
 
 
 class Span:
@@ -109,7 +109,7 @@ class Span:
 class StandIn:
     """An inert stand-in for a class or function in the table of allowed names."""
 
-    name: str  # "scipy.sparse.csc.csc_matrix", for messages
+    name: str  # name for messages, such as "scipy.sparse.csc.csc_matrix"
     role: str
 
 

@@ -1,4 +1,4 @@
-"""Joint and keypoint names missing in the PIG model's files, from its authors' figures."""
+"""Joint and keypoint names from the PIG authors' figures, as the model's files lack them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _JOINTS = (
     "L heel,L ball back,L toe"
 )
 JOINTS = tuple(_JOINTS.split(","))
-"""Names by index; two pairs repeat."""
+"""Names by index; two pairs of names repeat."""
 
 KEYPOINTS = (
     ("nose", "v", 10895),

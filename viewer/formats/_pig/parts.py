@@ -1,4 +1,4 @@
-"""Arrays of a PIG model, read from a folder of text tables or an archive with the same checks."""
+"""Arrays of a PIG model, read from text tables or an archive with the same checks."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Part:
     name : str
         File name or key, for messages.
     values : (N, columns)
-        Numbers; of a sparse matrix (joint, vertex, weight) rows.
+        Numbers; for a sparse matrix, rows of (joint, vertex, weight).
     source : Source
         The file, which records errors.
     offset_of : callable or None
@@ -96,7 +96,7 @@ class Part:
 
 @dataclass(slots=True)
 class PigFiles:
-    """All arrays that were found."""
+    """All arrays of a model that are present."""
 
     parts: dict[str, Part] = field(default_factory=dict)
     part_names: tuple[str, ...] = ()

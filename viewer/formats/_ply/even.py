@@ -12,11 +12,14 @@ from numpy.typing import NDArray
 
 from viewer.formats._ply.header import Element
 
+_WHOLE = 2.0**31
+
 __all__ = ["Columns", "even_binary", "even_text"]
 
 Numbers = NDArray[Any]
 Columns = tuple[dict[str, Numbers], dict[str, tuple[NDArray[np.int64], Numbers]]]
-"""Properties by name, and lists by name: the number of values of each row, and all values."""
+"""Properties by name, and lists by name. A list consists of the number of values of each row, and
+all values."""
 
 
 def even_text(element: Element, block: NDArray[np.float64]) -> Columns | None:
@@ -35,8 +38,8 @@ def even_text(element: Element, block: NDArray[np.float64]) -> Columns | None:
         if prop.count_kind:
             if (block[:, at] != width).any():
                 return None
-            values = block[:, at + 1 : at + 1 + width].reshape(-1)
-            found[prop.name] = _equal_counts(len(block), width), values
+            values = _compact(block[:, at + 1 : at + 1 + width])
+            found[prop.name] = _equal_counts(len(block), width), values.reshape(-1)
             at += width
         else:
             columns[prop.name] = block[:, at]
@@ -79,6 +82,14 @@ def even_binary(
         else:
             columns[prop.name] = values
     return (columns, found), kind.itemsize
+
+
+def _compact(values: NDArray[np.float64]) -> Numbers:
+    """Return whole numbers as int32, of half the size, and others unchanged."""
+    if not (len(values) and values.min() > -_WHOLE and values.max() < _WHOLE):
+        return values
+    whole = values.astype(np.int32)
+    return whole if (whole == values).all() else values
 
 
 def _equal_counts(count: int, size: int) -> NDArray[np.int64]:

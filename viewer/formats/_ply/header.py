@@ -82,7 +82,7 @@ def read_header(source: Source) -> Header:
     position, number, has_format = 0, 0, False
     while position < min(len(source.data), _LONGEST):
         match = _LINE.match(source.data, position)
-        assert match is not None  # the pattern matches any text
+        assert match is not None  # the pattern matches every text
         words = match[1].decode("utf-8", "surrogateescape").split()
         if number == 0 and words != ["ply"]:
             raise _no_ply(source, match[1])

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from dataclasses import field
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.data_classes import dataclass
 from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
-from viewer.formats._ply.even import even_binary, even_text
+from viewer.formats._ply.binary_rows import BinaryRows
+from viewer.formats._ply.even import even_text
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
+from viewer.formats._ply.table import Numbers, Places, Table, list_places
 from viewer.formats._source import Source
 from viewer.formats._text.line_sizes import line_sizes
 from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
@@ -23,52 +22,21 @@ from viewer.formats._text.words import number_key
 
 __all__ = ["Table", "read_tables"]
 
-Places = NDArray[np.int64]
 Indices = NDArray[np.integer]
-Numbers = NDArray[Any]
 
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 
-@dataclass(slots=True)
-class Table:
-    """One element's rows.
-
-    Attributes
-    ----------
-    element : Element
-        Declaration of the element in the header.
-    columns : dict of str to (N,)
-        Properties of the element that are not lists.
-    lists : dict of str to ((N,), (M,))
-        List properties: the number of values of each row, and the values of all rows.
-    offset_of : callable or None
-        Returns the offset of a row; slow, for errors only. None in a binary file.
-    is_first : bool
-        Whether it is the first element with its name; later ones are read and discarded.
-    """
-
-    element: Element
-    columns: dict[str, Numbers] = field(default_factory=dict)
-    lists: dict[str, tuple[Places, Numbers]] = field(default_factory=dict)
-    offset_of: Callable[[int], int] | None = None
-    is_first: bool = True
-
-    def offset(self, row: int) -> int | None:
-        """Return the offset of a row in the file; None in a binary file, which has no lines."""
-        return None if self.offset_of is None else self.offset_of(row)
-
-
 def read_tables(source: Source, header: Header) -> dict[str, Table]:
-    """Read all elements, by name.
+    """Read all elements and return them by name.
 
     Raises
     ------
     FormatError
         If there are fewer numbers than the header declares, or words that are not numbers.
     """
-    body: _Text | _Binary
-    body = _Binary(source, header) if header.order else _Text(source, header)
+    body: _Text | BinaryRows
+    body = BinaryRows(source, header) if header.order else _Text(source, header)
     tables: dict[str, Table] = {}
     for element in header.elements:
         table = Table(element, is_first=element.name not in tables)
@@ -89,40 +57,57 @@ def read_tables(source: Source, header: Header) -> dict[str, Table]:
     return tables
 
 
-def _flat(starts: Places, counts: Places, step: int) -> Places:
-    """Return the positions of all values of lists that begin at ``starts``."""
-    total = np.cumsum(counts) - counts
-    return np.repeat(starts - total * step, counts) + np.arange(counts.sum()) * step
-
-
 class _Text:
     """Rows of a text file, one per line; words that are not numbers become NaN."""
 
     def __init__(self, source: Source, header: Header) -> None:
         self.source, self.start = source, header.end
-        self.data = source.data.rstrip(b"\x1a")
-        self.values, bad = parse_numbers(self.data, self.start, len(self.data))
-        if bad >= 0:
-            self.values = parse_words(self.data, self.start, len(self.data))
-        self.has_bad = bad >= 0
-        # The first word of every non-empty line, and its number of words.
-        self.counts = line_sizes(self.data, self.start)
-        self.firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
+        self._lines = line_sizes(self.data, self.start)
+        self.counts = self._lines.words
         self.line = 0
         self._begins: Places | None = None
+        self._firsts: Places | None = None
+        self._values: Numbers | None = None
+        self.has_bad = False  # correct once all values have been parsed
+
+    @property
+    def data(self) -> bytes:
+        """The file, without a final Ctrl-Z."""
+        return self.source.data.rstrip(b"\x1a")
+
+    @property
+    def values(self) -> Numbers:
+        """All values; only irregular files need them together."""
+        if self._values is None:
+            self._values, bad = parse_numbers(self.data, self.start, len(self.data))
+            if bad >= 0:
+                self._values = parse_words(self.data, self.start, len(self.data))
+            self.has_bad = bad >= 0
+        return self._values
+
+    @property
+    def firsts(self) -> Places:
+        """The first word of every non-empty line."""
+        if self._firsts is None:
+            self._firsts = np.cumsum(self.counts, dtype=np.int64) - self.counts
+        return self._firsts
 
     def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
+        """Read an element if all its rows have the same size; return whether they do."""
         element = table.element
         last = self.line + element.count
         if self.has_bad or element.count == 0 or last > len(self.counts):
             return False
         counts = self.counts[self.line : last]
-        first, width = int(self.firsts[self.line]), int(counts[0])
+        width = int(counts[0])
         if (counts != width).any():
             return False
-        block = self.values[first : first + width * element.count].reshape(-1, width)
-        found = even_text(element, block)
+        start, end = (self._lines.offset(line) for line in (self.line, last))
+        values, bad = parse_numbers(self.data, start, end)
+        if bad >= 0:
+            return False
+        first = int(self.counts[: self.line].sum(dtype=np.int64))
+        found = even_text(element, values.reshape(-1, width))
         if found is None:
             return False
         table.columns, table.lists = found
@@ -132,6 +117,7 @@ class _Text:
 
     def begin(self, element: Element) -> Places:
         """Return the first word of each row."""
+        _ = self.values  # parsed first, so that invalid words are known
         last = self.line + element.count * bool(element.properties)
         if last > len(self.firsts):
             raise self.source.fault(
@@ -173,7 +159,7 @@ class _Text:
             raise self._no_count(table, int(wrong[0]), int(cursor[wrong[0]]))
         cursor = cursor + 1
         self._need(cursor + whole)
-        places = _flat(cursor, whole, 1)
+        places = list_places(cursor, whole, 1)
         values = self.values[places]
         if self.has_bad:
             bad = np.flatnonzero(np.isnan(values))
@@ -226,14 +212,16 @@ class _Text:
             self._refuse(int(more[0]), int(cursor[more[0]]))
 
     def finish(self) -> None:
-        """Warn about lines after those of the last element."""
-        left = len(self.firsts) - self.line
+        """Warn about lines after the last element, and release the text."""
+        left = len(self.counts) - self.line
         if left:
             self.source.warn("F006.ply-lines", n=left)
             first = self.firsts[self.line]
             words = first + np.flatnonzero(np.isnan(self.values[first:]))
             if len(words):
                 self._refuse_first(words, Phrase("ply-rest"))
+        del self._lines
+        self.source.release()
 
     def _need(self, cursor: Places) -> None:
         short = np.flatnonzero(cursor > self.rows_left)
@@ -257,128 +245,3 @@ class _Text:
             letters = np.frombuffer(self.data, dtype=np.uint8, offset=self.start)
             self._begins = word_begins(letters)
         return self.start + int(self._begins[word])
-
-
-class _Binary:
-    """Rows of a binary file."""
-
-    def __init__(self, source: Source, header: Header) -> None:
-        self.source, self.order = source, header.order
-        self.data, self.position = source.data, header.end
-
-    def begin(self, element: Element) -> Places:
-        """Return the offset of each row; rows of different sizes are followed by their counts."""
-        sizes = [int(prop.kind[1]) for prop in element.properties if not prop.count_kind]
-        sizes += [int(prop.count_kind[1]) for prop in element.properties if prop.count_kind]
-        left = len(self.data) - self.position
-        if sum(sizes) * element.count > left:
-            raise self._short(element, left)
-        if not element.has_lists:
-            return self.position + np.arange(element.count, dtype=np.int64) * sum(sizes)
-        return self._walked(element)
-
-    def offsets(self, cursor: Places) -> Callable[[int], int] | None:
-        """Return None, as binary files have no lines."""
-        return None
-
-    def take_even(self, table: Table) -> bool:
-        """Read an element whose rows all have the same size; return whether it is one."""
-        element = table.element
-        if element.count == 0:
-            return False
-        counts = self._list_sizes(element, self.position)[1]
-        # Lists longer than the file are refused with the element.
-        if sum(counts) > len(self.data) or any(count < 0 for count in counts):
-            return False
-        found = even_binary(element, self.data, self.position, self.order, counts)
-        if found is None:
-            return False
-        (table.columns, table.lists), size = found
-        self.position += size * element.count
-        return True
-
-    def _row_size(self, element: Element, start: int) -> int:
-        """Return the size of one row in bytes; counts beyond the end of the file are 0."""
-        return self._list_sizes(element, start)[0]
-
-    def _list_sizes(self, element: Element, start: int) -> tuple[int, list[int]]:
-        """Return the size of one row in bytes, and the lengths of its lists as declared."""
-        place, counts = start, list[int]()
-        for prop in element.properties:
-            size = int(prop.kind[1])
-            if prop.count_kind:
-                width = int(prop.count_kind[1])
-                number = int.from_bytes(
-                    self.data[place : place + width],
-                    "little" if self.order == "<" else "big",
-                    signed=prop.count_kind[0] == "i",
-                )
-                counts.append(number)
-                place += width + max(number, 0) * size
-            else:
-                place += size
-        return place - start, counts
-
-    def _walked(self, element: Element) -> Places:
-        """Return the starts of rows, followed one by one because their lists differ in length.
-
-        This takes one iteration per face; files that contain only triangles never need it.
-        """
-        starts = np.empty(element.count, dtype=np.int64)
-        place, end = self.position, len(self.data)
-        for row in range(element.count):
-            starts[row] = place
-            place += self._row_size(element, place)
-            if place > end:
-                raise self._short(element, end - self.position)
-        return starts
-
-    def take(self, table: Table, cursor: Places, prop: Property) -> tuple[Numbers, Places]:
-        """Return the next number of each row."""
-        return self._numbers(cursor, prop.kind)
-
-    def _numbers(self, cursor: Places, kind: str) -> tuple[Numbers, Places]:
-        """Return the number at each offset, in native byte order."""
-        size = int(kind[1])
-        if len(cursor) == 0:
-            return np.zeros(0, dtype=kind), cursor
-        # A window with the size of a number starts at every byte, as rows need not be aligned.
-        windows = np.ndarray(
-            len(self.data) - size + 1, dtype=self.order + kind, buffer=self.data, strides=(1,)
-        )
-        return windows[cursor].astype(kind), cursor + size
-
-    def take_lists(
-        self, table: Table, cursor: Places, prop: Property
-    ) -> tuple[Places, Numbers, Places]:
-        """Return the next list of each row."""
-        counts, cursor = self._numbers(cursor, prop.count_kind)
-        whole = counts.astype(np.int64)
-        wrong = np.flatnonzero(whole < 0)
-        if len(wrong):
-            row = int(wrong[0])
-            item = Phrase("ply-row", element=table.element.name, row=row)
-            raise self.source.fault("F002.ply-list", item=item, found=int(whole[row]))
-        size = int(prop.kind[1])
-        values, _ = self._numbers(_flat(cursor, whole, size), prop.kind)
-        return whole, values, cursor + whole * size
-
-    def end(self, element: Element, cursor: Places) -> None:
-        """Continue after the last row."""
-        if len(cursor):
-            self.position = int(cursor[-1])
-
-    def finish(self) -> None:
-        """Warn about bytes after those of the last element."""
-        left = len(self.data) - self.position
-        if left:
-            self.source.warn("F006.ply-bytes", n=left)
-
-    def _short(self, element: Element, left: int) -> FormatError:
-        return self.source.fault(
-            "F002.ply-short",
-            element.offset,
-            element=element.name,
-            expected=element.count,
-            size=left,
-        )

@@ -82,12 +82,12 @@ class NamedValues:
         Raises
         ------
         FormatError
-            If a value is of a different kind; the error has the line of the first.
+            If a value is of a different kind; the error has the line of the first such value.
         """
         value = self.values.get(key)
         try:
             array = np.asarray(value)
-        except ValueError:  # ragged lists, or lists nested more deeply than an array can be
+        except ValueError:  # the lists are ragged, or nested more deeply than an array can be
             array = np.zeros(0, dtype=object)
         if array.dtype.kind in kinds or (array.size == 0 and array.dtype.kind == "f"):
             return array
@@ -118,7 +118,7 @@ def parse_json(source: Source) -> NamedValues:
         line.
     """
     text = source.data.decode("utf-8", "surrogateescape")
-    odd: set[str] = set()  # accepted by Python but not by JSON
+    odd: set[str] = set()  # Python accepts these words, but JSON does not
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
@@ -158,7 +158,7 @@ def _odd_json(source: Source, text: str) -> FormatError:
         return source.fault(
             "F002.json-constant", _byte_offset(text, constant[1]), found=constant[0]
         )
-    assert repeated is not None  # one of these has been detected
+    assert repeated is not None  # a repeated key is the only remaining reason
     found = printable(repeated[0], 40)
     return source.fault("F002.json-twice", _byte_offset(text, repeated[1]), found=found)
 

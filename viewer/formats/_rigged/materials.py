@@ -143,5 +143,5 @@ def _picture(archive: Archive, key: str) -> Bytes | None:
 
 
 def texts(archive: Archive, key: str) -> tuple[str, ...]:
-    """Return an array of texts."""
+    """Return an array of strings."""
     return tuple(map(str, archive.array(key, (None,), "SU").values().astype(str).tolist()))

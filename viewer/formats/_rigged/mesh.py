@@ -74,12 +74,12 @@ def read_mesh(archive: Archive) -> Mesh:
 
 
 def _more_uvs(number: int) -> list[str]:
-    """Return the keys of the texture coordinates after the first."""
+    """Return the keys of the sets of texture coordinates after the first."""
     return ["second_uvs", *(f"uvs_{index}" for index in range(2, number + 1))][:number]
 
 
 def _present_uvs(archive: Archive) -> list[str]:
-    """Return the keys of the texture coordinates after the first that an archive has."""
+    """Return the keys of the sets of texture coordinates after the first that an archive has."""
     return next(
         _more_uvs(number) for number in count() if not archive.has(_more_uvs(number + 1)[-1])
     )

@@ -112,7 +112,7 @@ def unclosed(source: Source, block: Block, offset: int, found: bytes | None) -> 
 
 
 def to_whole(values: Floats) -> tuple[Ints, int]:
-    """Return numbers as int32, and the index of the first number that this changed, or -1."""
+    """Return numbers as int32, and the index of the first number that conversion changed, or -1."""
     whole = np.clip(values, -_INT32, _INT32 - 1).astype(np.int32)
     differs = whole != values
     whole.flags.writeable = False  # a read-only array need not be copied

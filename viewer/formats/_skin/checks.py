@@ -24,14 +24,15 @@ __all__ = [
     "unbound_skin",
 ]
 
-WEIGHT_TOLERANCE = 0.01  # tolerance of the format; sums farther from 1 cause a warning
+# Tolerance of the format for sums of weights; larger deviations from 1 cause a warning.
+WEIGHT_TOLERANCE = 0.01
 _SINGULAR = 1e-12  # minimum determinant relative to the product of the column lengths
 _NEARLY_SINGULAR = 1e6  # maximum condition number
-_FAR = 1e6  # a vertex this many times the median distance away is stray
+_FAR = 1e6  # multiple of the median distance beyond which a vertex is stray
 
 
 def even_counts(source: Source, sections: Sections) -> None:
-    """Refuse sections whose number of vertices differs from that of the positions.
+    """Refuse sections whose number of vertices differs from the number of positions.
 
     If all other sections agree, the positions are assumed to be wrong.
     """
@@ -109,7 +110,7 @@ def check_mesh(source: Source, sections: Sections, mesh: Mesh) -> None:
         source.warn("F005.skin-texture", sections.offsets["material"])
     # A sample of a few thousand vertices is enough to locate the figure.
     some = mesh.positions[:: max(1, mesh.n_vertices // 4096)]
-    # The middle value replaces np.median, whose import of numpy.ma takes 14 ms at start-up.
+    # The middle value is used instead of np.median, which imports numpy.ma and takes 14 ms.
     middle = len(some) // 2
     center = np.partition(some, middle, axis=0)[middle]
     typical = float(np.partition(np.abs(some - center).max(axis=1), middle)[middle])
@@ -196,7 +197,7 @@ def invert_bindings(source: Source, sections: Sections) -> Floats:
 
 
 def checked_influences(source: Source, sections: Sections, n_joints: int) -> tuple[Ints, Floats]:
-    """Return joints and weights of all influences; refuse indices of joints without binding."""
+    """Return joints and weights of all influences; refuse indices of joints without a binding."""
     joints, weights = sections.joints, sections.weights
     fits = (joints >= 0) & (joints < n_joints)
     if fits.all():

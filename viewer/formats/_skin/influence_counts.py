@@ -11,8 +11,8 @@ from viewer.rig.arrays import Floats
 
 __all__ = ["find_heads"]
 
-_LEAP = 16  # vertices that each step of the Python loop skips
-_SMALL = 1 << 29  # up to this count of numbers, three times the count fits an int32
+_LEAP = 16  # number of vertices that each step of the Python loop skips
+_SMALL = 1 << 29  # maximum count of numbers for which three times the count fits into an int32
 
 
 def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
@@ -25,7 +25,7 @@ def find_heads(values: Floats, count: int) -> NDArray[np.integer] | None:
     size = len(values)
     if count == 0:
         return None if size else np.zeros(0, np.int32)
-    # There are two extra positions, the end of the block and one beyond it; both map to the latter.
+    # There are two extra positions, the end of the block and one beyond it; both map to the second.
     kind: type[np.int32] | type[np.int64] = np.int32 if size < _SMALL else np.int64
     after = np.full(size + 2, size + 1, dtype=kind)
     counts: NDArray[Any] = np.clip(values, 0, size).astype(kind)

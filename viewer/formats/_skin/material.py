@@ -33,7 +33,7 @@ def read_material(
     keywords : container of bytes
         Keywords of sections, which cannot be part of a name.
     pictures : dict
-        Images loaded so far, by name; this material's is added.
+        Images loaded so far, by name; the image of this material is added.
 
     Returns
     -------
@@ -54,7 +54,7 @@ def read_material(
     while (word := source.next_word(position)) is not None and word.group() != b"}":
         if word.group() == b"texture":
             rest = _FILE_NAME.match(source.data, word.end())
-            assert rest is not None  # the pattern matches the empty string too
+            assert rest is not None  # the pattern also matches the empty string
             texture = rest[1].strip().decode("utf-8", "surrogateescape") or None
             named, position = word.start(), rest.end()
         else:

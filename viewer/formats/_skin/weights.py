@@ -1,6 +1,6 @@
 """The ``skinweights`` section of a ``.skin`` file.
 
-It has a count for each vertex, followed by that many pairs of joint and weight. Valid numbers are
+It has a count for each vertex, followed by as many pairs of joint and weight. Valid numbers are
 parsed together; otherwise every word is examined, and an unreadable vertex gets no influence.
 """
 
@@ -79,7 +79,8 @@ def _whole_influences(
     begin, end = block.start, block.end
 
     def offset_of(vertex: int) -> int:
-        # It is preceded by one count per vertex and two words per influence.
+        # The vertex's words follow one count per earlier vertex and two words per earlier
+        # influence.
         return source.number_offset(begin, end, vertex + 2 * int(starts[vertex]))
 
     return starts, joints, weights, offset_of

@@ -23,7 +23,7 @@ def weights_lines(skin: Skin) -> Iterator[bytes]:
         starts = skin.starts[first : first + _AT_ONCE + 1]
         used = slice(int(starts[0]), int(starts[-1]))
         text = _text(starts - starts[0], skin.joints[used], skin.weights[used])
-        # The separator of lines ends with the indentation of the next one.
+        # The separator of lines ends with the indentation of the next line.
         yield b"  " + text[:-2]
 
 

@@ -1,4 +1,4 @@
-"""The optional parts of a body model: shapes, hands, landmarks, texture coordinates, symmetry."""
+"""Optional parts of a body model: shapes, hands, landmarks, texture coordinates, symmetry."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ _NOT_NEEDED = (
 IGNORED = frozenset(_NOT_NEEDED.split())
 """Keys of models that are not needed for posing."""
 
-_SHAPES = 300  # number of shapes of models with at least 400 columns; the expressions follow
+_SHAPES = 300  # number of shapes, before the expressions, of models with at least 400 columns
 _FEW_SHAPES = 10  # number of shapes of older models
 
 

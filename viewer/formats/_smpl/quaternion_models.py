@@ -1,4 +1,4 @@
-"""Arrays in which STAR and SUPR differ from SMPL: correctives, and the joint regressor of SUPR."""
+"""Arrays in which STAR and SUPR differ from SMPL: correctives, and SUPR's joint regressor."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def coordinate_regressor(archive: Archive, matrix: Sparse, n_joints: int) -> Joi
 def quaternion_correctives(
     archive: Archive, n_vertices: int, n_joints: int
 ) -> tuple[Correctives, str] | None:
-    """Return correctives that quaternions drive, and the model's title; None for SMPL's own.
+    """Return correctives that quaternions drive, and the model's title; None for SMPL's.
 
     STAR has four columns for each joint except the root, and one for a shape coefficient; SUPR has
     four for each joint.

@@ -3,7 +3,7 @@
 A word is the text of one number. Its digits form an integer w, and its value is w * 10^q. If w and
 10^|q| are exact in float64, their product or quotient is the correctly rounded value (Clinger
 1990). Otherwise the product is computed to about 100 bits; if its error could change the rounding,
-the word is left to ``float()``.
+the word is converted by ``float()``.
 """
 
 from __future__ import annotations

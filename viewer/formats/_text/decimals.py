@@ -133,15 +133,15 @@ def _nearest(
 def _placed(numbers: Words, exponents: Indices, decimals: Indices, most: int, least: int) -> Digits:
     """Place the point in numbers * 10^-decimals.
 
-    ``exponents`` are those of the first digits; from -4 to below ``most``, no exponent is written.
-    ``least`` is the number of decimals of integers.
+    ``exponents`` are the exponents of the first digits; from -4 to below ``most``, no exponent is
+    written. ``least`` is the number of decimals of integers.
     """
     exponents = np.where(numbers == 0, 0, exponents)
     numbers, decimals = _stripped(numbers, decimals)
     is_exponential = (exponents < -4) | (exponents >= most)
     tails = None
     if is_exponential.any():
-        # One digit before the point.
+        # Write one digit before the point.
         decimals = np.where(is_exponential, decimals + exponents, decimals)
         tails = np.where(is_exponential, _TAILS.take(exponents + 99, mode="clip"), _U(0))
     numbers = numbers * _TENS.take(np.maximum(-decimals, 0))

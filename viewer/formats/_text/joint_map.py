@@ -1,6 +1,6 @@
 """Joint map files: the joint of a motion's skeleton that drives each joint of a figure.
 
-One joint of the figure per line, followed by the joint of the motion; nothing follows ``=`` for a
+Each line contains a joint of the figure and the joint of the motion; nothing follows ``=`` for a
 joint that stays at rest. Joints of the figure that are not listed are matched automatically. ``#``
 at the beginning of a line or after a space begins a comment. A name that contains ``=`` or a quote,
 or begins with ``#``, is in double quotes, with the escapes of JSON::

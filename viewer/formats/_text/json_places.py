@@ -2,7 +2,7 @@
 
 Python's parser is fast, but it does not record offsets. If there is an error, the text is scanned a
 second time, token by token. By then, it is known to be valid JSON, except that it may be nested too
-deeply and contain NaN and infinities.
+deeply or contain NaN and infinities.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def value_place(text: str, path: Sequence[str | int]) -> int | None:
 
 
 def nearest_place(text: str, path: Sequence[str | int]) -> int | None:
-    r"""Return the offset of a key or list item; if it is missing, that of its container.
+    r"""Return the offset of a key or list item; if it is missing, the offset of its container.
 
     None if the outermost container is also missing.
 
@@ -127,7 +127,7 @@ def long_number_place(text: str) -> int | None:
 def _places(text: str) -> Iterator[tuple[Keys, int, bool]]:
     """Yield the path and offset of every value and key, and whether it is a key."""
     path: list[str | int] = []
-    objects: list[bool] = []  # whether each open bracket is that of an object
+    objects: list[bool] = []  # whether each open bracket belongs to an object
     expects_key = False
     for token in _TOKEN.finditer(text):
         word = token.group()

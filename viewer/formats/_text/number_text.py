@@ -54,7 +54,7 @@ class Digits:
     odd: dict[int, bytes] = field(default_factory=dict)
 
     def put(self, other: Digits, places: Indices) -> None:
-        """Replace the digits of the numbers at some indices by those of other numbers."""
+        """Replace the digits of the numbers at some indices by the digits of other numbers."""
         for name in ("minus", "whole", "fraction", "decimals"):
             getattr(self, name)[places] = getattr(other, name)
         if other.tails is not None:

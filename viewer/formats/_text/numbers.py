@@ -45,10 +45,10 @@ _NOT_ZERO = re.compile(rb"[+-]?[0.]*[1-9]")
 _SMALLEST = float(np.nextafter(0.0, 1.0))  # smallest positive float64
 _SPACE = re.compile(rb"[ \t\n\r\v\f]")
 _CHUNK = 1 << 17  # bytes per chunk, whose temporary arrays stay in the processor's cache
-_LONG = 1 << 20  # bytes; the progress of reading longer texts is reported
+_LONG = 1 << 20  # number of bytes above which the progress of reading is reported
 _FEW = 0.25  # maximum fraction of words with more than 8 characters that are evaluated separately
 _HANDFUL = 200  # number of words with an exponent up to which float() is faster
-_MANY = 0.5  # fraction of words with an exponent above which all words are evaluated like these
+_MANY = 0.5  # fraction of words with an exponent above which all words are evaluated like them
 _GROWTH = 1.02  # margin of the array for the expected number of values
 
 

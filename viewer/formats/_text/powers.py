@@ -20,7 +20,7 @@ FARTHEST = 100
 ERROR = 2.0**-99
 """Relative error of a product; its bound is 6 x 2^-106."""
 
-_SPLIT = 134217729.0  # 2^27 + 1: splits a float into two halves of 26 bits
+_SPLIT = 134217729.0  # 2^27 + 1, which splits a float into two halves of 26 bits
 
 
 def times_power(
@@ -40,7 +40,7 @@ def times_power(
     half = values * _SPLIT
     half -= half - values
     rest = values - half
-    # The exact error of the product, because no product of two halves is rounded.
+    # This is the exact error of the product, because no product of two halves is rounded.
     error = half * upper - product
     error += half * lower
     error += rest * upper

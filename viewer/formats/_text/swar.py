@@ -38,7 +38,7 @@ ZEROS = _U(0x3030303030303030)
 _LOW7 = _U(0x7F7F7F7F7F7F7F7F)
 _HIGH_NIBBLES = _U(0xF0F0F0F0F0F0F0F0)
 _SIXES = _U(0x0606060606060606)
-# The mask of the last k characters of a word.
+# Masks of the last k characters of a word.
 _KEEP = np.array([0] + [(1 << 64) - (1 << (64 - 8 * k)) for k in range(1, 9)], dtype=np.uint64)
 
 
@@ -77,7 +77,7 @@ def digits_only(words: Words, lengths: Indices) -> Words:
 
 
 def first_of(words: Words, letters: np.uint64) -> Words:
-    """Return the top bit of the first character that equals that of ``letters``, or 0."""
+    """Return the top bit of the first character that matches its counterpart in ``letters``."""
     x = words ^ letters
     zero = ~(((x & _LOW7) + _LOW7) | x | _LOW7)
     return zero & (~zero + _U(1))

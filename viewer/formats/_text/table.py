@@ -52,7 +52,7 @@ def read_table(
 
 
 def _regular_rows(source: Source, columns: int) -> Floats | None:
-    """Return the rows of a table without errors, (N, columns); None if it has any."""
+    """Return the rows of a table without errors, (N, columns); None if it has errors."""
     from viewer.media.array_cache import slot_of
 
     data = source.data

@@ -5,7 +5,7 @@ r"""Legacy streams of torch: files before version 1.6, and storages inside other
     stream  = magic number, protocol 1001, {"little_endian": …}, value, [key, …], storage …
     storage = number of elements (8 bytes), their bytes; in the order of the keys
 
-The first five are pickles one after another. Storages in the value are persistent ids.
+The first five items are consecutive pickles. Storages in the value are persistent ids.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def read_stream(machine: Machine) -> object:
     Raises
     ------
     FormatError
-        If the stream is damaged, or a storage is missing or has another size than declared.
+        If the stream is damaged, or a storage is missing or does not have the declared size.
     """
     if run(machine) != _NUMBER:
         raise machine.fail(Phrase("torch-magic"))

@@ -38,7 +38,7 @@ def is_torch(directory: ZipDirectory) -> bool:
 
 
 def open_torch(directory: ZipDirectory) -> Archive:
-    """Open a torch file whose value is a dict; raises as ``open_archive`` does."""
+    """Open a torch file whose value is a dict; errors as of ``open_archive``."""
     directory.check(lambda member: member.filename)
     source, members = directory.source, {member.filename: member for member in directory.members}
     found = [name for name in members if name.endswith(_PICKLE)]

@@ -6,7 +6,7 @@
         body_pose (L, 63)  global_orient (L, 3)  betas (L, 10)  transl (L, 3)
     K_fullimg (L, 3, 3)
 
-SMPL-X without hands, whose fingers keep the mean hand; 30 frames per second. The world has y up.
+SMPL-X without hands, whose fingers have the mean pose; 30 frames per second. The world has y up.
 """
 
 from __future__ import annotations
@@ -79,7 +79,7 @@ def _track(part: Archive) -> Track:
 
 
 def _size(intrinsics: Floats) -> tuple[int, int]:
-    """Return the video's size; the tool puts the image centre in the middle."""
+    """Return the video's size, as the tool uses its centre as the image centre."""
     center = intrinsics[0, :2, 2]
     return round(2 * center[0]), round(2 * center[1])
 
@@ -87,10 +87,10 @@ def _size(intrinsics: Floats) -> tuple[int, int]:
 def _camera(
     world: Track, camera: Track, frames: Frames, intrinsics: Floats, rest_roots: RestRoots
 ) -> Cameras:
-    """Return the camera that sees a figure in the world like its counterpart in camera space.
+    """Return the camera for which a figure in the world looks like its counterpart in camera space.
 
     The pelvis is at J0 + t in either space, so R maps the roots' orientations and
-    T = (J0 + t) - R (J0 + t_world), with the figure's own rest pelvis J0.
+    T = (J0 + t) - R (J0 + t_world), with the rest pelvis J0 of the figure.
     """
     roots = [rotation_vector_to_matrix(_root(track)) for track in (world, camera)]
     rotations = np.einsum("nij,nkj->nik", roots[1], roots[0])

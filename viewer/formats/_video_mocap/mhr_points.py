@@ -83,7 +83,7 @@ KEYPOINTS = (
     *("left_olecranon", "right_olecranon", "left_cubital_fossa", "right_cubital_fossa"),
     *("left_acromion", "right_acromion", "neck"),
 )
-"""Names of the keypoints; those of the fingers begin at the tip."""
+"""Names of the keypoints; names of fingers begin at the tip."""
 
 _LIMBS = (
     "ankle-knee knee-hip shoulder-hip shoulder-elbow elbow-wrist ankle-big_toe ankle-small_toe "

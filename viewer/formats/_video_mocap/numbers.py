@@ -37,11 +37,11 @@ Frames = np.ndarray[Any, np.dtype[np.int64]]
 # Maximum number of frames of all people: 18 hours of one person, about a gigabyte.
 _MOST_ROWS = 2_000_000
 _PERSON = re.compile(r"-?[0-9]{1,9}")
-_SMALLEST = 1e-3  # minimum determinant; that of a rotation is 1, of a missing one 0
+_SMALLEST = 1e-3  # minimum determinant; a rotation has 1, a missing rotation 0
 
 
 class RowBudget:
-    """Counts the frames of all people, because dicts that share arrays multiply them."""
+    """Limit of the number of frames of all people, which dicts that share arrays could multiply."""
 
     def __init__(self, archive: Archive, most: int = _MOST_ROWS) -> None:
         self._archive, self._most, self._left = archive, most, most
@@ -120,9 +120,9 @@ def frames_of(archive: Archive, key: str, count: int) -> Frames:
 
 
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return rotation vectors of rotation matrices, whose last axes are 3 x 3; zeros are identity.
+    """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
 
-    Single precision leaves matrices that are not exactly orthogonal; the nearest rotation is used.
+    Matrices in single precision are not exactly orthogonal; the nearest rotation is used.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
 
 
 def rotations_of(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return rotation matrices, made exactly orthogonal; see ``matrices``."""
+    """Return exactly orthogonal rotation matrices; see ``matrices``."""
     return _rotations(archive, key, rows(archive, key, shape))
 
 

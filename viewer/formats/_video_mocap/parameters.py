@@ -66,7 +66,7 @@ _PEOPLE = ("person_id", "track_id", "tracklet_id", "person", "pid", "id")
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _LARGEST = 1 << 30  # maximum number of a frame or person
 _DEEPEST = 3  # maximum depth of dicts inside dicts
-_COST = 20  # frames; inspecting a dict takes about as long as reading this many
+_COST = 20  # number of frames that take about as long to read as one dict takes to inspect
 _LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
 _LISTED = 12  # maximum number of ignored keys that are listed
 
@@ -203,7 +203,7 @@ def _found(
 def _people(
     source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]]
 ) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are the frames of few people.
+    """Return the tracks of people: dicts of single frames are combined into people.
 
     Single frames with different joints or numbers of coefficients are different people.
     """
@@ -223,7 +223,7 @@ def _people(
 def _people_of_frames(
     source: Source, found: list[tuple[Archive, _Layout]], tracks: list[Track]
 ) -> dict[int, Track]:
-    """Return the people of single frames, by their numbers or else by how often a frame occurs."""
+    """Return the people of single frames; without numbers, they are counted within each frame."""
     persons = [_number(archive, layout.person) for archive, layout in found]
     known = [person for person in persons if person is not None and person >= 0]
     if len(known) < len(tracks):
@@ -284,7 +284,7 @@ def _width(shape: Floats | None) -> int:
 def _joined(tracks: list[Track]) -> Track:
     """Return the frames of one person, each of which is a separate dict.
 
-    Frames keep their numbers if all are different; else they are in the given order.
+    The numbers of frames are used if all are different; otherwise frames are in the given order.
     """
     numbers = np.concatenate([track.frames for track in tracks])
     frames, order = np.unique(numbers, return_index=True)

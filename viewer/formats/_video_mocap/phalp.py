@@ -6,8 +6,8 @@
                       size (height, width), smpl {global_orient (1, 3, 3), body_pose (23, 3, 3),
                       betas (10,)}; bbox, mask, 3d_joints … are not read
 
-SMPL in the camera's space, with ``camera`` as its translation. Trackers keep lost people for a
-while: they are listed in ``tid``, but ``tracked_time`` counts the frames since they were seen.
+SMPL in the camera's space, with ``camera`` as its translation. Trackers continue to list lost
+people in ``tid`` for a while, but ``tracked_time`` counts the frames since they were last seen.
 """
 
 from __future__ import annotations
@@ -141,7 +141,7 @@ def _track(archive: Archive, rows: list[tuple[int, Floats]]) -> Track:
 
 
 def _size(frame: Archive) -> tuple[int, int] | None:
-    """Return width and height of the video, from the first detection that gives them."""
+    """Return width and height of the video, from the first detection that states them."""
     try:
         sizes = frame.array("size", (None, 2)).values() if frame.has("size") else np.zeros((0, 2))
     except FormatError:

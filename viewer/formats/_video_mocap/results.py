@@ -55,7 +55,7 @@ class Track:
     shape : (N, S), (1, S) or None
         Shape coefficients.
     hands : mapping of side to (N, C)
-        As for ``BodyMotion``; zeros stand for the mean hand.
+        As for ``BodyMotion``; zeros mean the mean hand.
     world_rotations : (N, 3) or None
         As for ``BodyMotion``.
     layout, points : PointLayout, (N, P, 4)
@@ -78,7 +78,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cameras:
-    """The camera of a video, in each of its frames: pixel K (R X + T), as for ``CameraView``.
+    """The camera of a video, in each of its frames: K (R X + T) in pixels, as for ``CameraView``.
 
     Attributes
     ----------
@@ -110,7 +110,7 @@ class Results:
     model : str
         The member of the SMPL family, or ``"MHR"``; empty if there are no bodies.
     people : mapping of space to {person: Track}
-        ``"world"`` and ``"camera"``, or the one that the file has; the first is the default.
+        ``"world"`` and ``"camera"``, or only the space that the file has; the first is the default.
     ups : mapping of space to axis
         The axis that points up; empty if it is unknown.
     cameras : mapping of space to Cameras
@@ -167,7 +167,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
 
 
 def _shapes_vary(results: Results) -> bool:
-    """Return whether anyone has a shape that changes over time."""
+    """Return whether any person has a shape that changes over time."""
     shapes = [track.shape for people in results.people.values() for track in people.values()]
     return any(shape is not None and bool((shape != shape[:1]).any()) for shape in shapes)
 
@@ -259,7 +259,7 @@ class _Capture:
         )
 
     def view(self, cameras: Cameras) -> CameraView:
-        """Return the camera; frames outside the timeline are dropped."""
+        """Return the camera; frames outside the timeline are omitted."""
         intrinsic, size = cameras.intrinsics[0], cameras.size
         if size is not None and not 0 < min(size) <= max(size) < _LARGEST:
             size = None

@@ -40,7 +40,7 @@ class Form:
 
 
 def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
-    """Return the form of an array; None if it has none of these numbers of joints.
+    """Return the form of an array; None if it does not have one of these numbers of joints.
 
     Parameters
     ----------

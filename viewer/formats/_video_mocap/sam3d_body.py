@@ -50,7 +50,7 @@ _PARAMETERS = (
 )
 _MODEL = ("mhr_model_params", "shape_params", "expr_params")
 _MOST_POINTS = 4_000_000  # maximum number of points of a person in all frames: 128 MB
-_COST = 10  # frames; inspecting a person takes about as long as reading this many
+_COST = 10  # number of frames that take about as long to read as one person takes to inspect
 _LOOKED_AT = 1000  # number of frames or people of which at least one must be recognised
 _SUFFIXES = (".npz", ".pkl")
 
@@ -92,7 +92,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
     Raises
     ------
     FormatError
-        If a shape differs from those of the tool, or a number is not finite.
+        If a shape differs from the tool's, or a number is not finite.
     """
     place = shape_of(archive, _PLACE)
     lead = place[:1] if len(place) == 2 else ()
@@ -124,7 +124,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
 
 
 def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
-    """Return values with an axis of frames."""
+    """Return values with a first axis of frames."""
     return values if lead else values[None]
 
 
@@ -162,7 +162,7 @@ def _people(archive: Archive) -> Iterator[tuple[int, int, Archive]]:
         if inner is None:
             continue
         if _is_person(inner):
-            # A list of people is one picture, a dict of people has one for each frame.
+            # A list contains the people of one picture, a dict one person for each frame.
             is_list = archive.keys == tuple(map(str, range(len(archive.keys))))
             yield (0, frame, inner) if is_list else (frame, 0, inner)
             continue
@@ -181,7 +181,7 @@ def claims_folder(source: Source, names: set[str]) -> bool:
     file = Source(source.path / first, max_size=source.max_size)
     try:
         return file.peek(4).startswith((b"PK", b"\x80")) and recognises(archive_of(file))
-    except FormatError:  # a file of another kind in a folder of another format
+    except FormatError:  # the folder is in another format
         return False
 
 
@@ -302,7 +302,7 @@ def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
 
 
 def _camera(cameras: dict[int, Floats]) -> Cameras:
-    """Return the camera of a video; the rig's axes are those of the camera with y and z negated."""
+    """Return the camera of a video; the rig's axes are the camera's with y and z negated."""
     frames = np.array(sorted(cameras), dtype=np.int64)
     intrinsics = np.array([cameras[int(frame)] for frame in frames])
     center = intrinsics[0, :2, 2]

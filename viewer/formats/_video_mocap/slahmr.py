@@ -95,7 +95,7 @@ def read(source: Source, archive: Archive) -> Results:
 
 
 def _intrinsics(archive: Archive) -> Floats:
-    """Return fx, fy, cx and cy: those of the first frame, if there are several."""
+    """Return fx, fy, cx and cy; if there are several frames, of the first."""
     values = rows(archive, "intrins", archive.array("intrins").shape).reshape(-1)
     if len(values) == 0 or len(values) % 4:
         raise archive.fault("F002.video-count", item="intrins", expected=4, found=len(values))

@@ -51,11 +51,11 @@ def module_of(tool: str) -> ModuleType:
 
 
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool; None if there is none."""
+    """Return the key in ``TOOLS`` of an archive's tool, or None."""
     return next((tool for tool in TOOLS if module_of(tool).recognises(archive)), None)
 
 
 def folder_tool(source: Source, names: set[str]) -> str | None:
-    """Return the key in ``TOOLS`` of a folder's tool, given its names; None if there is none."""
+    """Return the key in ``TOOLS`` of a folder's tool, given the folder's file names; or None."""
     tools = (tool for tool, row in TOOLS.items() if row.has_folders)
     return next((tool for tool in tools if module_of(tool).claims_folder(source, names)), None)

@@ -6,7 +6,7 @@
            frame_ids (T,)  verts (T, 6890, 3), which are not read
 
 SMPL with a shape per frame. The world has y up; its ``trans_world`` is read as SMPL's translation,
-whereas WHAM's own renderings place the midpoint of the hips there. The camera's focal length is the
+whereas WHAM's renderings place the midpoint of the hips there. The camera's focal length is the
 diagonal of the video, whose size is not in the file.
 """
 

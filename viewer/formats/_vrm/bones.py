@@ -10,7 +10,7 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.json_parts import is_index, part
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
-__all__ = ["read_humanoid"]
+__all__ = ["modern_bone", "read_humanoid"]
 
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 
@@ -37,7 +37,7 @@ def read_humanoid(
     given: list[tuple[Any, Any]] = []
     if version == 0 and isinstance(bones, list):
         given = [(part(each, "bone"), part(each, "node")) for each in bones]
-        given = [(_modern(bone), node) for bone, node in given if isinstance(bone, str)]
+        given = [(modern_bone(bone), node) for bone, node in given if isinstance(bone, str)]
     elif isinstance(bones, dict):
         given = [(bone, part(each, "node")) for bone, each in bones.items()]
     found: dict[str, int] = {}
@@ -51,7 +51,12 @@ def read_humanoid(
     return found
 
 
-def _modern(bone: str) -> str:
+def modern_bone(bone: str) -> str:
+    """Return the name in VRM 1.0 of a human bone of VRM 0.x.
+
+    >>> modern_bone("leftThumbProximal"), modern_bone("hips")
+    ('leftThumbMetacarpal', 'hips')
+    """
     for old, new in _OLD_THUMB.items():
         if bone.endswith(old):
             return bone.removesuffix(old) + new

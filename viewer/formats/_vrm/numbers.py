@@ -23,12 +23,12 @@ def value_of(told: Any, default: float) -> float | None:
     if told is None:
         return default
     is_number = isinstance(told, int | float) and not isinstance(told, bool)
-    # Numbers far outside any sensible range would overflow in products.
+    # Numbers far outside a plausible range would overflow in products.
     return float(told) if is_number and math.isfinite(told) and abs(told) < _LARGEST else None
 
 
 def rows_of(told: Any, default: tuple[float, ...]) -> Floats | None:
-    """Return a vector of as many numbers as the default; None if it is invalid."""
+    """Return a vector with as many numbers as the default; None if it is invalid."""
     if told is None:
         return np.array(default)
     if not isinstance(told, list) or len(told) != len(default):

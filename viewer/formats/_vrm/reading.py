@@ -1,7 +1,7 @@
 """Humanoid bones, expressions and permissions of a VRM file.
 
 Specifications: ``github.com/vrm-c/vrm-specification``, ``VRM`` 0.0 and ``VRMC_vrm`` 1.0. Version 0
-names the joints of a thumb differently, gives the weights of expressions in percent, and binds
+names the joints of a thumb differently, states the weights of expressions in percent, and binds
 them to meshes instead of nodes.
 """
 
@@ -19,7 +19,8 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.bones import read_humanoid
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
-from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.json_parts import is_index, listed, part
+from viewer.formats._vrm.material_values import modern_binds, old_binds
 from viewer.formats._vrm.references import named_nodes
 from viewer.formats._vrm.springs import read_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
@@ -87,7 +88,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
 
 
 def _contents(file: NodeFile) -> tuple[tuple[str, str], ...]:
-    """Return facts about parts that are drawn in one view only, and about constraints."""
+    """Return facts about parts that are drawn in only one view, and about constraints."""
     names = file.tree.names
     shown = {f"{each.replace('-', ' ')} only": each for each in ("first-person", "third-person")}
     facts = [
@@ -120,28 +121,28 @@ def _shortened(text: str) -> str:
 def _expressions(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> tuple[NodeExpression, ...]:
-    """Return the expressions that bind morph targets; report those that only change materials."""
+    """Return the expressions that change shapes or materials; report changes without effect."""
     if version == 0:
-        groups = part(told, "blendShapeMaster", "blendShapeGroups")
-        listed = groups if isinstance(groups, list) else []
-        named = [(each.get("name"), each) for each in listed if isinstance(each, dict)]
+        groups = listed(told, "blendShapeMaster", "blendShapeGroups")
+        named = [(each.get("name"), each) for each in groups if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
         kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
         named = [item for kind in kinds if isinstance(kind, dict) for item in kind.items()]
         at = f"{pointer}/expressions"
-    found, undrawn = [], []
+    found, undrawn = [], list[str]()
+    materials = listed(told, "materialProperties")
     for name, each in named:
         if not isinstance(each, dict):
             continue
         binds = _binds(source, file, each, version, at)
-        if any(
-            each.get(key)
-            for key in ("materialColorBinds", "textureTransformBinds", "materialValues")
-        ):
-            undrawn.append(str(name))
-        if binds:
-            found.append(_expression(str(name), each, binds))
+        if version == 0:
+            changes, lost = old_binds(each, materials[: len(file.materials)])
+        else:
+            changes, lost = modern_binds(each, len(file.materials))
+        undrawn += [f"{name}: {one}" for one in lost]
+        if binds or changes:
+            found.append(replace(_expression(str(name), each, binds), materials=tuple(changes)))
     if undrawn:
         source.warn("F007.vrm-materials", at, names=undrawn)
     return tuple(found)
@@ -168,9 +169,8 @@ def _binds(
     source: Source, file: NodeFile, told: Mapping[str, Any], version: int, pointer: str
 ) -> tuple[tuple[int, int, float], ...]:
     """Return node, morph target and weight of each bind of an expression."""
-    listed = told.get("binds" if version == 0 else "morphTargetBinds")
     binds: list[tuple[int, int, float]] = []
-    for each in listed if isinstance(listed, list) else ():
+    for each in listed(told, "binds" if version == 0 else "morphTargetBinds"):
         index, weight = part(each, "index"), part(each, "weight")
         if version == 0:
             mesh, scale = part(each, "mesh"), 1.0 / _PERCENT

@@ -1,4 +1,4 @@
-"""Chains of springs, such as hair and skirts: ``VRMC_springBone`` 1.0, ``secondaryAnimation``.
+"""Chains of spring joints: ``VRMC_springBone`` 1.0 and ``secondaryAnimation``.
 
 ::
 

@@ -36,7 +36,7 @@ class Accumulation:
         self.context, self.size, self.count = context, size, 0
         self._owner = Owner()
         keep = self._owner.keep
-        what = f"the sum of pictures of {size[0]} x {size[1]} pixels"
+        what = f"the sum of images of {size[0]} x {size[1]} pixels"
         with self._owner.guard():
             self._sum = keep(checked(context, context.texture(size, 4, dtype="f4"), what))
             self._framebuffer = keep(context.framebuffer([self._sum]))

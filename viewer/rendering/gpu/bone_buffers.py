@@ -20,7 +20,7 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["BoneBuffers"]
 
-_BALL = -2  # marks a ball, in place of a child
+_BALL = -2  # value of the child's index that marks a ball
 _MANY = 1000  # number of joints above which balls, which may all coincide, are omitted
 _GREY = (0.30, 0.32, 0.35)  # linear
 
@@ -33,7 +33,7 @@ _ARROW = (0.05, 0.0012, 0.0040)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Rows:
-    """Instances of one shape: their links, free ends, widths and colours, each (N, ...)."""
+    """Instances of one shape: links, free ends, widths and colours, each (N, ...)."""
 
     links: Ints
     ends: Floats

@@ -18,7 +18,7 @@ _END = 0.4  # length of an end, relative to the previous bone
 _END_LIMITS = 0.01, 0.07  # minimum and maximum length of an end, relative to the figure's size
 _AXIS = 0.4  # length of axes, relative to the shortest bone at the joint
 _AXIS_LIMITS = 0.008, 0.06  # minimum and maximum length of axes, relative to the figure's size
-_REACH = 12.0  # maximum size of a figure relative to its long bones: roots may be far away
+_REACH = 12.0  # maximum size of a figure relative to its long bones, as roots may be far away
 _SAME = 1e-6  # distance below which joints coincide, relative to the figure's size
 
 

@@ -87,9 +87,9 @@ def device_of_worker(
     rank : int
         Number of the worker on its machine.
     devices : sequence of EglDevice, optional
-        Devices; those of this machine if omitted.
+        Devices; this machine's devices if omitted.
     visible : str, optional
-        Value of ``CUDA_VISIBLE_DEVICES``; that of the environment if omitted.
+        Value of ``CUDA_VISIBLE_DEVICES``; taken from the environment if omitted.
 
     Returns
     -------

@@ -27,7 +27,7 @@ _CURVE_BITS = 10  # bits per axis
 
 @dataclass(frozen=True, slots=True)
 class MeshRun:
-    """Consecutive triangles with one material, and of one part until runs are merged.
+    """Consecutive triangles of one material, and of one part until runs are merged.
 
     First index, number of indices, surface, and part; -1 for several or none.
     """
@@ -86,7 +86,7 @@ class IndexSet:
 
     @property
     def is_blended(self) -> bool:
-        """Whether some triangles are blended."""
+        """Whether any triangle is blended."""
         return any(run.surface.is_blended and run.count for run in self.runs)
 
 
@@ -118,7 +118,7 @@ def index_set(
     Returns
     -------
     IndexSet
-        With a run for each material of each part, in the order of the file.
+        Contains a run for each material of each part, in the order of the file.
     """
     parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
     edges = np.flatnonzero((np.diff(materials) != 0) | (np.diff(parts) != 0)) + 1

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
 from viewer.rendering.gpu.ownership import Owner
@@ -13,6 +15,8 @@ from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
 from viewer.rendering.gpu.upload import buffer, float32, offset_texture
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.blendshapes import active_rows
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell, shell_of
 from viewer.rig.mesh import Mesh, bounding_box, split_seams, visible_vertices
@@ -190,7 +194,7 @@ class MeshBuffers:
 
     @property
     def colors(self) -> moderngl.Buffer | None:
-        """A colour for every split vertex by its body part; None if the figure has no parts."""
+        """A colour for every split vertex, by its body part; None if the figure has no parts."""
         parts = self.figure.body_parts
         if self._colors is None and parts is not None:
             from viewer.rendering.part_colors import part_colors
@@ -212,15 +216,20 @@ class MeshBuffers:
         """Number of pose correctives that are skipped together, see ``Correctives.block``."""
         return 1 if self.figure.correctives is None else self.figure.correctives.block
 
-    @property
-    def product(self) -> np.ndarray:
-        """The pose correctives as float32, (P, 3 V), for sums on the CPU."""
+    def summed(self, weights: NDArray[np.floating[Any]]) -> np.ndarray:
+        """Return the sums of the pose correctives, (A, 3 V) float32, for weights (A, P)."""
+        correctives = self.figure.correctives
+        assert correctives is not None  # checked by the caller
+        if isinstance(correctives.offsets, SparseOffsets):
+            rows = (correctives.displacement(row).reshape(-1) for row in weights.astype(np.float64))
+            return float32(np.stack([*rows]))
         if self._product is None:
-            correctives = self.figure.correctives
-            assert correctives is not None  # checked by the caller
             values = correctives.values()
             self._product = float32(values.reshape(len(values), -1))
-        return self._product
+        total = np.zeros((len(weights), self._product.shape[1]), "f4")
+        for run in active_rows(np.abs(weights).max(axis=0), self.block):
+            total += weights[:, run].astype("f4") @ self._product[run]
+        return total
 
     def release(self) -> None:
         """Free every buffer and texture."""

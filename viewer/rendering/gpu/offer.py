@@ -30,7 +30,7 @@ class Offer:
 
 
 def headless_offer(options: Mapping[str, Any]) -> Offer | None:
-    """Return the OpenGL version that the machine offers without a window; None if there is none.
+    """Return the OpenGL version that the machine offers without a window; None if it offers none.
 
     Parameters
     ----------

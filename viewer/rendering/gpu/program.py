@@ -143,7 +143,7 @@ class Programs:
             )
             geometry = _compose(f"{middle}.geom", "", files) if middle else None
             if geometry:
-                # Both stages output the fragment shader's inputs: those of the vertex shader are
+                # Both stages output the fragment shader's inputs: the vertex shader's outputs are
                 # renamed.
                 vertex = re.sub(r"\bv_(\w+)", r"v_vertex_\1", vertex)
             try:

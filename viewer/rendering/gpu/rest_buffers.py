@@ -1,4 +1,4 @@
-"""Rest vertices of one actor: those of the figure, or a copy with shape and correctives applied.
+"""Rest vertices of one actor: the figure's, or a copy with shape and correctives applied.
 
 Pose correctives are summed in one of two ways. On a graphics card, the vertex shader sums them
 from a texture, and a frame uploads only the weights. Software drivers are several times faster
@@ -96,8 +96,6 @@ class RestBuffers:
 
     def _write(self, figure: Figure, weights: Floats | None, normals: bool) -> None:
         """Upload positions, and normals if the shape changed, of every split vertex."""
-        from viewer.rig.blendshapes import active_rows
-
         shape = figure.require_mesh()
         if self._own is None:
             size = self.mesh.positions.size
@@ -111,9 +109,7 @@ class RestBuffers:
             normals = True
         rest = float32(shape.positions - self.mesh.center)
         if weights is not None:
-            product = self.mesh.product
-            for rows in active_rows(weights, self.mesh.block):
-                rest += (float32(weights[rows]) @ product[rows]).reshape(-1, 3)
+            rest += self.mesh.summed(weights[None])[0].reshape(-1, 3)
         self.positions.write(rest[self.mesh.sources])
         if normals:
             self.normals.write(float32(shape.normals[self.mesh.sources]))

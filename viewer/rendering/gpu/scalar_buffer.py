@@ -105,7 +105,7 @@ class ScalarBuffer:
 
     def use(self, unit: int) -> None:
         """Bind the colours to a texture unit."""
-        assert self._colors is not None  # set before drawing
+        assert self._colors is not None  # ``show`` is called before drawing
         self._colors.use(unit)
 
     def _has(self, look: ScalarLook) -> bool:

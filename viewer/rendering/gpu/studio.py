@@ -12,7 +12,7 @@ from viewer.resources import resource
 __all__ = ["STUDIO_SAMPLERS", "Matcaps", "Studio"]
 
 STUDIO_SAMPLERS = {"u_studio": 13, "u_split_sum": 7, "u_matcap": 7}
-"""Texture units other than those of materials and effects; no program uses both of the last two."""
+"""Texture units that materials and effects do not use; no program uses both of the last two."""
 
 _SRGB8 = 0x8C41
 

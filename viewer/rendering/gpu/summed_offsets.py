@@ -14,7 +14,6 @@ from viewer.rendering.gpu.upload import (
     write_stacked,
 )
 from viewer.rig.arrays import Floats
-from viewer.rig.blendshapes import active_rows
 
 __all__ = ["SummedOffsets"]
 
@@ -94,14 +93,10 @@ class SummedOffsets:
 
     def _sum(self, rows: NDArray[np.intp], count: int) -> None:
         """Multiply the weights of all changed instances by the offsets in one product."""
-        product, size = self.mesh.product, 3 * len(self.mesh.copies)
+        size = 3 * len(self.mesh.copies)
         if len(self._sums) < count:
             self._sums, rows = np.zeros((count, size), "f4"), np.arange(count)
-        weights = self._weights[rows]
-        total = np.zeros((len(rows), size), "f4")
-        for run in active_rows(np.abs(weights).max(axis=0), self.mesh.block):
-            total += weights[:, run] @ product[run]
-        self._sums[rows] = total
+        self._sums[rows] = self.mesh.summed(self._weights[rows])
         texels = count * size // 3
         if self._summed is None or self._summed.width * self._summed.height < texels:
             if self._summed is not None:

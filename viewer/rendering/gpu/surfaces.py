@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 import moderngl
@@ -15,6 +15,7 @@ from viewer.rendering.gpu.program import set_uniforms
 from viewer.rendering.gpu.upload import picture_texture
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import ALPHA_MODES, TEXTURES, Material, Texture
+from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.mesh import Mesh
 
 __all__ = ["PLAIN", "SAMPLERS", "Surface", "drawn_sets", "needs_materials", "upload_surfaces"]
@@ -33,6 +34,8 @@ SAMPLERS = {
 _UNITS = tuple(SAMPLERS.values())
 _MOST_SETS = 3  # maximum number of texture coordinate sets that one figure's textures may use
 _COLORS = ("base_texture", "emissive_texture", "shade_texture")  # sRGB
+# Toon materials have no metalness and roughness: their other textures use the units of these.
+_MATCAP, _RIM, _WIDTH = "metallic_texture", "roughness_texture", "occlusion_texture"
 _UNTEXTURED: dict[str, Any] = {
     "u_textured": False,
     "u_has_metallic_map": False,
@@ -62,6 +65,8 @@ class Surface:
         Whether the triangles are drawn after all opaque ones.
     double_sided : bool
         Whether back faces are drawn.
+    outline : Outline or None
+        Line around the triangles.
     """
 
     uniforms: dict[str, Any] = field(default_factory=lambda: _uniforms(Material(), {}, ()))
@@ -70,6 +75,7 @@ class Surface:
     is_physical: bool = False
     is_blended: bool = False
     double_sided: bool = True
+    outline: Outline | None = None
 
     def use(self, program: moderngl.Program, textured: bool) -> None:
         """Set uniforms and bind textures."""
@@ -79,6 +85,11 @@ class Surface:
             return
         for unit, texture in self.textures:
             texture.use(unit)
+
+    def changed(self, material: Material) -> Surface:
+        """Return the surface with the colours and placements of a changed material."""
+        values = {**_colors(material), "u_places": _places(material)}
+        return replace(self, uniforms={**self.uniforms, **values}, outline=material.outline)
 
 
 def needs_materials(mesh: Mesh) -> bool:
@@ -103,7 +114,7 @@ def drawn_sets(mesh: Mesh, notes: list[str]) -> tuple[int, ...]:
     used = {
         texture.uv_set
         for material in mesh.materials
-        for texture in material.textures.values()
+        for texture in _slots(material).values()
         if texture.image is not None and 0 < texture.uv_set <= len(mesh.other_uvs)
     }
     sets = (0, *sorted(used))
@@ -141,10 +152,11 @@ def upload_surfaces(
     surfaces = []
     for material in materials:
         found: dict[str, moderngl.Texture] = {}
-        for name, texture in material.textures.items():
+        is_toon = material.shade_color is not None
+        for name, texture in _slots(material).items():
             if texture.image is None or texture.uv_set not in sets:
                 continue
-            is_linear = name not in _COLORS
+            is_linear = name not in (*_COLORS, *((_MATCAP, _RIM) if is_toon else ()))
             filters = texture.is_smooth, texture.minification
             key = id(texture.image), is_linear, texture.wrap, filters
             if key not in made:
@@ -190,23 +202,37 @@ def _surface(
         is_physical=material.is_physical,
         is_blended=material.alpha_mode == "blend",
         double_sided=material.double_sided,
+        outline=material.outline,
     )
+
+
+def _slots(material: Material) -> dict[str, Texture]:
+    """Return the drawn textures, by the field of the material whose texture unit they use."""
+    if material.shade_color is None:
+        return material.textures
+    rim, outline = material.rim, material.outline
+    others = {
+        _MATCAP: None if rim is None else rim.matcap,
+        _RIM: None if rim is None else rim.texture,
+        _WIDTH: None if outline is None else outline.texture,
+    }
+    kept = {name: one for name, one in material.textures.items() if name not in others}
+    return kept | {name: one for name, one in others.items() if one is not None}
 
 
 def _uniforms(
     material: Material, textures: dict[str, moderngl.Texture], sets: Sequence[int]
 ) -> dict[str, Any]:
     """Return all uniforms of a material, since programs keep the values of the previous one."""
-    placed = [getattr(material, name) or Texture("") for name in TEXTURES]
+    placed = _placed(material)
     channels = np.eye(4, dtype="f4")[[texture.channel for texture in placed]]
     slots = [sets.index(one.uv_set) if one.uv_set in sets else 0 for one in placed]
     values: dict[str, Any] = {
         "u_textured": "base_texture" in textures,
-        "u_base_factor": material.base_color or (1.0, 1.0, 1.0, 1.0),
         "u_has_base_factor": material.base_color is not None,
         "u_alpha_mode": ALPHA_MODES.index(material.alpha_mode),
         "u_alpha_cutoff": material.alpha_cutoff,
-        "u_places": np.stack([_place(texture) for texture in placed]).tobytes(),
+        "u_places": _places(material),
         "u_uv_sets": np.array(slots, dtype="i4").tobytes(),
         "u_channels": channels.tobytes(),
         "u_has_metallic_map": "metallic_texture" in textures,
@@ -216,16 +242,42 @@ def _uniforms(
             material.occlusion_strength if "occlusion_texture" in textures else 0.0
         ),
         "u_has_emissive_map": "emissive_texture" in textures,
-        "u_emissive": material.emissive,
         "u_unlit": material.unlit,
         "u_toon": material.shade_color is not None,
-        "u_shade_color": material.shade_color or (1.0, 1.0, 1.0),
         "u_shade_range": material.shade_range,
         "u_has_shade_map": "shade_texture" in textures,
+        **_colors(material),
     }
+    if material.rim is not None:
+        rim = material.rim
+        values |= {"u_rim_power": rim.power, "u_rim_lift": rim.lift, "u_rim_mix": rim.mix}
     if material.is_physical:
         values |= {"u_metallic": material.metallic, "u_roughness": material.roughness}
     return values
+
+
+def _colors(material: Material) -> dict[str, Any]:
+    """Return the uniforms of the colours that expressions may change."""
+    rim = material.rim or Rim()
+    return {
+        "u_base_factor": material.base_color or (1.0, 1.0, 1.0, 1.0),
+        "u_emissive": material.emissive,
+        "u_shade_color": material.shade_color or (1.0, 1.0, 1.0),
+        "u_has_rim": rim.has_effect,
+        "u_rim_color": rim.color,
+        "u_matcap_factor": rim.matcap_factor,
+    }
+
+
+def _placed(material: Material) -> list[Texture]:
+    """Return the texture of each unit; one without pixels for unused units."""
+    slots = _slots(material)
+    return [slots.get(name) or Texture("") for name in TEXTURES]
+
+
+def _places(material: Material) -> bytes:
+    """Return the transforms of the textures of all units."""
+    return np.stack([_place(texture) for texture in _placed(material)]).tobytes()
 
 
 def _place(texture: Texture) -> np.ndarray:

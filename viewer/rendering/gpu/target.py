@@ -89,11 +89,11 @@ class Target:
             check_errors(context, f"an image of {size[0]} x {size[1]} pixels")
         except (moderngl.Error, RenderError):
             self.release()
-            context.clear_errors()  # clears the error of the failed allocation
+            context.clear_errors()  # this clears the error of the failed allocation
             raise self._no_room() from None
 
     def _allocate(self) -> None:
-        """Create the framebuffers; all parts are released if any of them fails."""
+        """Create the framebuffers; if any part fails, all parts are released."""
         context, size, own = self.context, self.size, self._owned
         self.texture = context.texture(size, 4)
         own.append(self.texture)

@@ -135,7 +135,7 @@ def pair_texture(context: moderngl.Context, indices: Any, weights: Any) -> moder
 
 
 def write_pairs(texture: moderngl.Texture, indices: Any, weights: Any) -> None:
-    """Upload (index, weight) pairs into a texture with room for at least as many."""
+    """Upload (index, weight) pairs into a texture with room for all of them."""
     pairs = np.zeros((texture.width * texture.height, 2), "f4")
     # float32 represents every index below 2^24 exactly.
     pairs[: len(indices), 0] = indices

@@ -47,7 +47,7 @@ class Labels:
         Labelled points, scene space.
     ranks : (N,) int
         If there is no room for all labels, lower ranks take precedence, even across annotations;
-        among equal ranks, nearer points do.
+        among equal ranks, nearer points take precedence.
     colors : (N, 3)
         Colours of the text, sRGB, 0 to 1.
     """
@@ -60,7 +60,7 @@ class Labels:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Annotation:
-    """Segments, and labels over them.
+    """Segments, and labels drawn over them.
 
     Attributes
     ----------

@@ -25,8 +25,8 @@ __all__ = [
 
 _DEPTH = 0.2  # distance of the image planes, relative to the size of the scene
 _WIDTH = 1.8  # width of lines, pixels
-_COLOR = (0.10, 0.13, 0.18, 0.95)  # sRGB and opacity
-_TICK = 0.22  # height of the mark above a frustum's upper side, relative to the length of the side
+_COLOR = (0.10, 0.13, 0.18, 0.95)  # colour of lines, sRGB and opacity
+_TICK = 0.22  # height of the mark above a frustum's upper side, relative to that side's length
 _RANK = 1  # rank of the labels: joint names and findings take precedence
 
 
@@ -55,7 +55,7 @@ def camera_centers(cameras: Sequence[CameraView]) -> Floats:
 
 
 def frusta_points(cameras: Sequence[CameraView], box: Floats) -> Floats:
-    """Return the corners and tips of all frusta: (N, 3); ``box`` is that of the scene."""
+    """Return the corners and tips of all frusta: (N, 3); ``box`` is the scene's box."""
     depth = frustum_depth(box)
     corners = [frustum_corners(camera, depth) for camera in cameras]
     return np.concatenate([camera_centers(cameras), *corners])

@@ -17,7 +17,7 @@ from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints, shown_parents
 from viewer.rig.srgb import encode_srgb
 
@@ -69,7 +69,7 @@ class JointMarks:
 
     @property
     def bones(self) -> tuple[Ints, Ints]:
-        """Shown joints with a parent, and these parents: (N,) and (N,)."""
+        """Shown joints with a parent, and their parents: (N,) and (N,)."""
         parents, shown = shown_parents(self.skeleton), shown_joints(self.skeleton)
         children = shown[parents[shown] >= 0]
         return children, parents[children]
@@ -82,8 +82,7 @@ def marks_of(actors: Sequence[Actor]) -> list[JointMarks]:
         skeleton, pose = actor.figure.skeleton, actor.pose
         if skeleton is None or pose is None or not actor.is_drawn:
             continue
-        shape = shaped(actor.figure, pose.shape_weights).skeleton
-        assert shape is not None  # applying a shape keeps the skeleton
+        shape = shaped_skeleton(actor.figure, pose.shape_weights)
         placement = actor.placement @ placement_matrix(pose)
         matrices = placement @ posed_skeleton(shape, pose).world
         found.append(JointMarks(index, skeleton, matrices))

@@ -32,11 +32,11 @@ _WAYS = np.array(
 _REACHES = (1.0, 3.0, 5.0)
 """Distances of labels from their points, in gaps; all but the first have a leader line."""
 
-_ALIKE = 1.0  # pixels; labels of points closer than this may have the same position
+_ALIKE = 1.0  # labels of points closer than this, in pixels, may have the same position
 # Minimum distance of a label from other points, as a multiple of its distance from its own point,
 # or in gaps for a label with a leader line.
 _CLEARER = 1.5
-_FREE = 3.0  # the same distance for a position with plenty of room
+_FREE = 3.0  # the same minimum distance for a position with plenty of room
 _BESIDE_LINE = 0.75  # minimum distance of a leader line from other points, in gaps
 
 

@@ -11,7 +11,7 @@ from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["Cells", "Dots", "summed", "sums_within"]
 
-_FINE = 4  # subdivisions of a pixel per axis; each contains at most one dot
+_FINE = 4  # number of subdivisions of a pixel per axis; each subdivision contains at most one dot
 _BLOCK = 4  # number of cells per axis of a block
 _DENSE = 8  # mean number of dots per block above which dots are split into layers
 _PAIRS = 1 << 18  # number of pairs of a rectangle and a dot per batch
@@ -113,7 +113,7 @@ class Dots:
 
     @property
     def n_layers(self) -> int:
-        """Number of layers; the few dots of the first suffice to reject most crowded positions."""
+        """Number of layers; the first layer's few dots suffice to reject most crowded positions."""
         return len(self._layers)
 
     def _starts(self, places: Ints) -> Ints:
@@ -165,7 +165,7 @@ class Dots:
 
 
 def _levels(places: Ints) -> Ints:
-    """Return layers of dots, (N,): 0 for one dot per block, 1 for one per cell, 2 for the rest."""
+    """Return layers of dots, (N,): 0 for one dot per block, 1 for one per cell, otherwise 2."""
     firsts = _firsts(places // _BLOCK)
     if len(places) < _DENSE * len(firsts):
         return np.zeros(len(places), dtype=np.int32)

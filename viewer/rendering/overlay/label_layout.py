@@ -25,7 +25,7 @@ _FEWEST, _MOST = 256, 1024  # number of labels in the first batch, and maximum o
 _CELL = 0.5  # side length of a cell in gaps, unless this gives too many cells
 # Maximum numbers of cells, above which a grid costs more than it saves.
 _CELLS_PER_LABEL, _MANY_CELLS = 40, 300_000
-_SAMPLES = 5  # number of columns of a label that are tested first; they detect most overlaps
+_SAMPLES = 5  # number of columns of a label that are tested first, which detects most overlaps
 
 
 @dataclass(frozen=True, slots=True, eq=False)

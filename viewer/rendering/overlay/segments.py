@@ -23,7 +23,7 @@ HIDDEN = 0.4
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Segments:
-    """Segments in drawing order; those of length 0 are dots.
+    """Segments in drawing order; segments of length 0 are dots.
 
     Attributes
     ----------

@@ -14,7 +14,8 @@ from viewer.rendering.view import View, set_lights
 
 __all__ = ["BackdropPass"]
 
-_PARALLEL_FOV = 35.0  # degrees, for parallel projections, whose rays would all show the same point
+# Field of view for parallel projections, whose rays would all show the same point, degrees.
+_PARALLEL_FOV = 35.0
 
 
 class BackdropPass:

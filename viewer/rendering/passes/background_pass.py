@@ -18,7 +18,7 @@ _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
 _CLEARED = {
     "white": (1.0, 1.0, 1.0, 1.0),
     "transparent": (0.0, 0.0, 0.0, 0.0),
-    "environment": (0.0, 0.0, 0.0, 0.0),  # drawn by another pass
+    "environment": (0.0, 0.0, 0.0, 0.0),  # another pass draws it
 }
 # Maximum size of a stored gradient; larger ones are drawn each time, to save memory.
 _MOST_PIXELS = 1 << 23
@@ -44,7 +44,7 @@ def parse_color(text: str) -> tuple[float, float, float]:
 
 
 class BackgroundPass:
-    """Clears a target and fills it with its background.
+    """Pass that clears a target and fills it with its background.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ class BackgroundPass:
 
 
 class _Picture:
-    """A stored image that is copied instead of being drawn again."""
+    """Stored image that is copied instead of being drawn again."""
 
     def __init__(
         self, context: moderngl.Context, programs: Programs, size: tuple[int, int]

@@ -55,7 +55,7 @@ class SortedTriangles:
         source : IndexSet
             Triangles of the mesh; the blended ones are used.
         along : (3,)
-            Row of the model-view matrix that gives the depth, which decreases with the distance.
+            Row of the model-view matrix that yields the depth, which decreases with the distance.
         """
         given = tuple(run for run in source.runs if run.surface.is_blended and run.count)
         if given != self._given or source.indices is not self._buffer:

@@ -16,7 +16,7 @@ def bone_style(skeleton: Skeleton, options: DisplayOptions) -> str:
 
 
 def skeleton_opacity(skeleton: Skeleton, options: DisplayOptions) -> float:
-    """Return the opacity of a skeleton that is shown over a skin, 0 to 1."""
+    """Return the opacity of a skeleton that is drawn over a skin, 0 to 1."""
     if options.skeleton_opacity is not None:
         return options.skeleton_opacity
     return OPACITIES[bone_style(skeleton, options)]

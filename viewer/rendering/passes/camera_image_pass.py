@@ -21,7 +21,7 @@ _UNIT = 0
 
 
 class CameraImagePass:
-    """Draws images without their lens distortion; the last image of each camera stays uploaded.
+    """Pass that draws images without lens distortion; each camera's last image stays uploaded.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ __all__ = ["Contact", "ContactPass"]
 
 _SIZE = 256  # texels on each side of the field
 _NEAR, _FAR = 0.04, 0.35  # upper ends of contact and ambient shadow, figure sizes
-_BELOW = 0.05  # depth to which feet may sink into the ground, figure sizes
+_BELOW = 0.05  # maximum depth to which feet sink into the ground, figure sizes
 _NARROW, _WIDE = 0.012, 0.07  # standard deviations of the blurs, figure sizes
 
 
@@ -33,7 +33,7 @@ class Contact:
     Attributes
     ----------
     texture : moderngl.Texture
-        Red is darkness caused by contact, green by occluders farther above, 0 to 1.
+        Red is darkness caused by contact, green darkness caused by occluders farther above, 0 to 1.
     low, high : (2,)
         Opposite corners of the field, along the ground's axes.
     """
@@ -100,7 +100,7 @@ class ContactPass:
         margin = 3.0 * _WIDE * size
         low = (centers - radii)[near, :2].min(axis=0) - margin
         high = (centers + radii)[near, :2].max(axis=0) + margin
-        # Seen from below, right is the first axis and up the second one reversed.
+        # Seen from below, the first axis points right and the second one down.
         below = np.stack([axes[0], -axes[1], -axes[2]])
         bottom, top = height - _BELOW * size, height + _FAR * size
         middle = np.array([0.5 * (low + high)[0], -0.5 * (low + high)[1], -0.5 * (bottom + top)])

@@ -52,7 +52,7 @@ class Ghost:
 
 
 class GhostPass:
-    """Draws ghosts; the mesh is uploaded when a different ghost is drawn.
+    """Pass that draws ghosts; the mesh is uploaded when a different ghost is drawn.
 
     Parameters
     ----------
@@ -106,7 +106,8 @@ class GhostPass:
     def _uploaded(self, figure: Figure) -> PosedMesh:
         if self._posed is None or figure is not self._figure:
             self.release()
-            notes: list[str] = []  # stays empty: a mesh without materials has no textures to reduce
+            # This list stays empty, as a mesh without materials has no textures to reduce.
+            notes: list[str] = []
             with self._owner.guard():
                 buffers = self._owner.keep(MeshBuffers(self.context, figure, notes))
                 posed = self._owner.keep(PosedMesh(self.context, self.programs, buffers))

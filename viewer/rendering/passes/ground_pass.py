@@ -35,7 +35,7 @@ def grid_step(box: Floats) -> float:
 
 
 class GroundPass:
-    """Draws the ground grid.
+    """Pass that draws the ground grid.
 
     Parameters
     ----------
@@ -85,7 +85,8 @@ class GroundPass:
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
             self._ground = self.context.vertex_array(program, content)
-        with without_depth_writes(self.context):  # the translucent grid must not hide later draws
+        # The translucent grid must not hide later draw calls.
+        with without_depth_writes(self.context):
             self._ground.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""Shadows on the ground: those of the key light, and contact shadows."""
+"""Shadows on the ground: the key light's shadows, and contact shadows."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _FIELD_UNIT = 0
 
 
 class GroundShadowPass:
-    """Draws black patches on the ground, whose opacity represents the shadow.
+    """Pass that draws black patches on the ground, whose opacity represents the shadow.
 
     Parameters
     ----------

@@ -26,10 +26,11 @@ FEWEST = 8
 def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[list[Actor]]:
     """Return groups of actors to draw as instances: those with the same figure and shape.
 
-    Small groups use posed buffers instead, so that camera moves need no re-skinning, and so do
-    translucent actors, actors with hidden parts, and meshes that are drawn several times per
-    frame, in the bind pose or coloured by a scalar. If back faces are culled, either all or none of
-    the actors of a group are mirrored, and actors with mirrored joints are drawn individually.
+    Posed buffers are used instead for small groups, so that camera moves need no re-skinning, and
+    for translucent actors, actors with hidden parts, outlines or changed materials, and meshes that
+    are drawn several times per frame, in the bind pose or coloured by a scalar. If back faces are
+    culled, either all or none of the actors of a group are mirrored, and actors with mirrored
+    joints are drawn individually.
 
     Parameters
     ----------
@@ -50,6 +51,7 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
     groups: dict[tuple[int, bytes, bool], list[Actor]] = {}
     for actor in actors:
         pose, is_plain = actor.pose, actor.opacity == 1.0 and not actor.hidden_parts
+        is_plain = is_plain and not _has_own_look(actor)
         if pose is None or not actor.figure.is_attached or not is_plain:
             continue
         is_mirrored = False
@@ -61,6 +63,15 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         key = id(actor.figure), pose.shape_weights.tobytes(), is_mirrored
         groups.setdefault(key, []).append(actor)
     return [group for group in groups.values() if len(group) >= FEWEST]
+
+
+def _has_own_look(actor: Actor) -> bool:
+    """Return whether outlines are drawn, or expressions may change materials."""
+    shapes, mesh, pose = actor.figure.blend_shapes, actor.figure.require_mesh(), actor.pose
+    if any(material.outline is not None for material in mesh.materials):
+        return True
+    has_binds = shapes is not None and shapes.material_binds is not None
+    return has_binds and pose is not None and bool(pose.shape_weights.any())
 
 
 def _has_single_sides(actor: Actor) -> bool:

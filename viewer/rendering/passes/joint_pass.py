@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, world_matrices
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.number_key import NumberKey
 from viewer.rig.pose import Pose, rest_pose
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skeleton import Skeleton, shown_joints
 from viewer.rig.skinning import deform
 
@@ -85,10 +85,9 @@ class SkeletonBuffers:
         """
         if self.is_current(pose, options):
             return
-        skeleton = shaped(self.figure, pose.shape_weights).skeleton
-        assert skeleton is not None  # applying a shape keeps the skeleton
+        skeleton = shaped_skeleton(self.figure, pose.shape_weights)
         are_boxes = self.style(options) == "boxes"
-        # Bones need the matrices of all joints, as they reach from one joint to another.
+        # Bones reach from one joint to another, so they need the matrices of all joints.
         self.boxes.move(posed_skeleton(skeleton, pose).world.copy(), hides=are_boxes)
         self._key = pose.skinning_key, are_boxes
 
@@ -101,7 +100,7 @@ class SkeletonBuffers:
 
 
 class JointPass:
-    """Draws skeletons.
+    """Pass that draws skeletons.
 
     Parameters
     ----------
@@ -156,7 +155,7 @@ class JointPass:
         how = placement, view, options, selected, opacity, color
         draw = partial(draw_joints, program, skeleton, *how)
         if opacity < 1.0:
-            # Only the nearest parts are drawn: the others would show through.
+            # Only the nearest parts are drawn, as the others would show through.
             draw_nearest(self.context, draw)
         else:
             draw()

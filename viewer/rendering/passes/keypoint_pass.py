@@ -56,7 +56,7 @@ class KeypointBuffers:
 
 
 class KeypointPass:
-    """Draws keypoints with the shader program of the joints.
+    """Pass that draws keypoints with the shader program of the joints.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ _MOST = 1000  # number of texts up to which unused texts stay in the texture
 
 
 class LabelPass:
-    """Draws labels.
+    """Pass that draws labels.
 
     Parameters
     ----------

@@ -57,7 +57,7 @@ class LatePasses:
     programs : Programs
         Shader programs shared by all passes.
     mesh_pass, joint_pass : MeshPass, JointPass
-        Passes that some of these passes use for drawing.
+        Passes that some of the optional passes use for drawing.
     buffers : ActorBuffers
         Uploaded buffers.
     """
@@ -172,7 +172,7 @@ class LatePasses:
         return backdrop
 
     def use_pictures(self, meshes: Sequence[MeshBuffers], options: DisplayOptions) -> None:
-        """Bind the textures that shading needs in addition to those of the meshes."""
+        """Bind the textures that shading needs in addition to the meshes' textures."""
         if options.shading == "matcap":
             self.matcaps.use(options.matcap)
         elif any(shading_of(mesh, options) == "pbr" for mesh in meshes):
@@ -210,7 +210,7 @@ class LatePasses:
         at = Moment(scene.time or 0.0, options.path_seconds)
         for index, actor in enumerate(scene.actors):
             joints = tuple(joint for owner, joint in options.path_joints if owner == index)
-            # Paths are drawn across gaps: they show past and future positions of absent actors.
+            # Paths are drawn even while actors are absent, to show their past and future positions.
             if joints and actor.visible and actor.clip is not None:
                 paths = self._buffers.motion_path(actor)
                 paths.update(actor, joints, options.min_confidence)

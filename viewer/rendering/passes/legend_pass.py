@@ -15,7 +15,7 @@ _MARGIN = 0.014  # margin of the legend, as a fraction of the image height
 
 
 class LegendPass:
-    """Draws a legend over everything else.
+    """Pass that draws a legend over everything else.
 
     Parameters
     ----------

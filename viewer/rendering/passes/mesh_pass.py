@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import moderngl
@@ -15,6 +16,7 @@ from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.passes.hull_pass import draw_hulls, outlined_runs
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
 from viewer.rendering.passes.skin_pass import PosedMesh
@@ -45,7 +47,7 @@ _COLORMAP_UNIT = 6
 
 
 class MeshPass:
-    """Draws posed meshes with any shading.
+    """Pass that draws posed meshes with any shading.
 
     Parameters
     ----------
@@ -111,9 +113,41 @@ class MeshPass:
         is_mirrored = mesh.is_mirrored_by(placement)
         array = self.array(mesh, program, indices)
         backs = None if blended else self._back_faces(mesh, placement, view, options)
+        # Blended surfaces write no depth, so their outlines are drawn below them.
+        if blended:
+            self._draw_hulls(mesh, placement, view, options, blended, look_of)
         draw_runs(
             array, indices, options, blended=blended, is_mirrored=is_mirrored, back_faces=backs
         )
+        if not blended:
+            self._draw_hulls(mesh, placement, view, options, blended, look_of)
+
+    def _draw_hulls(
+        self,
+        mesh: PosedMesh,
+        placement: Floats,
+        view: View,
+        options: DisplayOptions,
+        blended: bool,
+        look: Mapping[str, object],
+    ) -> None:
+        """Draw the outlines of toon materials; ``look``: uniforms of the whole mesh."""
+        indices = mesh.index_set(options)
+        runs = outlined_runs(indices.runs, blended)
+        is_shown = uses_materials(mesh, options) and shading_of(mesh.mesh, options) == "pbr"
+        if not runs or not is_shown:
+            return
+        effects = (*fragment_macros(mesh.mesh, view, options), "HULL")
+        program = self.programs.drawing(
+            "hull", "pbr", fragment="mesh", materials=True, effects=effects
+        )
+        set_model(program, view, placement, mesh.center)
+        set_lights(program, view, options.lights)
+        set_surface(program, mesh.mesh, options)
+        set_uniforms(program, look)
+        unit, is_mirrored = mesh.mesh.figure.unit, mesh.is_mirrored_by(placement)
+        array = self.array(mesh, program, indices)
+        draw_hulls(array, runs, placement, unit, options, is_mirrored)
 
     def _back_faces(
         self, mesh: PosedMesh, placement: Floats, view: View, options: DisplayOptions
@@ -200,7 +234,7 @@ class MeshPass:
     def draw_normals(
         self, mesh: PosedMesh, placement: Floats, view: View, size: float, opacity: float = 1.0
     ) -> None:
-        """Draw a line along every vertex normal; ``size`` is that of the figure."""
+        """Draw a line along every vertex normal; ``size`` is the figure's size."""
         program = self.programs.drawing("line")
         set_model(program, view, placement, mesh.center)
         program["u_line_color"] = _premultiplied(_NORMAL_COLOR, opacity)

@@ -33,7 +33,7 @@ _GOLDEN = 0.618033988749895
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """Drawn part of motion paths: ``reach`` seconds before and after ``now``; all if 0."""
+    """Drawn part of motion paths: ``reach`` seconds before and after ``now``; all of them if 0."""
 
     now: float
     reach: float
@@ -142,7 +142,7 @@ def _place(actor: Actor) -> tuple[bytes, float]:
 
 
 class MotionPathPass:
-    """Draws motion paths.
+    """Pass that draws motion paths.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class OutlineTools:
 
 
 class OutlinePass:
-    """Draws outlines over everything, including objects in front of the outlined parts.
+    """Pass that draws outlines over everything, even over objects in front of the outlined parts.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ class OutlinePass:
             If the driver has no room for the masks.
         """
         self._make(target.size, options.samples)
-        assert self._mask is not None  # created above
+        assert self._mask is not None  # ``_make`` created it
         mask = self._mask
         mask.framebuffer.use()
         self.context.viewport = (0, 0, *target.size)

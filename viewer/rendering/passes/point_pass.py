@@ -176,7 +176,7 @@ class PointBuffers:
         kept = np.flatnonzero(shown[limbs].all(axis=1))
         ends = np.concatenate([np.stack([single, single], axis=1), limbs[kept]])
         self._numbers = np.concatenate([single, len(self.layout.names) + kept]).astype(np.int32)
-        # A limb has the confidence of its less certain end.
+        # A limb has the lower confidence of its two ends.
         return ends, np.clip(points[ends, 3].min(axis=1), 0.0, 1.0)
 
     def _write(
@@ -187,8 +187,8 @@ class PointBuffers:
         radii = self._measured[1][ends].min(axis=1)
         radii[ends[:, 0] != ends[:, 1]] *= _LIMB
         sides = self.layout.sides[ends]
-        # A limb from the middle to a side has the side's colour; a limb between the sides has
-        # neither.
+        # A limb from the middle to a side has that side's colour; a limb between sides, the
+        # middle's.
         side = np.sign(sides.sum(axis=1)) + 1
         palette = np.array([RIGHT, actor.color or MIDDLE, LEFT])
         places = (points[ends, :3] - self.center).reshape(-1, 6)
@@ -211,7 +211,7 @@ class PointBuffers:
 
 
 class PointPass:
-    """Draws keypoints and limbs.
+    """Pass that draws keypoints and limbs.
 
     Parameters
     ----------

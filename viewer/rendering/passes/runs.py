@@ -1,4 +1,4 @@
-"""Runs of triangles with one material, drawn with their colours or only as shapes."""
+"""Runs of triangles of one material, drawn with their colours or only as shapes."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def draw_runs(
 ) -> None:
     """Draw all opaque or all blended triangles, one material at a time.
 
-    Of blended triangles that are not sorted, the back faces are drawn first. Back faces of opaque
+    If blended triangles are not sorted, their back faces are drawn first. Back faces of opaque
     triangles are drawn only in the regions ``back_faces``, if given.
     """
     two_passes = blended and isinstance(indices, IndexSet)

@@ -18,7 +18,7 @@ from viewer.rig.geometry.transform import translation_matrix
 __all__ = ["ShadowPass", "light_view", "map_side", "parallel_view"]
 
 _SIDES = 256, 2048  # minimum and maximum number of texels on each side of a shadow map
-_MARGIN = FILTER_RADIUS + 2.0  # texels without shadow around all casters
+_MARGIN = FILTER_RADIUS + 2.0  # width of the margin without shadow around all casters, texels
 _STEP = 2.0**0.25  # step factor of the map's extent: its resolution is constant while figures move
 _TO_TEXTURE = np.array([[0.5, 0, 0, 0.5], [0, 0.5, 0, 0.5], [0, 0, 0.5, 0.5], [0, 0, 0, 1.0]])
 

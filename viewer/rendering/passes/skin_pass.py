@@ -26,6 +26,7 @@ from viewer.rendering.gpu.upload import (
     write_rigid,
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
+from viewer.rendering.material_looks import MaterialLooks
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
@@ -87,6 +88,7 @@ class PosedMesh:
             self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self._rigid: moderngl.Texture | None = None
         self.back_faces = BackFaces(mesh)
+        self._looks = MaterialLooks(mesh)
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
@@ -97,7 +99,8 @@ class PosedMesh:
     def index_set(self, options: DisplayOptions, as_listed: bool = False) -> IndexSet:
         """Return the drawn triangles; see ``MeshBuffers.index_set``."""
         hidden = options.hidden_parts
-        return self.mesh.index_set(options.reduced, hidden, as_listed, self.hidden_parts)
+        found = self.mesh.index_set(options.reduced, hidden, as_listed, self.hidden_parts)
+        return self._looks.of(found)
 
     def update(self, pose: Pose | None, skinning: Skinning | str = "lbs") -> None:
         """Skin the mesh if pose or method changed since the last call.
@@ -109,6 +112,7 @@ class PosedMesh:
         skinning : Skinning or str
             Skinning settings, or a key of ``viewer.rig.skinning.METHODS``.
         """
+        self._looks.update(pose)
         how = Skinning(skinning) if isinstance(skinning, str) else skinning
         attached = self.mesh.figure.is_attached and pose is not None
         key = (*skinning_options_key(how), pose.skinning_key) if attached and pose else ("binding",)

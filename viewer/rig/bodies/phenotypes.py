@@ -2,7 +2,7 @@
 
 Brégier et al., Human Mesh Modeling for Anny Body. A target belongs to one variation of several
 phenotypes (``female``, ``young``, ``maxmuscle`` ...). A value between two anchors of a phenotype
-gives weights to two variations; a target's coefficient is the product of the weights of its
+assigns weights to two variations; a target's coefficient is the product of the weights of its
 variations::
 
     c_t = prod_{v in t} w_v        w_v: piecewise linear in the phenotype, sums to 1

@@ -12,7 +12,7 @@ __all__ = ["CameraImage", "CameraImages"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CameraImage:
-    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, not undistorted."""
+    """One image: its pixels (H, W, 4) uint8, sRGB, first row at the top, with lens distortion."""
 
     pixels: Bytes
 
@@ -31,7 +31,7 @@ class CameraImages(Protocol):
         """
 
     def size_of(self, camera: str) -> tuple[int, int] | None:
-        """Return the width and height of a camera's images, pixels; None if it has none."""
+        """Return the width and height of a camera's images, pixels; None if it has no images."""
 
     def notes_of(self, camera: str) -> list[str]:
         """Return messages about a camera's missing or unusable images, one line each."""

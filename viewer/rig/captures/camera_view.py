@@ -62,11 +62,11 @@ class CameraView:
     translation : (3,)
         T, scene units.
     size : (int, int) or None
-        Width and height of its images, if the files give them.
+        Width and height of its images, if the files state them.
     distortion : (N,)
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     motion : CameraMotion or None
-        Its placement over time if it moves; the fields above are then those of the first frame.
+        Its placement over time if it moves; the fields above then apply to the first frame.
     """
 
     name: str
@@ -125,7 +125,7 @@ def motion_times(view: CameraView, most: int) -> Floats:
     Parameters
     ----------
     view : CameraView
-        Fixed or moving camera; a fixed one has the time 0.
+        Fixed or moving camera; a fixed camera has only the time 0.
     most : int
         Maximum number of times, at least 2.
     """

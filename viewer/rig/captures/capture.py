@@ -31,9 +31,9 @@ class CapturePart:
     bodies : mapping of person to BodyMotion
         Only the rows of this part; their ``timing`` covers the whole capture, with -1 elsewhere.
     points : mapping of person to (PointLayout, PointClip)
-        The same for keypoints.
+        Keypoints in the same form.
     parameters : mapping of person to ParameterMotion
-        The same for model parameters; people who have both are shown as bodies if the figure of
+        Model parameters in the same form; people who have both are shown as bodies if the figure of
         the bodies has model parameters, otherwise as points.
     warnings : tuple of Diagnostic
         Messages from the reader about these frames.

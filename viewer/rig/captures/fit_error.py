@@ -30,7 +30,7 @@ def fitted_body(points: Actor, actors: Sequence[Actor]) -> Actor | None:
 def keypoint_distances(points: Actor, body: Actor) -> dict[str, float]:
     """Return the distance from each visible keypoint to the corresponding joint.
 
-    The joints are those of the model: regressed from its shaped mesh, then posed.
+    The joints are the model's: regressed from its shaped mesh, then posed.
 
     Parameters
     ----------

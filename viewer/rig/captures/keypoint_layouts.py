@@ -1,6 +1,6 @@
 """Layouts of captured keypoints, chosen by keypoint count: names, limbs and sides.
 
-body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others are those of
+body25 and the orders of hands and face are OpenPose's, panoptic is CMU's; the others come from
 COCO, Human3.6M as EasyMocap orders it (left first), the SMPL family and MediaPipe.
 """
 
@@ -185,7 +185,8 @@ def _part(name: str) -> PointLayout:
 def joined_layout(title: str, parts: Sequence[PointLayout]) -> PointLayout:
     """Return one layout of several sets of keypoints, concatenated.
 
-    A hand that follows a body is attached to the body's wrist: its own wrist is the same point.
+    A hand that follows a body is attached to the body's wrist: the wrist of the hand is the same
+    point.
 
     Parameters
     ----------

@@ -8,8 +8,8 @@ __all__ = ["is_tracked", "person_label", "person_name"]
 def is_tracked(person: int | None) -> bool:
     """Return whether a number identifies a track that follows one person from frame to frame.
 
-    Capture systems give detections without a track the number -1. Here they are numbered -1, -2, -3
-    … within each frame; in the next frame the same number may belong to a different person.
+    Capture systems assign the number -1 to detections without a track. Here they are numbered -1,
+    -2, -3 … within each frame; in the next frame the same number may belong to a different person.
     """
     return person is not None and person >= 0
 

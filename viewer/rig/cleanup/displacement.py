@@ -22,7 +22,7 @@ class Displacement:
     Attributes
     ----------
     mean, largest : float
-        Over joints and frames, figure units.
+        Mean and maximum distance over all joints and frames, figure units.
     joint, frame : int
         Location of the largest distance; frames are numbered as in the first motion.
     n_frames : int

@@ -10,9 +10,9 @@ from viewer.rig.cleanup.frame_rows import runs_of
 __all__ = ["contacts", "mean_speeds"]
 
 # Heights and speeds are relative to the figure's height at rest: 0.02 is 34 mm for a person.
-_LOW, _HIGH = 0.02, 0.035  # height above the lowest positions at which a contact begins, and ends
-_SLOW, _FAST = 0.3, 0.5  # speed per second at which a contact begins, and ends
-_LOWEST = 0.05  # fraction of the frames below the level of the ground
+_LOW, _HIGH = 0.02, 0.035  # heights above the lowest positions at which a contact begins and ends
+_SLOW, _FAST = 0.3, 0.5  # speeds per second at which a contact begins and ends
+_LOWEST = 0.05  # fraction of the frames that are below the ground level
 _WINDOW = 0.1  # seconds over which the speed is averaged
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
 

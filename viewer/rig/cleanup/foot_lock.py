@@ -64,9 +64,10 @@ def lock_feet(
 ) -> tuple[SampledClip, FootLock]:
     """Return a motion whose feet do not slide while they are on the ground.
 
-    In a contact of the ball of a foot, or else of its ankle, that joint stays fixed; the foot keeps
-    its orientation. Before and after contacts the correction fades. Hips and knees rotate so that
-    the ankles reach their targets; if a leg is too short, the body is lowered.
+    During a contact of the ball of a foot, or of its ankle if the ball is not in contact, that
+    joint stays fixed; the foot keeps its orientation. Before and after contacts, the correction
+    fades. Hips and knees rotate so that the ankles reach their targets; if a leg is too short, the
+    body is lowered.
 
     Parameters
     ----------

@@ -51,7 +51,7 @@ def with_rows(clip: Captured, frames: Indices) -> Captured:
     arrays: dict[str, Any] = {}
     for field in fields(clip):
         value = getattr(clip, field.name)
-        # A single row that applies to all frames stays as it is.
+        # A single row that applies to all frames is unchanged.
         if (
             isinstance(value, np.ndarray)
             and len(value) == count

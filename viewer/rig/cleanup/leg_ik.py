@@ -11,7 +11,7 @@ from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaterni
 __all__ = ["Leg", "bend", "reach"]
 
 _STRAIGHT = 0.05  # sine of the knee's angle below which the plane of the leg is undefined
-_REACH = 0.9999  # maximum fraction of the leg's length, as a straight knee has no direction
+_REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +43,9 @@ def bend(
 ) -> tuple[Floats, Floats]:
     """Return the rotations of thigh and shin that bring the ankle to a target.
 
-    The shin rotates about the normal of the leg's plane until the distance from hip to ankle is
-    that of the target (law of cosines). Then the whole leg rotates about the hip by the smallest
-    angle that points it at the target, so the knee keeps its direction.
+    The shin rotates about the normal of the leg's plane until the distance from hip to ankle equals
+    the target's (law of cosines). Then the whole leg rotates about the hip by the smallest angle
+    that points it at the target, so the knee keeps its direction.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ _LONGEST = 1000  # maximum number of frames added at each end
 class OneEuro:
     """One Euro filter, applied forwards and then backwards, so that the delays cancel.
 
-    First, the motion is extended beyond both ends by point reflection, long enough for a pass to
+    First, the motion is extended beyond both ends by point reflection, far enough for a pass to
     settle: uniform motion is unchanged up to its ends, and the end values are preserved.
 
     Each pass is x' = x' + a (x - x'), a = 1 / (1 + r / (2 pi f)) at r frames per second. The cutoff

@@ -15,16 +15,16 @@ from viewer.rig.motion.timing import Timing
 
 __all__ = ["resampled"]
 
-_ON_FRAME = 1e-6  # fraction of a frame; times this close to a frame are treated as that frame
-_MOST_FRAMES = 1_000_000  # 9 hours at 30 frames per second
+_ON_FRAME = 1e-6  # tolerance, as a fraction of a frame, for times that are treated as that frame
+_MOST_FRAMES = 1_000_000  # maximum number of frames: 9 hours at 30 frames per second
 
 
 def resampled(clip: Captured, rate: float) -> Captured:
     """Return a clip with another frame rate, which begins at the same time.
 
     Rotations are interpolated along the shorter arc, everything else linearly. At the times of the
-    original frames, the values are the original ones. A new frame between two original frames is
-    missing if one of those is missing. Frames are counted from 0.
+    original frames, values are unchanged. A new frame between two original frames is missing if
+    either of those is missing. Frames are counted from 0.
 
     Parameters
     ----------

@@ -12,7 +12,7 @@ from viewer.rig.cleanup.tangent import continuous, moved, relative_vectors
 
 __all__ = ["SavitzkyGolay"]
 
-_SECONDS = 0.2  # default length of the window
+_SECONDS = 0.2  # default length of the window, seconds
 _PASSES = 2  # the second pass fits relative to the result of the first, which is less noisy
 
 

@@ -40,7 +40,7 @@ def relative_vectors(base: Floats, quaternions: Floats) -> Floats:
     found = multiply(conjugate(base), quaternions)
     sine = np.linalg.norm(found[..., :3], axis=-1)
     angle = 2.0 * np.arctan2(sine, found[..., 3])
-    # A rotation by almost 0 has the factor angle / sin(angle / 2) = 2.
+    # A rotation by nearly 0 has the factor angle / sin(angle / 2) = 2.
     is_tiny = sine < np.finfo(float).tiny ** 0.5
     factor = np.divide(angle, sine, out=np.full(sine.shape, 2.0), where=~is_tiny)
     return factor[..., None] * found[..., :3]

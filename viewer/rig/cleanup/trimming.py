@@ -11,7 +11,7 @@ __all__ = ["trimmed"]
 
 
 def trimmed(clip: Captured, first: int | None = None, stop: int | None = None) -> Captured:
-    """Return a range of frames of a clip; they keep their times and numbers.
+    """Return a range of frames of a clip, with unchanged times and numbers.
 
     Parameters
     ----------

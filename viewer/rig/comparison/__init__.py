@@ -19,7 +19,7 @@ from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor, actor_points
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skinning import Skinning, deform
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
@@ -70,7 +70,7 @@ def compare(
 
 
 class _Comparison:
-    """Two actors, their matched parts, and the tallies of their differences."""
+    """Two actors, their matched parts, and their accumulated differences."""
 
     def __init__(self, first: Actor, second: Actor, skinning: Skinning, steps: Steps) -> None:
         self.first, self.second, self.skinning, self.steps = first, second, skinning, steps
@@ -268,7 +268,7 @@ def _is_same_topology(first: Mesh, second: Mesh) -> bool:
 def _joint_frames(actor: Actor) -> Floats:
     """Return the joint matrices with the figure's own scale and translation: (J, 4, 4)."""
     pose = actor.require_pose()
-    shape = shaped(actor.figure, pose.shape_weights).require_skeleton()
+    shape = shaped_skeleton(actor.figure, pose.shape_weights)
     return placement_matrix(pose) @ world_matrices(shape, pose)
 
 

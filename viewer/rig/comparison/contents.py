@@ -104,7 +104,7 @@ def _equal(one: object, other: object) -> bool:
 
 
 def _same_texture(one: Texture, other: Texture) -> bool:
-    """Return whether two textures look the same: their names are those of files."""
+    """Return whether two textures look the same: their names are file names."""
     placed = (one.channel, one.uv_set, one.wrap) == (other.channel, other.uv_set, other.wrap)
     if not placed or not _same_transform(one, other):
         return False

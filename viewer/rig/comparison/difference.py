@@ -87,7 +87,7 @@ class Difference:
 
 
 class Tally:
-    """Accumulates a measure step by step.
+    """Accumulator of a measure over all steps.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ class Tally:
     count : int
         Number of joints or vertices.
     items : tuple of str
-        Names of these; empty for vertices, which have indices.
+        Names of the joints; empty for vertices, which have indices.
 
     Attributes
     ----------

@@ -63,7 +63,7 @@ class Steps:
         return len(self.times) or 1 + len(self.dofs)
 
     def pose(self, number: int, first: Actor, second: Actor) -> str:
-        """Pose both actors for one step and return its name; any order is possible."""
+        """Pose both actors for one step and return its name; steps may be in any order."""
         if len(self.times):
             # Each motion is timed from its own start, as captures may start at any frame.
             for actor in (first, second):
@@ -173,7 +173,7 @@ def _test_poses(first: Skeleton, second: Skeleton, n_poses: int) -> Steps:
 
 
 def _random_dofs(skeleton: Skeleton, rows: Ints, limits: Floats, count: int) -> Floats:
-    """Draw random DOF values within both limits, or those of the first if they are disjoint."""
+    """Draw random DOF values within both limits; within the first if the limits are disjoint."""
     is_rotation = skeleton.dof_kinds[rows] >= 3
     # Relative to the skeleton's own extent, as its unit may be unknown.
     reach = _SHIFT * float(np.abs(skeleton.rest_translations).sum(axis=0).max())

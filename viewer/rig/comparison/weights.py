@@ -48,7 +48,7 @@ def skin_at(skin: Skin, triangles: Ints, found: SurfacePoints) -> Skin:
     Parameters
     ----------
     skin : Skin
-        Influences on the mesh that the points lie on.
+        Influences on the mesh on which the points lie.
     triangles : (T, 3)
         Triangles of that mesh.
     found : SurfacePoints

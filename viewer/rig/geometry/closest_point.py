@@ -22,16 +22,16 @@ from viewer.rig.arrays import Bools, Floats, Ints, frozen
 __all__ = ["Surface", "SurfacePoints", "interpolate"]
 
 _PAIRS = 1 << 19  # point-piece pairs per batch, about 150 bytes each
-_LONG = 3.0  # pieces are split above this many times the median radius
+_LONG = 3.0  # multiple of the median radius above which pieces are split
 # Pieces in the first query; if more pieces may lie within the bound, a second query finds all of
 # them.
 _NEAREST = 8
-_POINTS = 1 << 16  # points per batch
+_POINTS = 1 << 16  # number of query points per batch
 _FLAT = 1e-20  # sin^2 of the angle below which a triangle is treated as a segment
 # Bounds are rounded up by this factor, so that rounding never excludes a triangle.
 _SLACK = 1.0 + 1e-9
-_ROUNDED = 1e-12  # rounding of a difference of squared distances, relative to the larger one
-_FEW = 10_000  # points; with fewer, starting threads costs more time than it saves
+_ROUNDED = 1e-12  # rounding error of a difference of squared distances, relative to the larger one
+_FEW = 10_000  # number of points below which starting threads costs more time than it saves
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -341,9 +341,8 @@ def _radii(pieces: Floats) -> Floats:
 def _barycentric(points: Floats, corners: Floats) -> Floats:
     """Return the barycentric coordinates of the closest point of each triangle to a query point.
 
-    If the projection onto the plane lies inside the triangle, it solves the 2 x 2 normal equations
-    of
-    |a + s ab + t ac - p|^2; otherwise the closest point is on one of the three edges.
+    If the projection onto the plane lies inside the triangle, s and t solve the 2 x 2 normal
+    equations of |a + s ab + t ac - p|^2; otherwise the closest point is on one of the three edges.
     """
     ab, ac = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     ap = points - corners[:, 0]

@@ -226,7 +226,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     Parameters
     ----------
     matrices : (..., 3, 3)
-        Matrices to split; a reflection gives a stretch with a negative determinant.
+        Matrices to split; a reflection results in a stretch with a negative determinant.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def nearest_rotations(matrices: Floats) -> tuple[Floats, Floats]:
     stretches : (..., 3, 3)
         R^T M.
     """
-    # M = U S V^T gives R = U V^T, with the last column of U negated if that is a reflection.
+    # M = U S V^T yields R = U V^T, with the last column of U negated if that is a reflection.
     left, _, right = np.linalg.svd(matrices)
     signs = np.ones((*left.shape[:-2], 3))
     signs[..., 2] = np.where(np.linalg.det(left @ right) < 0.0, -1.0, 1.0)

@@ -17,9 +17,10 @@ from viewer.rig.skin import Skin, skin_rows
 
 __all__ = ["Shell", "shell_of"]
 
-_MOST_TRIANGLES = 500_000  # for larger meshes, the check takes longer than it saves
+# Maximum number of triangles, above which the check takes longer than it saves.
+_MOST_TRIANGLES = 500_000
 _MOST_OPEN = 256  # maximum number of edges of openings, which are projected in every image
-# Squared number of edges of openings per triangle, so that the sign of the volume is reliable.
+# Maximum squared number of edges of openings per triangle for which the volume's sign is reliable.
 _CLOSED = 0.25
 _HOLLOW = 1e-6  # volume relative to area^1.5 below which it is 0, as for two coincident sheets
 
@@ -72,6 +73,8 @@ def shell_of(mesh: Mesh, skin: Skin | None) -> Shell | None:
     corners = same[mesh.triangles]
     a, b, c = corners.T
     corners = corners[(a != b) & (b != c) & (c != a)]
+    if _has_long_borders(corners, mesh.n_vertices):
+        return None
     found = _neighbours(corners)
     if found is None:
         return None
@@ -91,6 +94,23 @@ def _move_together(skin: Skin, copies: Ints, originals: Ints) -> bool:
         and np.array_equal(first.joints, second.joints)
         and np.array_equal(first.weights, second.weights)
     )
+
+
+def _has_long_borders(corners: NDArray[np.int64], n_vertices: int) -> bool:
+    """Return whether more than ``_MOST_OPEN`` vertices certainly lie on openings; avoids a sort.
+
+    Around a vertex in the interior, each neighbour follows it in one triangle and precedes it in
+    another, so any numbers of the neighbours cancel out. As many unpaired edges begin as end at a
+    vertex, so at least one begins at each vertex where the numbers do not cancel out.
+    """
+    # Sums of whole numbers below 2**30 are exact for up to 2**23 neighbours.
+    numbers = np.random.default_rng(0).integers(1 << 30, size=n_vertices).astype(np.float64)
+    sums = np.zeros(n_vertices)
+    for start, end in ((0, 1), (1, 2), (2, 0)):
+        first, second = corners[:, start], corners[:, end]
+        sums += np.bincount(first, numbers[second], n_vertices)
+        sums -= np.bincount(second, numbers[first], n_vertices)
+    return bool(np.count_nonzero(sums) > _MOST_OPEN)
 
 
 def _neighbours(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools] | None:

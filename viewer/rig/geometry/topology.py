@@ -50,7 +50,8 @@ class Edges:
     pairs : (P, 2)
         Triangles on both sides of edges that belong to exactly two triangles.
     agree : (P,) bool
-        Whether the two traverse the edge in opposite directions, as consistent neighbours do.
+        Whether the two triangles traverse the edge in opposite directions, as consistent neighbours
+        do.
     """
 
     keys: Indices
@@ -124,8 +125,8 @@ def orientations(count: int, edges: Edges) -> tuple[Indices, Bools, Bools]:
     component : (count,)
         Smallest triangle of each triangle's component.
     flipped : (count,) bool
-        True for the smaller part of each component; of equal parts, for the one without the first
-        triangle.
+        True for the smaller part of each component; of two equal parts, for the one without the
+        first triangle.
     one_sided : (count,) bool
         Triangles of components that are not orientable.
     """

@@ -71,9 +71,9 @@ class Explanation:
     stored : (3,)
         Position in the file, bind pose.
     shaped : (3,)
-        After the figure's blend shapes.
+        Position after the figure's blend shapes.
     rest : (3,)
-        p, after blend shapes and pose correctives: the position before skinning.
+        Position p before skinning, after blend shapes and pose correctives.
     joints : (K,)
         Joints of the effective influences, strongest first.
     names : tuple of K str

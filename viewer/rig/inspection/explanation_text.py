@@ -13,7 +13,7 @@ from viewer.rig.skinning import METHODS
 __all__ = ["explanation_text"]
 
 _LONGEST = 40  # maximum number of characters of a joint's name
-_RIGID = 1e-9  # a stretch this close to the identity is a rounding error
+_RIGID = 1e-9  # tolerance within which a stretch is treated as the identity
 
 
 def explanation_text(explanation: Explanation, digits: int = 4) -> list[str]:

@@ -25,14 +25,14 @@ from viewer.rig.skinning import joint_matrices
 __all__ = ["FRONTS", "Front", "front_axes", "guess_front", "usual_front"]
 
 Front: TypeAlias = str
-"""A signed axis, as ``"+z"``; never the up axis."""
+"""A signed axis, such as ``"+z"``; never the up axis."""
 
 FRONTS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """All signed axes; the two along a scene's up axis do not apply to it."""
 
 _MOST_ACTORS, _MOST_JOINTS, _MOST_VERTICES = 16, 2000, 100_000
-_N_TIMES = 9  # number of samples of a motion
-_SURE = 0.5  # smaller components of a vote along an axis are inconclusive
+_N_TIMES = 9  # number of sampled frames of a motion
+_SURE = 0.5  # minimum component of a vote along an axis; smaller ones are inconclusive
 _WEIGHTS = {"sides": 3.0, "toes": 2.0, "face": 2.0, "ends": 2.0, "travel": 1.0}
 """Weight of each kind of evidence.
 

@@ -1,6 +1,6 @@
 """Evidence of a figure's facing direction: sides, toes, faces, heads and tails, soles, travel.
 
-Each kind gives a horizontal vector towards the front. Its length is the confidence: 1 for complete
+Each kind yields a horizontal vector towards the front. Its length is the confidence: 1 for complete
 and consistent evidence, 0 for none.
 """
 
@@ -16,12 +16,15 @@ from viewer.rig.retargeting.joint_names import sided_words
 
 __all__ = ["from_ends", "from_face", "from_sides", "from_soles", "from_toes", "from_travel"]
 
-_LEAST = 0.01  # fraction of the figure's size; shorter offsets have no reliable direction
-# Fraction of the figure's size: a head this far from the centre is in front of the body.
+# Minimum length of offsets with a reliable direction, as a fraction of the figure's size.
+_LEAST = 0.01
+# Minimum distance from the centre, as a fraction of the figure's size, of a head in front of the
+# body.
 _CLEAR = 0.2
 _TOES, _FACE = ("toe", "ball"), ("eye", "nose", "jaw", "beak", "muzzle", "snout")
-_SLAB, _ABOVE = 0.015, (0.05, 0.09)  # fractions of the height: soles, and range of the ankles
-# Fraction of the vertices of a symmetric mesh whose mirror images are near other vertices.
+# Height of the soles and range of the ankles, as fractions of the figure's height.
+_SLAB, _ABOVE = 0.015, (0.05, 0.09)
+# Minimum fraction of a symmetric mesh's vertices whose mirror images are near other vertices.
 _MIRRORED = 0.98
 _LOOKED_AT = 2000  # maximum number of vertices in the symmetry test
 
@@ -69,7 +72,7 @@ def from_face(names: Sequence[str], parents: Ints, places: Floats, up: Floats) -
 def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
     """Return evidence from the ends of an animal: the head is in front, the tail behind.
 
-    A head directly above the centre, as in people, gives no evidence.
+    A head directly above the centre, as in people, is no evidence.
     """
     words = [word for _, word in sided_words(names)]
     heads = [j for j, word in enumerate(words) if word.startswith("head")]
@@ -86,7 +89,7 @@ def from_ends(names: Sequence[str], places: Floats, up: Floats) -> Floats:
 
 
 def from_travel(places: Floats, size: float, up: Floats) -> Floats:
-    """Return evidence from a motion: figures mostly move forwards.
+    """Return evidence from a motion: figures usually move forwards.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ __all__ = ["Ground", "ground_of", "resting_frames"]
 Level = tuple[float, int]  # a height, and the number of frames in which feet rest at it
 
 # Lengths are relative to the figure's height at rest: 0.01 is 17 mm for a person.
-_ALIKE = 0.005  # heights closer than this are one level: about half the tolerance for sunk feet
+_ALIKE = 0.005  # maximum distance of heights of one level: about half the tolerance for sunk feet
 _APART = 0.01  # minimum distance between separate levels
 _CUSTOM = 0.015  # maximum distance from a conventional ground: calibrations err by about 25 mm
 _NEAR = 0.03  # maximum distance of the lowest feet from a conventional ground if they never rest
@@ -25,8 +25,9 @@ _RESTS = 0.2  # minimum fraction of resting frames: with fewer, equal heights ma
 _FRACTION = 0.1  # minimum fraction of the frames at rest for a level
 _TIE = 0.5  # fraction of the longest level's frames above which a likely level is chosen
 _CLEAR = 1.0 / 3.0  # fraction of the longest level's frames above which another level is a rival
-_ROLLS = 0.02  # minimum distance from the longest level: rolling feet create others this close
-_STEP = 0.06  # distance below the longest level: the ground may be this far below a step or a seat
+_ROLLS = 0.02  # minimum distance from the longest level, as rolling feet create closer levels
+# Maximum distance of the ground below the longest level, which may be a step or a seat.
+_STEP = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +39,7 @@ class Ground:
     height : float or None
         Along the up axis; None if unknown.
     levels : tuple of (float, int)
-        Heights at which feet rest with their numbers of frames, the most frequent first; if empty,
+        Heights at which feet rest and their numbers of frames, the most frequent first; if empty,
         the height is only an estimate.
     """
 
@@ -120,7 +121,7 @@ def _has_rival(levels: Sequence[Level], customs: Sequence[Level], size: float) -
 def resting_frames(
     lowest: Floats, present: Bools, step: float, size: float, seconds: float = _LONG
 ) -> Bools:
-    """Return the frames in which the lower foot is at constant height for some time: (F,).
+    """Return a mask of the frames in which the lower foot rests at a constant height: (F,).
 
     Parameters
     ----------

@@ -15,8 +15,8 @@ __all__ = ["DENSITY", "Measures", "measure"]
 DENSITY = 985.0
 """Density of a human body, kg per cubic metre."""
 
-# Maximum fraction of the surface that may be missing, as at the eyes or the mouth of a body, for a
-# meaningful volume.
+# Maximum fraction of the surface that may be missing, for example at the eyes or the mouth of a
+# body, for a meaningful volume.
 _HOLE = 0.01
 
 
@@ -31,7 +31,7 @@ class Measures:
     volume : float or None
         Enclosed volume, cubed units; None if the mesh is open.
     mass : float or None
-        Volume times ``DENSITY``, kilograms; None without a volume, or unless the unit is metres.
+        Volume times ``DENSITY``, kilograms; None if there is no volume or the unit is not metres.
     n_open_edges : int
         Number of edges that belong to a single triangle, with coincident vertices merged.
     """
@@ -77,7 +77,7 @@ def _open_edges(positions: Floats, triangles: Ints) -> Ints:
     corners: Ints = triangles
     for merges in (False, True):
         if merges:
-            # Vertices are often doubled along texture seams.
+            # Vertices are often duplicated along texture seams.
             same = np.unique(positions, axis=0, return_inverse=True)[1].reshape(-1).astype(np.int32)
             corners = same[triangles]
         following = np.roll(corners, -1, axis=1)

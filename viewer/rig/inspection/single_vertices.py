@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -81,11 +79,7 @@ def rest_vertices(figure: Figure, pose: Pose, vertices: Ints, correct: bool = Tr
     if not correct or figure.correctives is None or figure.skeleton is None:
         return rest
     weights = pose_weights(figure.correctives, figure.skeleton, pose)
-    active = np.flatnonzero(weights)
-    if len(active) == 0:
-        return rest
-    offsets = figure.correctives.values()[active[:, None], vertices[None, :]]
-    return rest + np.einsum("p,pva->va", weights[active], offsets.astype(np.float64, copy=False))
+    return rest + figure.correctives.of_vertices(vertices, weights) if weights.any() else rest
 
 
 def check_vertices(figure: Figure, vertices: Ints) -> None:
@@ -94,7 +88,7 @@ def check_vertices(figure: Figure, vertices: Ints) -> None:
     Raises
     ------
     RigError
-        If an index is out of range; the message gives the index and the range.
+        If an index is out of range; the message states the index and the range.
     """
     count = 0 if figure.mesh is None else figure.mesh.n_vertices
     wrong = vertices[(vertices < 0) | (vertices >= count)]

@@ -18,7 +18,8 @@ from viewer.rig.skin import Skin, owners
 __all__ = ["Soles", "extent", "soles_of", "soles_of_feet"]
 
 _STRAYS = 0.001  # fraction of vertices at either end that is excluded from the height
-_TILTS = np.radians([20.0, 45.0, 70.0])  # tilts of a foot while walking and on tiptoe
+# Tilts of a foot, from walking to lying on its instep.
+_TILTS = np.radians([20.0, 45.0, 70.0, 95.0, 125.0, 155.0])
 _N_SIDES = 8  # number of horizontal directions of tilts
 
 
@@ -31,9 +32,9 @@ class Soles:
     joints : (N,) int32
         For each of N feet, the joint nearest to the ground: the ball of the foot, or the ankle.
     feet : (P,)
-        The foot that each point belongs to.
+        The foot to which each point belongs.
     movers : (P,) int32
-        The joint that each point moves with.
+        The joint with which each point moves.
     places : (P, 3)
         Positions of the points in that joint's space.
     above : (P,)
@@ -54,7 +55,7 @@ class Soles:
         world : (F, J, 4, 4)
             Joint space to figure space.
         axis : (4,)
-            Row of the placement matrix that gives the height.
+            Row of the placement matrix that yields the height.
         scale : float
             Scene units per figure unit.
 
@@ -153,7 +154,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
     vertices = owners(skin)
     order = np.lexsort((skin.weights, vertices))
     last = np.flatnonzero(np.diff(vertices[order], append=-1))
-    strongest = order[last]  # strongest influence of each vertex that has any
+    strongest = order[last]  # strongest influence of each vertex that has influences
     strongest = strongest[is_foot[skin.joints[strongest]] & (skin.weights[strongest] > 0.0)]
     if len(strongest) == 0:
         return None
@@ -165,7 +166,7 @@ def _points(mesh: Mesh, skin: Skin, is_foot: Bools, axis: int) -> tuple[Ints, Fl
 
 
 def _directions(axis: int) -> Floats:
-    """Return the downward direction, and directions tilted from it all around: (D, 3)."""
+    """Return the downward direction, and directions tilted from it to all sides: (D, 3)."""
     angles = np.arange(_N_SIDES) * 2.0 * np.pi / _N_SIDES
     sides = np.zeros((_N_SIDES, 3))
     flat = [index for index in range(3) if index != axis]

@@ -38,7 +38,7 @@ class VertexFacts:
     normal : (3,)
         Unit length.
     uvs : (N, 2)
-        Texture coordinates, several along a seam; those of the triangle come first.
+        Texture coordinates, several along a seam; the triangle's coordinates come first.
     body_part : str
         Body part; empty if there is none.
     joints : (K,)
@@ -148,7 +148,7 @@ def facts_text(facts: VertexFacts) -> list[str]:
 
 
 def _uvs(figure: Figure, vertex: int, triangle: int) -> Floats:
-    """Return a vertex's distinct texture coordinates, those of the triangle first: (N, 2)."""
+    """Return a vertex's distinct texture coordinates, the triangle's first: (N, 2)."""
     mesh = figure.require_mesh()
     if mesh.uvs is None or len(mesh.uvs) == 0:
         return np.zeros((0, 2))

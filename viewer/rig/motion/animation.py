@@ -21,9 +21,9 @@ class Animation:
     start, end : float
         Playback range in seconds.
     read : callable
-        Returns the keys; called at most once, may raise a ``FormatError``.
+        Returns the keys, or raises a ``FormatError``; called at most once.
     place : str
-        JSON pointer to it in the file; empty if unknown.
+        JSON pointer to the animation in the file; empty if unknown.
     """
 
     __slots__ = ("_clip", "_read", "end", "name", "place", "start")
@@ -41,7 +41,7 @@ class Animation:
         self._clip: TransformClip | None = None
 
     def plays(self, clip: object) -> bool:
-        """Return whether a motion is the one of this animation."""
+        """Return whether a motion is the clip of this animation."""
         return clip is not None and clip is self._clip
 
     def clip(self) -> TransformClip:

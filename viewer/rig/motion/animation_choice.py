@@ -53,8 +53,8 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
     figures : sequence of Figure
         Figures with animations; numbers refer to the figure with the most animations.
     wanted : str
-        A name or label, matched exactly or else ignoring case; a number from 1; ``NONE``; or an
-        empty text for the first animation.
+        A name or label, matched exactly or, if there is no exact match, ignoring case; a number
+        from 1; ``NONE``; or an empty string for the first animation.
 
     Returns
     -------
@@ -92,7 +92,7 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
 
 
 def counterpart(figure: Figure, animation: Animation) -> int:
-    """Return the index of a figure's counterpart of another figure's animation, -1 if it has none.
+    """Return the index of a figure's counterpart of another figure's animation, or -1.
 
     Figures of one file have animations with the same names; the range distinguishes animations of
     equal name.
@@ -109,8 +109,8 @@ def counterpart(figure: Figure, animation: Animation) -> int:
 def own_first(figure: Figure, others: Sequence[Figure]) -> int:
     """Return 0 if a figure shares no animation with the others of its file, else -1.
 
-    Such a figure is an independent character, which plays its first animation whatever the others
-    play.
+    Such a figure is an independent character, which plays its first animation regardless of the
+    others.
 
     Parameters
     ----------

@@ -26,7 +26,7 @@ def baked(
     clip : TransformClip
         The motion.
     rate : float, optional
-        Frames per second; that of the keys if omitted.
+        Frames per second; the rate of the keys if omitted.
     base : Pose, optional
         Provides what the clip does not animate; the figure's own pose if omitted.
 

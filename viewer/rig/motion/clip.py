@@ -160,7 +160,7 @@ def _ratio(rise: Floats, run: Floats) -> Floats:
 
 
 def is_course_rig(skeleton: Skeleton) -> bool:
-    """Return whether a skeleton's DOFs are those of ``.anim`` channels, in that order.
+    """Return whether a skeleton's DOFs are the DOFs of ``.anim`` channels, in that order.
 
     These are translations x, y, z of the root, then rotations x, y, z of joints 0, 1, 2 and so on.
     """
@@ -178,7 +178,7 @@ def suits(clip: Clip, skeleton: Skeleton) -> bool:
 
 
 def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
-    """Return why a clip cannot move a skeleton, as a phrase that follows the name, or None."""
+    """Return the reason why a clip cannot move a skeleton, phrased to follow its name, or None."""
     if not is_course_rig(skeleton):
         return Phrase("not-course-rig", reason=_first_misfit(skeleton))
     if len(clip.channels) != skeleton.n_dofs:
@@ -187,7 +187,7 @@ def misfit(clip: Clip, skeleton: Skeleton) -> Phrase | None:
 
 
 def _first_misfit(skeleton: Skeleton) -> Phrase:
-    """Describe the first joint whose DOFs differ from those of a ``.skel``-style rig."""
+    """Describe the first joint whose DOFs differ from the DOFs of a ``.skel``-style rig."""
     for joint in range(skeleton.n_joints):
         kinds = [DOF_KINDS[kind] for kind in skeleton.dof_kinds[skeleton.dof_joints == joint]]
         if kinds != list(DOF_KINDS if joint == 0 else DOF_KINDS[3:]):
@@ -199,7 +199,7 @@ def _first_misfit(skeleton: Skeleton) -> Phrase:
 
 
 def check_fit(clip: Clip, skeleton: Skeleton) -> None:
-    """Raise if a clip was made for a different skeleton.
+    """Raise an error if a clip was made for a different skeleton.
 
     Raises
     ------

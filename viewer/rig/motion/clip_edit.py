@@ -1,6 +1,7 @@
 """Editing of keyed clips: every function returns a new channel or clip; the original is unchanged.
 
-Keys keep their order and therefore their indices: a moved key stops at an unmoved neighbour.
+The order of keys and therefore their indices never change: a moved key stops at an unmoved
+neighbour.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ __all__ = [
 ]
 
 _SMOOTH: tuple[Tangent, Tangent] = ("smooth", "smooth")
-_UNCHANGED = 1e-9  # radians or lengths; a DOF this close to its curve is treated as unchanged
+_UNCHANGED = 1e-9  # tolerance, in radians or lengths, within which a DOF equals its curve
 
 
 def add_key(
@@ -54,8 +55,8 @@ def add_key(
     """Return a channel with one more key, and its index.
 
     Without value and tangents, a key between others preserves the curve exactly: it gets the slope
-    of the curve there, and neighbours whose rules depend on adjacent keys keep their slopes as
-    explicit values. An existing key at this time is changed instead.
+    of the curve there, and neighbours whose rules depend on adjacent keys get their current slopes
+    as explicit values. An existing key at this time is changed instead.
 
     Parameters
     ----------
@@ -136,7 +137,7 @@ def move_keys(
     dv : float
         Length or radians.
     gap : float
-        Minimum distance in seconds to unmoved keys that are at least this far away now.
+        Minimum distance in seconds to unmoved keys that are at least this far away initially.
     """
     moved = np.zeros(len(channel.times), dtype=np.bool_)
     moved[list(keys)] = True
@@ -175,7 +176,7 @@ def set_key(
 
 
 def delete_keys(channel: Channel, keys: Iterable[int]) -> Channel:
-    """Return a channel without the given keys; the others keep their tangents."""
+    """Return a channel without the given keys; the tangents of other keys are unchanged."""
     stays = np.ones(len(channel.times), dtype=np.bool_)
     stays[list(keys)] = False
     return replace(
@@ -267,7 +268,7 @@ def key_pose(
     time : float
         Seconds.
     only_changed : bool
-        Skip DOFs whose value equals that of the clip, clamped to the limits, at that time.
+        Skip DOFs whose value equals the clip's value at that time, clamped to the limits.
     """
     targets, values = evaluate_all(clip, np.array([time]))
     now = np.zeros(skeleton.n_dofs)

@@ -86,7 +86,7 @@ def _table(channels: Sequence[Channel]) -> _Table:
             edges[row, :keys] = slopes(channel)
             last[row] = keys - 1
         else:
-            times[row, 0] = 0.0  # the curve is 0 everywhere
+            times[row, 0] = 0.0  # a curve without keys is 0 everywhere
         modes[row] = [_MODES[mode] for mode in channel.extrapolation]
     targets = np.array([channel.target for channel in channels], dtype=np.int32)
     return _Table(targets, times, values, edges, last, modes)

@@ -1,4 +1,4 @@
-"""Evaluation of motions: posing a single actor, and many frames of one as arrays."""
+"""Evaluation of motions: posing of a single actor, and many frames of one actor as arrays."""
 
 from __future__ import annotations
 
@@ -114,7 +114,8 @@ def frame_rate(motion: Motion | None) -> float:
 def scene_rate(actors: Iterable[Actor]) -> float:
     """Return the frames per second of a scene's timeline.
 
-    The rate is that of its longest capture, or else of its longest motion of keyed transforms.
+    This is the rate of its longest capture or, without captures, of its longest motion of keyed
+    transforms.
     """
     clips = [actor.clip for actor in actors if actor.clip is not None]
     for kinds in ((SampledClip, PointClip), (TransformClip,)):
@@ -320,7 +321,7 @@ def pose_of(figure: Figure, frames: Frames, frame: int) -> Pose:
 
 
 def frames_between(frames: Frames, rows: slice | NDArray[np.intp]) -> Frames:
-    """Return some of the frames; scales or a shape shared by all frames stay a single row."""
+    """Return some of the frames; scales or a shape shared by all frames remain a single row."""
     weights, scales = frames.shape_weights, frames.scales
     return Frames(
         frames.times[rows],

@@ -47,7 +47,7 @@ def pose_actors(actors: Iterable[Actor], time: float, interpolate: bool = False)
     """Pose actors by their clips at one time of the scene's clock, in place.
 
     Actors with the same figure and clip, each at its own offset, are posed together; the result
-    equals that of ``viewer.rig.motion.evaluation.pose_actor`` for each.
+    equals the result of ``viewer.rig.motion.evaluation.pose_actor`` for each.
 
     Parameters
     ----------

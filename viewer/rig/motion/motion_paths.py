@@ -20,7 +20,7 @@ __all__ = ["MotionPath", "motion_path", "path_times", "segments"]
 
 _KEYED_RATE = 60.0  # points per second along curves, which have no frames
 _MOST = 20_000  # maximum number of points of a path along curves
-_BLOCK = 1 << 14  # matrices per batch, which bounds the memory of long captures
+_BLOCK = 1 << 14  # number of matrices per batch, which limits the memory for long captures
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,7 +14,7 @@ __all__ = ["has_own_animations", "keeps_keys", "own_animations", "still_pose"]
 
 
 def has_own_animations(actor: Actor) -> bool:
-    """Return whether an actor has animations, and plays one of them, edited or not, or none.
+    """Return whether an actor has animations and plays either one of them, edited or not, or none.
 
     False if constraints also move its joints, because keys do not contain their effect.
     """

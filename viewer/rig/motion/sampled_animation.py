@@ -84,7 +84,7 @@ def sample_animation(
     actor : Actor
         Actor with a clip.
     rate : float, optional
-        Frames per second; that of ``frame_rate`` if omitted, which reproduces captured frames
+        Frames per second; the result of ``frame_rate`` if omitted, which reproduces captured frames
         exactly.
     frames : (int, int), optional
         First frame and end frame, exclusive (None: the clip's end), counted from the clip's

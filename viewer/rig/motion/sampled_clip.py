@@ -35,11 +35,11 @@ class SampledClip:
     figure_scales : (N,) or None
         Scales of the whole figure.
     shape_weights : (N, S) or (1, S) or None
-        Blend shape weights; a single row applies to all frames. If None, those of the pose are
+        Blend shape weights; a single row applies to all frames. If None, the pose's values are
         used.
     scales : (N, J, 3) or (1, J, 3) or None
-        Local scale factors of the joints; a single row applies to all frames. If None, those of the
-        pose are used.
+        Local scale factors of the joints; a single row applies to all frames. If None, the pose's
+        values are used.
     """
 
     name: str
@@ -71,7 +71,7 @@ class SampledClip:
 
     @property
     def n_rows(self) -> int:
-        """Number of frames that hold data, N."""
+        """Number of frames with data, N."""
         return len(self.rotations)
 
     @property
@@ -104,7 +104,7 @@ class SampledRows:
 
 
 def sample_rows(clip: SampledClip, times: Floats, interpolate: bool = False) -> SampledRows:
-    """Interpolate a clip at given times: rotations along the shorter arc, the rest linearly.
+    """Interpolate a clip at given times: rotations along the shorter arc, other values linearly.
 
     Exactly at a frame, the stored values are returned unchanged.
 

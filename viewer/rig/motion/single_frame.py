@@ -31,7 +31,7 @@ def single_frame(
     Parameters
     ----------
     actor : Actor
-        Actor with joints; an absent actor gives a missing frame.
+        Actor with joints; the frame of an absent actor is missing.
     rate : float
         Nominal frames per second of the animation.
     number : int
@@ -42,7 +42,8 @@ def single_frame(
     Returns
     -------
     SampledAnimation
-        Its ``motion`` also contains the frame: one key per DOF for rigs with keyed clips.
+        Animation whose ``motion`` also contains the frame: one key per DOF for rigs with keyed
+        clips.
 
     Raises
     ------

@@ -27,7 +27,7 @@ class SkeletonMotion:
     unit_note : Phrase or None
         Explains how the figure's unit was estimated; None if it was not estimated.
     up_notes : tuple of Phrase
-        Explain how the up axis was estimated, and give any contrary evidence.
+        Explain how the up axis was estimated, and state any contrary evidence.
     expressions : mapping of str to (N,)
         Weights of facial expressions at each row of the clip, by their names in VRM 1.0.
     """

@@ -149,7 +149,7 @@ def with_baked_springs(actor: Actor, rate: float | None = None) -> SampledClip:
     actor : Actor
         Actor with spring joints and a motion of joints.
     rate : float, optional
-        Frames per second; that of the motion if omitted, or that of the simulation for DOF curves.
+        Frames per second; if omitted, the motion's rate, or the simulation's rate for DOF curves.
 
     Raises
     ------

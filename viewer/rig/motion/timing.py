@@ -56,7 +56,7 @@ def frame_at(seconds: float, rate: float) -> int:
 def frame_times(start: float, end: float, rate: float) -> Floats:
     """Return the times of all frames from a start to an end (F,), seconds."""
     times: Floats = start + np.arange(frame_at(end - start, rate) + 1) / rate
-    # A repeating curve would be back at its start just after its end.
+    # Just after its end, a repeating curve would be at its start again.
     return np.minimum(times, end)
 
 
@@ -102,7 +102,7 @@ class Timing:
 
     @property
     def present(self) -> Bools:
-        """Which frames exist: (F,)."""
+        """Mask of the frames that exist: (F,)."""
         return self.rows >= 0
 
     def time(self, frame: int) -> float:

@@ -26,7 +26,8 @@ TRANSFORM_PATHS: tuple[TransformPath, ...] = get_args(TransformPath)
 
 Interpolation = Literal["step", "linear", "cubic"]
 INTERPOLATIONS: tuple[Interpolation, ...] = get_args(Interpolation)
-"""Between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite spline."""
+"""Values between keys: the earlier value, a line (slerp for rotations), or a cubic Hermite
+spline."""
 
 _COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 
@@ -35,7 +36,7 @@ _COMPONENTS = {"translation": 3, "rotation": 4, "scale": 3}
 class TransformChannel:
     """The keys of one property of one joint, or of the weights of blend shapes.
 
-    Before its first and after its last key a channel keeps the value of that key (glTF 2.0,
+    Before its first key and after its last key, a channel has the value of that key (glTF 2.0,
     section 3.11).
 
     Attributes
@@ -50,7 +51,7 @@ class TransformChannel:
         Translation relative to the parent joint (rest translation included), quaternion
         (x, y, z, w) including the rest rotation, scale factors, or shape weights.
     interpolation : str
-        Entry of ``INTERPOLATIONS``. Linear rotations take the shorter arc; cubic ones are
+        Entry of ``INTERPOLATIONS``. Linear rotations follow the shorter arc; cubic ones are
         normalised after interpolation.
     tangents : (N, 2, C) or None
         Incoming and outgoing slopes, per second; only for ``"cubic"``.
@@ -104,7 +105,7 @@ class TransformClip:
     name : str
         Display name.
     channels : tuple of TransformChannel
-        At most one per joint and path; properties without a channel keep their values in the pose.
+        At most one per joint and path; properties without a channel have their values in the pose.
     start, end : float
         Playback range in seconds.
     """

@@ -17,7 +17,7 @@ __all__ = ["CUSTOM", "guess_up"]
 CUSTOM = "z"
 """Default up axis without evidence: EasyMocap's calibration board usually lies on the floor."""
 
-_ENOUGH = 64  # frames per person; more frames would not change the result
+_ENOUGH = 64  # maximum number of frames per person, as more frames would not change the result
 _LOW = (("mid_hip",), ("pelvis",), ("left_hip", "right_hip"))
 _HIGH = (("head",), ("nose",), ("left_ear", "right_ear"), ("neck",))
 
@@ -47,7 +47,7 @@ def guess_up(actors: Iterable[Actor]) -> str:
     lengths = np.linalg.norm(steps, axis=1)
     mean = (steps[lengths > 0.0] / lengths[lengths > 0.0, None]).sum(axis=0)
     axis = int(np.abs(mean).argmax())
-    if axis == 0:  # also the case if all sums are 0
+    if axis == 0:  # the axis is also 0 if all sums are 0
         return CUSTOM
     return ("-" if mean[axis] < 0.0 else "") + "xyz"[axis]
 

@@ -12,11 +12,11 @@ from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose, joint_rotations, local_matrices
 from viewer.rig.posing.pose_vector import set_joint_rotations
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.shape import shaped
+from viewer.rig.shape import shaped_skeleton
 
 __all__ = ["own_up", "upright_actor", "upright_placement"]
 
-_OVER = np.array([1.0, -1.0, -1.0])  # 180 degrees about x
+_OVER = np.array([1.0, -1.0, -1.0])  # rotation by 180 degrees about x
 
 
 def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
@@ -48,7 +48,7 @@ def own_up(scene: Scene, actor: Actor) -> tuple[Literal["y", "z"], bool]:
 def upright_actor(scene: Scene, actor: Actor) -> Actor:
     """Return an actor whose figure records the up axis of its pose, rotated if upside down.
 
-    A body in a z-up capture stands along z, regardless of the up axis of its model.
+    A body in a z-up capture is upright along z, regardless of the up axis of its model.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _rotated_upright(figure: Figure, pose: Pose) -> Pose:
 
     The first root keeps its position in the figure, l' = l; the figure's translation T moves it.
     """
-    skeleton = shaped(figure, pose.shape_weights).require_skeleton()
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
     upright = pose.copy()
     roots = np.flatnonzero(skeleton.parents < 0).astype(np.int32)
     within = pose.figure_scale * local_matrices(skeleton, pose)[roots, :3, 3]

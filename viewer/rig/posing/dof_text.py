@@ -10,7 +10,7 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, dof_label
 
 __all__ = ["beyond_text", "dof_value_text"]
 
-_MOST_DIGITS = 9  # maximum decimals; more would show rounding errors of float64
+_MOST_DIGITS = 9  # maximum number of decimals; more would show rounding errors of float64
 
 
 def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) -> str:

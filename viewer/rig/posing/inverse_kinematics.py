@@ -23,10 +23,10 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton, joint_label
 
 __all__ = ["Reach", "chain_above", "place_jacobian", "reach", "rotation_axes"]
 
-_CLOSE = 1e-7  # fraction of the chain's length; smaller errors are treated as 0
-_STILL = 1e-10  # radians; smaller steps end the search
-_LARGEST_STEP = 0.5  # radians; the linearisation is poor for larger steps
-_BEND = 0.02  # radians; bends a straight chain out of a singular pose
+_CLOSE = 1e-7  # error below which the target is reached, as a fraction of the chain's length
+_STILL = 1e-10  # step in radians below which the search ends
+_LARGEST_STEP = 0.5  # maximum step in radians for which the linearisation is accurate
+_BEND = 0.02  # angle in radians by which a straight chain is bent out of a singular pose
 _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e3  # limits of the damping, relative to the chain's length
 
 
@@ -50,7 +50,7 @@ class Reach:
 
 
 def chain_above(skeleton: Skeleton, joint: int, length: int) -> Ints:
-    """Return the joints that may rotate to move a joint: its nearest ancestors with free rotations.
+    """Return the joints that may rotate to move a joint: the nearest ancestors with free rotations.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def reach(
     Returns
     -------
     Reach
-        A pose that is not farther from the target than the start. A start outside its limits is
+        Pose that is not farther from the target than the start. A start outside its limits is
         clamped first.
 
     Raises

@@ -24,8 +24,8 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 __all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _SWEEPS = 200
-_STILL = 1e-10  # radians; a sweep with smaller changes is the last one
-_ROUNDING = 1e-9  # radians; a value that exceeds its limit by this much is treated as within it
+_STILL = 1e-10  # largest change in radians of the last sweep
+_ROUNDING = 1e-9  # tolerance in radians for a value that exceeds its limit
 _TURN = 2.0 * math.pi
 
 
@@ -119,7 +119,7 @@ class _Solver:
         self.present = np.clip(present, low, high)
 
     def best(self) -> Floats:
-        """Return the angles: exact and closest to the current ones, or else closest to the goal."""
+        """Return the exact angles nearest to the current ones; without exact ones, the best."""
         exact = self._exact()
         within = [
             values
@@ -190,12 +190,12 @@ class _Solver:
         return values
 
     def _best_one(self, place: int, around: Floats, now: float) -> float:
-        """Return the angle within the limits that maximises the trace; of several, the nearest."""
+        """Return the nearest of the angles within the limits that maximise the trace."""
         axis = self.axes[place]
         i, j = (axis + 1) % 3, (axis + 2) % 3
         cosine, sine = around[i, i] + around[j, j], around[i, j] - around[j, i]
         if math.hypot(cosine, sine) < 1e-12:
-            return now  # all angles are equally good
+            return now  # all angles are equally suitable
         # c cos t + s sin t is largest at t = atan2(s, c), and decreases on both sides of it.
         top = math.atan2(sine, cosine)
         top -= _TURN * round((top - now) / _TURN)

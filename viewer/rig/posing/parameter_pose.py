@@ -19,7 +19,8 @@ def parameter_pose(
 ) -> Pose:
     """Return the pose that SAM 3D Body stores for MHR.
 
-    The tool's vertices and joints are those of the pose times 0.01, with y and z negated.
+    The tool's vertices and joints are the pose's vertices and joints times 0.01, with y and z
+    negated.
 
     Parameters
     ----------

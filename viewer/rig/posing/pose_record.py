@@ -39,9 +39,8 @@ PARTS = {
 }
 """Rotation vectors of single joints under the names used by smplx."""
 
-_BODY = 21  # number of joints of body_pose in models with fingers or a face; only SMPL has two more
-_LONGEST_BODY = 23
-_SMALLEST, _LARGEST = 1e-6, 1e6  # scales that can be drawn in float32
+_BODY, _LONGEST_BODY = 21, 23  # joints of body_pose in models with fingers or a face, and in SMPL
+_SMALLEST, _LARGEST = 1e-6, 1e6  # range of scales that can be drawn in float32
 _FARTHEST = 1e9  # largest translation, figure units
 _HAND_PARTS = {"left_hand_pose": "left", "right_hand_pose": "right", "hand_pose": ""}
 
@@ -69,7 +68,7 @@ class PoseRecord:
         Whether hand poses are relative to the flat hand; if None, the mean is added to coefficients
         only.
     hand_coefficients : bool or None
-        Whether hand poses are coefficients; if None, they are unless there are 45 values.
+        Whether hand poses are coefficients; None means True unless there are 45 values.
     joint_rotations : JointRotations or None
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
@@ -193,7 +192,7 @@ def apply_record(
         with _part(name):
             notes += _apply_part(name, values, record, figure, work)
     has_shapes = figure.blend_shapes is not None and "shape" in figure.blend_shapes.groups
-    # Of a pose of a figure with the same skeleton, everything possible is applied.
+    # Everything possible is applied from a pose of a figure with the same skeleton.
     drop_excess = record.joint_rotations is not None or (drop_excess and has_shapes)
     with _part("shape"):
         notes += apply_coefficients("shape", record.shape, figure, work, drop_excess)
@@ -267,7 +266,8 @@ def _dof(figure: Figure, label: str) -> int:
     try:
         return find_dof(figure.require_skeleton(), label)
     except RigError as problem:
-        why = str(problem).removeprefix(f'"{label}": ')  # the caller adds the label
+        # The label is removed here, as the caller adds it.
+        why = str(problem).removeprefix(f'"{label}": ')
         values = {"figure": figure.name, "found": label, "reason": why}
         raise RigError(Diagnostic("F002.pose-unknown-dof", values=values)) from None
 
@@ -278,7 +278,7 @@ def _beyond_limits(skeleton: Skeleton, dofs: Floats) -> list[Diagnostic]:
 
 
 def _apply_vector(vector: Floats, figure: Figure, pose: Pose) -> list[Diagnostic]:
-    """Apply the model's pose vector, or that of another member of the SMPL family."""
+    """Apply the pose vector of the model, or of another member of the SMPL family."""
     skeleton = figure.require_skeleton()
     layout = figure.pose_layout
     own = skeleton.n_dofs if layout is None else layout.n_numbers

@@ -23,11 +23,11 @@ class Chains:
     Attributes
     ----------
     joints : (K,) int32
-        Their indices in the skeleton, parents before children.
+        Indices of the joints in the skeleton, parents before children.
     parents : (K,) int32
         Parents as indices into ``joints``; -1 for a root.
     place : (J,) int32
-        Index into ``joints`` of each joint of the skeleton, -1 for the others.
+        Index into ``joints`` of each joint of the skeleton, -1 if it is not included.
     """
 
     joints: Ints

@@ -14,7 +14,7 @@ __all__ = ["Drive"]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Drive:
-    """A motion that drives a figure with other joints, and the retargeting options.
+    """A motion that drives a figure with different joints, and the retargeting options.
 
     Attributes
     ----------
@@ -25,9 +25,9 @@ class Drive:
     joint_map : JointMap or None
         The requested match of joints; None for the automatic one.
     keeps_up : bool
-        Whether the result keeps the up axis of the motion's world instead of using the figure's.
+        Whether the result has the up axis of the motion's world instead of the figure's up axis.
     plants_feet : bool
-        Whether feet stay planted while those of the source are on the ground.
+        Whether feet stay planted while the source's feet are on the ground.
     hangs : bool
         Whether the up axis of the motion points down.
     finish : callable or None

@@ -54,20 +54,20 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
     up = drive.motion.figure.up
     if not drive.keeps_up or up == figure.up:
         return clip, notes
-    # The retargeted figure stands along its own up axis; rotate it back to the world's up axis.
+    # The retargeted figure is upright along its own up axis; rotate it to the world's up axis.
     rotation = _Z_TO_Y if figure.up == "z" else _Z_TO_Y * [-1.0, 1.0, 1.0, 1.0]
     return _rotated(clip, figure, rotation), notes
 
 
 def matches_of(drive: Drive, figure: Figure) -> Matches:
-    """Return the match of a drive's joints with those of a figure; raises as ``match_joints``."""
+    """Return the match of a drive's joints with a figure's; errors as of ``match_joints``."""
     source = drive.motion.figure
     skeletons = source.require_skeleton(), figure.require_skeleton()
     return match_joints(*skeletons, drive.joint_map, (source.name, figure.name))
 
 
 def full_map(drive: Drive, figure: Figure) -> JointMap:
-    """Return the match with a figure as a complete joint map; raises as ``match_joints``."""
+    """Return the match with a figure as a complete joint map; errors as of ``match_joints``."""
     source, target = drive.motion.figure.require_skeleton(), figure.require_skeleton()
     return joint_map_of(matches_of(drive, figure).partners, source, target)
 

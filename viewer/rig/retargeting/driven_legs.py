@@ -26,8 +26,8 @@ from viewer.rig.shape import shaped
 
 __all__ = ["DrivenLegs", "LegPair", "driven_legs", "foot_paths", "leg_pairs", "spans_of"]
 
-_ALIKE = 1e-4  # lengths this close are equal, relative to the body
-_UNEVEN = 1e-3  # largest relative difference of a joint's scale factors
+_ALIKE = 1e-4  # tolerance for equal lengths, relative to the body
+_UNEVEN = 1e-3  # maximum relative difference of a joint's scale factors
 _FOLDED = 1e-3  # extension at rest below which a leg is folded
 _STEEP = 0.9  # maximum sine of the slope of a standing person's foot
 
@@ -69,6 +69,8 @@ class DrivenLegs:
         A point of the sole below each ankle, in the ankle's space, homogeneous.
     level : (L, 3)
         The direction that points up in a standing foot, in the ankle's space.
+    toe_level : (L, 3)
+        The same direction in the ball's space.
     rests : (2, J, 3)
         Rest translations and scales of the skeleton.
     extensions : (L,)
@@ -77,6 +79,8 @@ class DrivenLegs:
         Approximate height of the body.
     clearance : float
         Height of the balls above the soles in the rest pose.
+    travel : (N, 3) or None
+        Translation relative to moving ground in each row; None if the ground does not move.
     """
 
     chains: Chains
@@ -84,30 +88,29 @@ class DrivenLegs:
     soles: Soles
     heels: Floats
     level: Floats
+    toe_level: Floats
     rests: Floats
     extensions: Floats
     size: float
     clearance: float
+    travel: Floats | None = None
 
     def worlds(self, clip: SampledClip) -> Floats:
-        """Return the world matrices of the chains: (N, K, 4, 4)."""
-        return chain_worlds(clip, self.chains, *self.rests)
+        """Return the world matrices of the chains, moved by the travel: (N, K, 4, 4)."""
+        found = chain_worlds(clip, self.chains, *self.rests)
+        if self.travel is not None:
+            found[..., :3, 3] += self.travel[:, None]
+        return found
 
     def heights(self, worlds: Floats, up: Floats) -> Floats:
         """Return the height of the lowest point of each foot: (N, L)."""
         # The matrices include the scales of the joints, and the soles are in the same unit.
         return self.soles.heights(worlds, np.append(up, 0.0), 1.0)
 
-    def facing(self, worlds: Floats, up: Floats) -> Floats:
-        """Return the cosine of the angle between each sole and the ground: (N, L)."""
-        ankles = worlds[:, [leg.ankle for leg in self.legs], :3, :3]
-        normals = np.einsum("nlab,lb->nla", ankles, self.level)
-        return normals @ up / np.linalg.norm(normals, axis=2)
-
     def straightness(self, worlds: Floats) -> Floats:
-        """Return the distance from hip to ankle relative to that in the rest pose: (N, L).
+        """Return the distance from hip to ankle relative to the distance in the rest pose: (N, L).
 
-        Legs that are folded at rest are compared with straight ones.
+        Legs that are folded at rest are compared with straight legs.
         """
         usual = np.where(self.extensions > _FOLDED, self.extensions, 1.0)
         return _extensions(worlds, self.legs) / usual
@@ -194,10 +197,13 @@ def driven_legs(
     inverse = np.linalg.inv(ankles)
     heels = np.einsum("lab,lb->la", inverse, np.append(below, np.ones((len(own), 1)), axis=1))
     level = np.einsum("lab,b->la", inverse[:, :3, :3], up)
-    toes = world[[leg.toe for leg in own], :3, 3] @ up
+    balls = world[[leg.toe for leg in own]]
+    toe_level = np.einsum("lab,b->la", np.linalg.inv(balls[:, :3, :3]), up)
+    toes = balls[:, :3, 3] @ up
     extensions, size = _extensions(world[None], own)[0], _size(world, own)
     clearance = float(toes.mean() - floor)
-    return DrivenLegs(chains, own, moved, heels, level, rests, extensions, size, clearance)
+    levels = level, toe_level
+    return DrivenLegs(chains, own, moved, heels, *levels, rests, extensions, size, clearance)
 
 
 def _is_solvable(linear: Floats) -> bool:

@@ -13,7 +13,7 @@ from viewer.rig.scene import figure_pose
 
 __all__ = ["expression_weights"]
 
-# Names in VRM 0.x, in lower case, and those in VRM 1.0.
+# Names in VRM 0.x, in lower case, and their names in VRM 1.0.
 _OLD = {
     **{"joy": "happy", "sorrow": "sad", "fun": "relaxed"},
     **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},

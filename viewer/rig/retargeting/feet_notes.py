@@ -10,7 +10,7 @@ from viewer.rig.scalars import length_text
 
 __all__ = ["feet_notes"]
 
-_ROUNDING = 1e-6  # relative to the body; smaller lengths are shown as 0
+_ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's height
 
 
 def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
@@ -43,6 +43,7 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         "after": text(changes.after),
         "gap_before": text(changes.gap_before),
         "gap": text(changes.gap_after),
+        "ground": f"{text(changes.ground_speed)}/s" if changes.ground_speed else "",
         "lowered": text(changes.lowered) if changes.lowered > _ROUNDING * changes.size else "",
     }
     return [Diagnostic("F007.feet-planted", values=values)]

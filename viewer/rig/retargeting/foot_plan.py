@@ -8,7 +8,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
-from viewer.rig.cleanup.leg_solving import falling
 from viewer.rig.retargeting.source_contacts import (
     Contact,
     FootPath,
@@ -19,9 +18,7 @@ from viewer.rig.retargeting.source_contacts import (
 
 __all__ = ["FootPlan", "foot_plan"]
 
-# Range of cosines of the angle between sole and ground over which a foot becomes fully held.
-_ON_SOLE = (-0.1, 0.3)
-_SUNK = 0.015  # the source's feet may be this far below the ground, relative to the body
+_SUNK = 0.015  # maximum depth of the source's feet below the ground, relative to the body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,14 +57,14 @@ class FootPlan:
             yield contact, slice(contact.start, contact.stop), ground
 
     def steps(self, points: tuple[Floats, Floats], contact: Contact) -> Floats:
-        """Return the horizontal displacements of a standing foot from row to row.
+        """Return the horizontal displacements of a planted foot from row to row.
 
         Parameters
         ----------
         points : ((N, 3), (N, 3))
             Paths of the ball and the heel.
         contact : Contact
-            The contact, which selects one of them in each row.
+            The contact, which selects one of the two paths in each row.
         """
         rows = slice(contact.start, contact.stop)
         toe, heel = (np.diff(path[rows], axis=0, prepend=path[rows][:1]) for path in points)
@@ -82,26 +79,20 @@ class FootPlan:
                 total += float(np.linalg.norm(self.steps(points, contact), axis=1).sum())
         return total
 
-    def holds(self, facing: Floats) -> Floats:
-        """Return the degree to which the sole of each foot is held on the ground, 0 to 1: (N, L).
-
-        Parameters
-        ----------
-        facing : (N, L)
-            Cosine of the angle between each sole and the ground.
-        """
-        result = np.zeros_like(facing)
+    def holds(self) -> Floats:
+        """Return the degree to which each foot is held on the ground, 0 to 1: (N, L)."""
+        result = np.zeros((len(self.feet[0].toe), len(self.feet)))
         for foot in range(len(self.contacts)):
             for contact, rows, _ in self.stances(foot):
                 result[rows, foot] = contact.hold
-        return result * falling((_ON_SOLE[1] - facing) / (_ON_SOLE[1] - _ON_SOLE[0]))
+        return result
 
-    def gap(self, heights: Floats, facing: Floats) -> float:
-        """Return the largest distance of a standing sole from the ground.
+    def gap(self, heights: Floats) -> float:
+        """Return the largest distance of a planted foot from the ground.
 
-        ``heights`` are those of the soles, (N, L); ``facing`` is as for ``holds``.
+        ``heights`` are the heights of the lowest point of each foot, (N, L).
         """
-        stands, largest = self.holds(facing) >= 1.0, 0.0
+        stands, largest = self.holds() >= 1.0, 0.0
         for foot in range(len(self.contacts)):
             for _, rows, ground in self.stances(foot):
                 gaps = np.abs(heights[rows, foot] - ground)[stands[rows, foot]]
@@ -112,7 +103,7 @@ class FootPlan:
         """Return the height below which a foot with contacts must not sink: (N,).
 
         This is the ground of the previous or next contact, whichever is lower. If the source's foot
-        sinks below that, the limit follows it.
+        sinks below this ground, the limit follows it.
         """
         contacts, path = self.contacts[foot], self.feet[foot]
         rows = np.arange(len(path.toe))

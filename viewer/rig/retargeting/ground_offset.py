@@ -17,17 +17,17 @@ _UPRIGHT = np.cos(np.radians(25.0))
 def ground_offset(
     source: Floats, target: Floats, matches: Matches, up: Floats, scale: float
 ) -> Floats:
-    """Return the offset that moves the target's feet to those of the scaled source.
+    """Return the offset that moves the target's feet to the feet of the scaled source.
 
     The path is scaled by the ratio of leg lengths from hip to ankle; the sizes of feet and hips may
-    have another ratio. Without this offset, a body with high ankles sinks into the ground.
+    have a different ratio. Without this offset, a body with high ankles sinks into the ground.
 
     Parameters
     ----------
     source, target : (J', 3), (J, 3)
         Joints of both skeletons in the source's rest pose, in common axes.
     matches : Matches
-        Joints of the source for those of the target.
+        Joints of the source for joints of the target.
     up : (3,)
         The up axis.
     scale : float
@@ -36,7 +36,7 @@ def ground_offset(
     Returns
     -------
     (3,)
-        Along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
+        Offset along the up axis, in the target's unit; 0 if pelvis or feet are unmatched, or the
         source does not stand in its rest pose.
     """
     place = {

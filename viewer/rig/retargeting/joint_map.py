@@ -71,7 +71,7 @@ def mapped_partners(
 ) -> Ints:
     """Return the source joint of each target joint: (J,) int32.
 
-    -1 for joints that the map keeps at rest, -2 for joints that it does not list.
+    The result is -1 for joints that stay at rest, -2 for joints that the map does not list.
 
     Parameters
     ----------

@@ -66,7 +66,8 @@ def match_joints(
     source, target : Skeleton
         The skeleton of the motion, and the skeleton to which it is retargeted.
     mapping : JointMap, or mapping of str to str, optional
-        Target joints and their source joints; or joint names of the source to those of the target.
+        Target joints and their source joints; or joint names of the source to joint names of the
+        target.
     titles : (str, str)
         Names of the two skeletons in messages.
 
@@ -191,7 +192,7 @@ def _left(source: Skeleton, target: Skeleton, partners: Ints) -> tuple[list[str]
 def _notes(
     source: Skeleton, target: Skeleton, partners: Ints, titles: tuple[str, str]
 ) -> list[Diagnostic]:
-    """Return messages about matched joints and unmatched ones."""
+    """Return messages about matched and unmatched joints."""
     moved, movers = joint_labels(target), joint_labels(source)
     pairs = [
         Phrase("joint-by-joint", joint=moved[joint], partner=movers[partner])

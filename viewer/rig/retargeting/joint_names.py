@@ -1,10 +1,10 @@
-"""Rules that translate joint names of many programs to those of the SMPL family.
+"""Rules that translate joint names of many programs to the names of the SMPL family.
 
 The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
 MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
 Max's Biped, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify. Sides are detected as ``L``,
-``R``, ``Left`` or ``Right`` at either end of a name; prefixes that most joints have
-(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are dropped.
+``R``, ``Left`` or ``Right`` at either end of a name; prefixes shared by most joints
+(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are removed.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ _WORDS = {
     "eye": "eye eyesmplhf eyeball",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_AMBIGUOUS = {"foot", "shoulder", "hand"}  # different joints in different conventions
+_AMBIGUOUS = {"foot", "shoulder", "hand"}  # words for different joints in different conventions
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
@@ -53,8 +53,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
-_SHARED = 0.6  # fraction of the joints; a first word shared by more joints is a prefix
-_MOST = 2000  # number of joints; a skeleton with more is not a body
+_SHARED = 0.6  # fraction of the joints above which a shared first word is a prefix
+_MOST = 2000  # maximum number of joints of a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
@@ -63,7 +63,7 @@ _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
 
 
 def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that every program can read: unique, and consisting of ``[A-Za-z0-9_]`` only.
+    """Return names that every program can read: unique, and consisting only of ``[A-Za-z0-9_]``.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     Returns
     -------
     list of J (str, str)
-        ``"left"``, ``"right"`` or ``""``, and the rest in lower case.
+        ``"left"``, ``"right"`` or ``""``, and the remaining word in lower case.
 
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
@@ -119,7 +119,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:
-    """Return the SMPL family's name for each joint, as its file states it or its name implies.
+    """Return the SMPL family's name for each joint, as stated by its file or implied by its name.
 
     Parameters
     ----------
@@ -172,8 +172,8 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
 
     Words whose meaning depends on the convention are resolved by the skeleton's other names:
     ``LeftShoulder`` is a collar if there is a ``LeftArm``, ``LeftFoot`` an ankle if there
-    is none. Chains of spine joints are numbered from the pelvis; of more than three, the first,
-    middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
+    is none. Chains of spine joints are numbered from the pelvis; if there are more than three, the
+    first, middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
 
 
 def _put_pelvis(result: list[str], parents: Ints, spine: list[int]) -> None:
-    """Name the pelvis: the joint above both legs, or else above the first leg or spine joint."""
+    """Name the pelvis: the joint above both legs; otherwise, above the first leg or spine."""
     legs = [result.index(name) for name in ("left_hip", "right_hip") if name in result]
     paths = [_ancestors(joint, parents) for joint in legs]
     shared = [joint for joint in paths[0] if all(joint in path for path in paths)] if paths else []
@@ -285,7 +285,7 @@ def _key(tokens: list[str]) -> _Key:
     """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM
+    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM have the prefix c
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
@@ -329,7 +329,7 @@ def _unambiguous(keys: list[_Key]) -> list[_Key]:
 
 
 def _role(key: _Key) -> str:
-    """Return the canonical name of one joint, or the chain that it belongs to."""
+    """Return the canonical name of one joint, or the chain to which it belongs."""
     side, word = key
     finger = _finger(word)
     if finger:

@@ -14,7 +14,7 @@ from viewer.rig.retargeting.source_rest import with_source_rest
 __all__ = ["front_axes", "rest_positions"]
 
 _SIDES = ("hip", "shoulder", "knee", "collar", "elbow")
-_SHORT = 1e-6  # fraction of the skeleton's size; shorter distances have no reliable direction
+_SHORT = 1e-6  # minimum distance with a reliable direction, as a fraction of the skeleton's size
 
 
 def rest_positions(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
@@ -52,7 +52,7 @@ def front_axes(points: Floats, matches: Matches, up: str, is_source: bool) -> Fl
     up : "y" or "z"
         Up axis.
     is_source : bool
-        Whether the points are those of the motion.
+        Whether the points belong to the motion.
     """
     upward = np.eye(3)["xyz".index(up)]
     joints = dict(zip(matches.names, range(len(matches.names)), strict=True))

@@ -34,7 +34,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
     list of Leg
         Hip, knee and ankle are the two long bones of a leg, without a scapula. The ankle is the
         hock of a hind leg and the wrist of a front leg. Chains without a counterpart on the other
-        side, such as a tail, are left out. Empty if there are fewer than four legs.
+        side, such as a tail, are omitted. Empty if there are fewer than four legs.
     """
     heights = points @ up - (points @ up).min()
     size = float(heights.max())

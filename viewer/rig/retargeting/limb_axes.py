@@ -1,8 +1,8 @@
 """Bending axes of knees and elbows, found from the motion.
 
 A joint bends about the normal of its two bones, cross(upper, lower), whose length is the sine of
-the angle. Knees bend backwards and elbows forwards, so that the sign of the normal distinguishes
-left from right. Its mean over the motion, in the axes of a joint, is the bending axis of the joint.
+the angle. Knees bend backwards and elbows forwards, so the sign of the normal distinguishes left
+from right. Its mean over the motion, in the axes of a joint, is the bending axis of the joint.
 """
 
 from __future__ import annotations

@@ -91,9 +91,10 @@ def joint_partners(figure: Figure) -> Ints:
 def posing_partners(figure: Figure) -> Ints:
     """Return each joint's counterpart for mirrored poses: (J,) int32.
 
-    The result is that of ``joint_partners`` for symmetric skeletons. Pairs of other humanoids are
-    found by the bones that their file states and by names (``Ear_L``, ``Ear_R``), and joints in the
-    mirror plane are their own counterparts; -1 for joints on one side only, such as a sword.
+    For symmetric skeletons, the result equals the result of ``joint_partners``. Pairs of other
+    humanoids are found by the bones that their file states and by names (``Ear_L``, ``Ear_R``), and
+    joints in the mirror plane are their own counterparts; -1 for joints on one side only, such as a
+    sword.
 
     Raises
     ------
@@ -161,7 +162,7 @@ def mirror_pose(figure: Figure, pose: Pose) -> Pose:
     Raises
     ------
     RigError
-        If the skeleton is neither symmetric nor a stated humanoid.
+        If the skeleton is not symmetric and the file states no human bones.
     """
     partners = posing_partners(figure)
     skeleton = figure.require_skeleton()

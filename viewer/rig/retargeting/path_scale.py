@@ -12,7 +12,7 @@ from viewer.rig.retargeting.rest_poses import RestPose
 
 __all__ = ["path_scale"]
 
-_ROUNDING = 1e-9  # a ratio this close to 1 is treated as 1
+_ROUNDING = 1e-9  # tolerance within which a ratio is treated as 1
 _LEGS = (("left_hip", "left_knee", "left_ankle"), ("right_hip", "right_knee", "right_ankle"))
 _ARMS = (
     ("left_shoulder", "left_elbow", "left_wrist"),
@@ -30,7 +30,7 @@ def path_scale(source: RestPose, target: RestPose, matches: Matches) -> tuple[fl
     source, target : RestPose
         Rest poses in common axes.
     matches : Matches
-        Joints of the source for those of the target.
+        Joints of the source for joints of the target.
     """
     partners, names = matches.partners, matches.names
     place = {name: joint for joint, name in enumerate(names) if name and partners[joint] >= 0}

@@ -1,6 +1,6 @@
 """Planting of a driven figure's feet during contacts of the source (after Kovar et al. 2002).
 
-Retargeting keeps the directions of limbs, so that feet slide and sink if proportions differ.
+Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
 sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
 the ankles reach their targets, and the body is lowered if a leg is too short.
@@ -14,6 +14,7 @@ from typing import cast
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.progress import report
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.cleanup.frame_rows import in_frame_order
 from viewer.rig.cleanup.leg_solving import leg_rotations, lowering
@@ -29,12 +30,15 @@ from viewer.rig.retargeting.driven_legs import (
 )
 from viewer.rig.retargeting.foot_plan import FootPlan, foot_plan
 from viewer.rig.retargeting.foot_shifts import foot_shifts
+from viewer.rig.retargeting.level_feet import levelled
+from viewer.rig.retargeting.moving_ground import ground_velocity, on_moving_ground
 from viewer.rig.retargeting.retarget import Retargeted
 
 __all__ = ["PlantedFeet", "plant_feet"]
 
-_EXTENDED = 0.97  # corrections straighten a leg up to this fraction of its length
+_EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
+_STEPS = 5  # number of steps reported as progress, from retargeting to the comparison
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +53,13 @@ class PlantedFeet:
         Total distance that feet slide while they are on the ground, in figure units: in the source,
         scaled to the figure, and in the figure before and after planting.
     gap_before, gap_after : float
-        Largest height of a standing sole above or below the ground.
+        Largest distance of a planted sole above or below the ground.
     lowered : float
         Largest distance by which the body was lowered.
     size : float
         Approximate height of the body.
+    ground_speed : float
+        Speed of the ground on which the feet stand, per second; 0 if it does not move.
     """
 
     n_contacts: int = 0
@@ -64,6 +70,7 @@ class PlantedFeet:
     gap_after: float = 0.0
     lowered: float = 0.0
     size: float = 1.0
+    ground_speed: float = 0.0
 
     @property
     def is_better(self) -> bool:
@@ -104,16 +111,27 @@ def plant_feet(
         return found.clip, None
     if has_source_proportions(found, figure, pairs, body.size):
         return found.clip, None
+    report(1, _STEPS, "steps", "planting the feet")
     source = cast("SampledClip", in_frame_order(found.source.clip))
-    worlds = body.worlds(clip)
+    worlds, timing = body.worlds(clip), clip.timing
     feet = foot_paths(found, source, pairs, body.feet_from_ankles(worlds), rest_up)
-    timing, shape = clip.timing, (body.size, body.clearance)
-    plan = foot_plan(feet, spans_of(timing), timing.frame_rate, shape, up)
+    how = spans_of(timing), timing.frame_rate
+    moves = ground_velocity(feet, *how, body.size, up)
+    if moves is not None:  # contacts and corrections are found in the axes of the ground
+        seconds = np.flatnonzero(timing.present) / timing.frame_rate
+        travel = -seconds[:, None] * moves
+        body = replace(body, travel=travel)
+        worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
+    plan = foot_plan(feet, *how, (body.size, body.clearance), up)
     if not any(plan.contacts):
         return found.clip, PlantedFeet()
-    planted, lowered = _planted(clip, body, worlds, plan)
+    report(2, _STEPS, "steps")
+    level = levelled(clip, body, worlds, plan)
+    report(3, _STEPS, "steps")
+    planted, lowered = _planted(level, body, body.worlds(level), plan)
+    report(4, _STEPS, "steps")
     after = body.worlds(planted)
-    gaps = [plan.gap(body.heights(each, up), body.facing(each, up)) for each in (worlds, after)]
+    gaps = [plan.gap(body.heights(each, up)) for each in (worlds, after)]
     changes = PlantedFeet(
         sum(map(len, plan.contacts)),
         plan.slide([(foot.toe, foot.heel) for foot in feet]),
@@ -123,6 +141,7 @@ def plant_feet(
         gaps[1],
         lowered,
         body.size,
+        0.0 if moves is None else float(np.linalg.norm(moves)),
     )
     return (planted if changes.is_better else found.clip), changes
 
@@ -132,9 +151,8 @@ def _planted(
 ) -> tuple[SampledClip, float]:
     """Return the corrected motion, and how far the body was lowered."""
     up, joints = plan.up, body.chains.joints
-    heights, facing = body.heights(worlds, up), body.facing(worlds, up)
-    straight = body.straightness(worlds)
-    shifts, sway = foot_shifts(plan, body.feet(worlds), heights, facing, straight)
+    heights, straight = body.heights(worlds, up), body.straightness(worlds)
+    shifts, sway = foot_shifts(plan, body.feet(worlds), heights, straight)
     moves = [shift - sway for shift in shifts]
     lowered = lowering(worlds[..., :3, 3], body.legs, moves, plan.rate, up, _EXTENDED)
     drop = sway - lowered[:, None] * up

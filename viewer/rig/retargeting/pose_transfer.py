@@ -50,7 +50,7 @@ __all__ = [
     "rotate_joints",
 ]
 
-_INEXACT = 1e-4  # radians; a rotation with a smaller error is treated as reached
+_INEXACT = 1e-4  # error in radians below which a rotation is treated as reached
 _REST_DIGITS = 5  # number of decimals to which equal rest rotations agree
 
 
@@ -73,7 +73,7 @@ class JointRotations:
     layout : str
         Result of ``dof_layout``: figures with the same layout use the DOF values directly.
     rotations : (J, 4) or None
-        Base rotations, before the DOFs, as in ``Pose``; None for those of the rest pose.
+        Base rotations, before the DOFs, as in ``Pose``; None for the rest pose's.
     meanings : tuple of J str
         For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
     left : (3,)
@@ -173,7 +173,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
         Provides the base rotations and translations.
     is_whole : bool
         Whether all DOFs of the source's pose are applied: joints that it does not contain are then
-        reset to the rest pose instead of keeping their values.
+        reset to the rest pose; by default, their values are unchanged.
     """
     if source.rotations is not None:
         pose.rotations[:] = source.rotations
@@ -207,7 +207,7 @@ def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
 def rotate_joints(
     source: JointRotations, target: Figure, start: Pose
 ) -> tuple[Pose, list[Diagnostic]]:
-    """Return a figure's pose with its joints rotated like those of another figure.
+    """Return a figure's pose with its joints rotated like another figure's joints.
 
     Parameters
     ----------
@@ -254,7 +254,7 @@ def _partners(source: JointRotations, target: Skeleton) -> Ints:
     """Return the source joint of each target joint, by name, then by stated bones; -1 for none."""
     partners = joints_by_name(source.names, target.names)
     if source.meanings or target.humanoid is not None:
-        # The names of other figures may be those of the SMPL family.
+        # Other figures may have the names of the SMPL family.
         theirs = source.meanings or source.names
         mine = target.names if target.humanoid is None else joint_meanings(target)
         meant = joints_by_name(theirs, mine)

@@ -17,7 +17,7 @@ __all__ = ["SIDES", "Postures", "postures_of", "rest_posture", "unit"]
 
 SIDES = ("left", "right")
 _LIMBS = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-_MOST = 4000  # maximum number of frames; of longer motions, every n-th frame is used
+_MOST = 4000  # maximum number of frames; for longer motions, every n-th frame is used
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +35,7 @@ class Postures:
     joints : dict of str to int
         Joints by their names in SMPL.
     up : (3,)
-        The up axis of the file; the body's own up axis if it is upside down.
+        The up axis of the file; the up axis of the body if it is upside down.
     """
 
     rows: Ints

@@ -21,11 +21,12 @@ __all__ = ["RestPose", "alignment", "is_same_rest", "rest_of", "up_rotation"]
 
 # Cosine of the maximum angle between the bones of equal rest poses.
 _SAME = np.cos(np.radians(20.0))
-# Cosine of the maximum difference for which a torso or foot keeps its own bend.
+# Cosine of the maximum difference for which a torso or foot keeps its bend.
 _NATURAL = np.cos(np.radians(25.0))
 # Cosine of the maximum angle of an upright body from the up axis.
 _UPRIGHT = np.cos(np.radians(25.0))
-_SHORT = 1e-6  # fraction of the skeleton's size; shorter bones have no reliable direction
+# Minimum length of bones with a reliable direction, as a fraction of the skeleton's size.
+_SHORT = 1e-6
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
@@ -101,10 +102,10 @@ def is_same_rest(source: RestPose, target: RestPose, matches: Matches, parents: 
 def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Ints) -> Floats:
     """Return the rotations from the target's rest pose to the source's at every matched joint.
 
-    Limbs and fingers: the bone is rotated to the source's direction by the smallest rotation from
-    the body's orientation, and therefore without twist. For hands with fingers, the knuckle line is
-    also aligned. Trunk and feet only follow the body, unless their directions differ by more than
-    25 degrees. The last joint of a limb follows the joint before it.
+    In limbs and fingers, the bone is rotated to the source's direction by the smallest rotation
+    from the body's orientation, and therefore without twist. For hands with fingers, the knuckle
+    line is also aligned. Trunk and feet only follow the body, unless their directions differ by
+    more than 25 degrees. The last joint of a limb follows the joint before it.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ def _at_joint(
     stands: Floats,
     reference: Floats,
 ) -> Floats:
-    """Return one joint's rotation; ``reference`` is that of the nearest matched ancestor."""
+    """Return one joint's rotation; ``reference`` is the nearest matched ancestor's rotation."""
     part = matches.names[joint].removeprefix("left_").removeprefix("right_")
     mine, theirs = (_directions(bone) for bone in bones)
     if not children:
@@ -240,7 +241,7 @@ def _body_frame(places: dict[str, Floats], up: Floats) -> Floats | None:
     if not sides or not high or not low:
         return None
     height = np.mean(high, axis=0) - np.mean(low, axis=0)
-    # The bend of the spine must not tilt a body that stands upright.
+    # The bend of the spine must not tilt an upright body.
     is_upright = height @ up > _UPRIGHT * np.linalg.norm(height)
     return _frame(sides[0], up if is_upright else height)
 
@@ -251,7 +252,7 @@ def _frame(side: Floats, main: Floats) -> Floats | None:
     length = np.linalg.norm(across)
     if not length > _SHORT * np.linalg.norm(side) * np.linalg.norm(main):
         return None
-    # Gram-Schmidt that keeps the main axis and adjusts the side.
+    # Gram-Schmidt orthogonalisation that keeps the main axis and adjusts the side.
     third, second = across / length, main / np.linalg.norm(main)
     return np.stack([np.cross(second, third), second, third], axis=1)
 
@@ -264,6 +265,6 @@ def _arc(start: Floats, end: Floats) -> Floats:
         return rotation_vector_to_matrix(axis / sine * np.arctan2(sine, cosine))
     if cosine > 0.0:
         return np.eye(3)
-    # 180 degrees about any perpendicular axis.
+    # Rotate by 180 degrees about any perpendicular axis.
     across = np.cross(start, np.eye(3)[np.abs(start).argmin()])
     return rotation_vector_to_matrix(np.pi * across / np.linalg.norm(across))

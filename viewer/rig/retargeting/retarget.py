@@ -44,7 +44,7 @@ from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
 
-_STILL = 1e-6  # fraction of the skeleton's size; position channels with less motion are ignored
+_STILL = 1e-6  # minimum motion of used position channels, as a fraction of the skeleton's size
 
 
 def scaled_motion(motion: SkeletonMotion, factor: float, unit: str = "") -> SkeletonMotion:
@@ -109,7 +109,7 @@ class Retargeted:
     source : SkeletonMotion
         The motion, with the rest pose that was used.
     matches : Matches
-        Joints of the source for those of the figure.
+        Joints of the source for joints of the figure.
     to_target : (3, 3)
         Rotation from the source's axes to the figure's.
     scale : float
@@ -135,7 +135,7 @@ def retarget(
     Joints are matched by ``mapping``, then by the names that many programs use for a body (see
     ``viewer.rig.retargeting.joint_names``), then by equal names; a skeleton with the same names
     and hierarchy matches joint by joint. Limbs get exactly the directions of the source's limbs;
-    spine, neck, head and feet keep the figure's own bend unless the rest poses differ greatly. With
+    spine, neck, head and feet keep the figure's bend unless the rest poses differ greatly. With
     the same hierarchy and nearly the same rest pose, local rotations are copied unchanged.
 
     Parameters

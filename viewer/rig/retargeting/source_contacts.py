@@ -2,9 +2,9 @@
 
 A foot touches the ground with its ball, its heel, or both. A point of a foot is in contact while it
 moves slowly and is no higher than the other point of the foot; both tests use hysteresis. A contact
-is valid only if, at some time during it, the foot is the lowest one (not one held still in the
-air), and if it is below its hip (not next to it, as in a lying person). So the ground need not be
-flat: every contact has its own height, as on stairs.
+is valid only if, at some time during it, the foot is the lowest one, not a foot held still in the
+air, and if it is below its hip, not next to it as in a lying person. The ground therefore need not
+be flat: every contact has its own height, as on stairs.
 """
 
 from __future__ import annotations
@@ -22,19 +22,17 @@ from viewer.rig.cleanup.leg_solving import falling
 __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
 
 # Lengths and speeds are relative to the size of the body, about its height: 0.1 is 0.17 m.
-_SLOW, _FAST = 0.08, 0.2  # speed per second at which a contact begins, and ends
-_LOW, _HIGH = (
-    0.015,
-    0.025,
-)  # height above the foot's lower point: a contact begins, and ends
-_LOWEST = 0.02  # a foot at most this far above the other one may be the lowest
+_SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
+# Heights above the foot's lower point at which a contact begins and ends.
+_LOW, _HIGH = 0.015, 0.025
+_LOWEST = 0.02  # maximum height above the other foot of a foot that may be the lowest
 _UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
-_LEVEL = 0.015  # heights this close are one level
-_GROUND = (-0.015, 0.06)  # heights of feet standing on a ground at height 0
+_LEVEL = 0.015  # maximum difference between heights of one level
+_GROUND = (-0.015, 0.06)  # range of heights of feet on a ground at height 0
 _SIMILAR = 1.0 / 3.0  # minimum fraction of the longest duration for a similar duration
 _TILTED = 0.04  # height of the heel above the ball, or vice versa, of a tilted foot
-_TIPTOE = 0.07  # the ball of a foot on tiptoe is at most this far above the ground
+_TIPTOE = 0.07  # maximum height of the ball of a foot on tiptoe above the ground
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +66,10 @@ class Contact:
         Half-open range of rows.
     on_toe : (N,)
         Rows of the range in which the ball is on the ground; in all others, only the heel is.
+    is_flat : (N,)
+        Rows of the range in which both are on the ground.
     hold : (N,)
-        1 in rows in which the foot is slow, less where the contact begins and ends.
+        1 in rows in which the foot is slow, less at the beginning and end of the contact.
     height : float
         Height of the foot's lower point.
     tilt : float
@@ -79,6 +79,7 @@ class Contact:
     start: int
     stop: int
     on_toe: Bools
+    is_flat: Bools
     hold: Floats
     height: float
     tilt: float
@@ -122,7 +123,8 @@ def foot_contacts(
                     continue
                 height = float(np.median(lows[number, rows][slow]))
                 tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
-                found.append(Contact(rows.start, rows.stop, toe[a:b], hold[a:b], height, tilt))
+                points = toe[a:b], toe[a:b] & heel[a:b]
+                found.append(Contact(rows.start, rows.stop, *points, hold[a:b], height, tilt))
         result.append(found)
     return result
 
@@ -165,7 +167,7 @@ def ground_level(
     size : float
         Approximate height of the body.
     clearance : float
-        Probable height of a standing foot's lower point above the ground.
+        Probable height of a planted foot's lower point above the ground.
     """
     every = [contact for foot in contacts for contact in foot]
     heights = np.array([contact.height for contact in every])

@@ -26,7 +26,8 @@ __all__ = ["SourceRest", "rest_fault", "with_source_rest"]
 SourceRest = int | str
 """A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
 
-_FOLDED = np.cos(np.radians(60.0))  # joint chains this close to the trunk's direction are not legs
+# Cosine of the minimum angle between the trunk and a leg's bones.
+_FOLDED = np.cos(np.radians(60.0))
 _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
 _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
@@ -54,7 +55,7 @@ def rest_fault(motion: SkeletonMotion, choice: SourceRest) -> Diagnostic | None:
 def with_source_rest(
     motion: SkeletonMotion, choice: SourceRest
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
-    """Return a motion whose skeleton has the requested rest pose; the motion is the same.
+    """Return a motion whose skeleton has the requested rest pose; the motion itself is unchanged.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def with_source_rest(
     motion : SkeletonMotion
         The same clip, with another rest pose of the skeleton.
     notes : list of Diagnostic
-        The chosen rest pose, unless it is that of the skeleton.
+        The chosen rest pose, unless it is the skeleton's.
 
     Raises
     ------
@@ -121,7 +122,7 @@ def _estimated(
 
 
 def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other world rotations: (J, 3, 3)."""
+    """Return a motion whose skeleton has other world rotations at rest: (J, 3, 3)."""
     above = worlds[skeleton.parents]
     above[skeleton.parents < 0] = np.eye(3)
     local = matrix_to_quaternion(np.swapaxes(above, 1, 2) @ worlds)
@@ -129,7 +130,7 @@ def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> Skele
 
 
 def _replaced(motion: SkeletonMotion, skeleton: Skeleton, local: Floats) -> SkeletonMotion:
-    """Return a motion whose skeleton rests with other local rotations: (J, 4)."""
+    """Return a motion whose skeleton has other local rotations at rest: (J, 4)."""
     rested = replace(skeleton, rest_rotations=local)
     return replace(motion, figure=replace(motion.figure, skeleton=rested))
 
@@ -142,9 +143,9 @@ def _row(motion: SkeletonMotion, frame: int) -> int:
 
 
 def _is_body(still: Postures) -> bool:
-    """Return whether a rest pose is that of a body: legs apart from the trunk, limbs unfolded.
+    """Return whether a rest pose is a body's: legs apart from the trunk, limbs unfolded.
 
-    It need not be upright, and may be that of an animal, whose legs are across its trunk.
+    The body need not be upright, and may be an animal's, whose legs are perpendicular to its trunk.
     """
     trunk = still.trunk()[0]
     side = still.direction("right_hip", "left_hip")[0]
@@ -185,7 +186,7 @@ def _calibration(postures: Postures) -> tuple[int, float]:
 
 
 def _is_rolled(postures: Postures, left: Floats, forward: Floats) -> Bools:
-    """Return a mask of the frames whose bending axes are not those of a T- or A-pose: (F,)."""
+    """Return a mask of the frames whose bending axes differ from a T- or A-pose: (F,)."""
     result = np.zeros(len(postures.rows), dtype=bool)
     for limb in limb_axes(postures):
         if limb.is_seen:

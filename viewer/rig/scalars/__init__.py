@@ -64,15 +64,15 @@ class Quantity:
     needs : str
         Part that a figure must have, as named in the message if it is missing.
     kind : str
-        ``"sequential"``: amounts from 0; ``"diverging"``: below or above 0; ``"discrete"``:
+        ``"sequential"``: amounts from 0; ``"diverging"``: values below and above 0; ``"discrete"``:
         counts; ``"categorical"``: indices of named items.
     unit : str
         ``"length"`` for figure units, otherwise the unit's name; empty if dimensionless.
     moves : bool
         Whether the values depend on the pose.
     about : str
-        ``"joint"`` or ``"field"`` if the quantity refers to one, which its name may specify; empty
-        otherwise.
+        ``"joint"`` or ``"field"`` if the quantity refers to a joint or field, which its name may
+        specify; empty otherwise.
     isolines : bool
         Whether isolines are drawn by default.
     least : float
@@ -145,7 +145,7 @@ SCALARS = {
         "Classes", "fields", "classes", "categorical", "", moves=False, about="field"
     ),
 }
-"""Quantities by name, in the order of menus."""
+"""Quantities by name, in menu order."""
 
 
 def split_name(name: str) -> tuple[str, str]:
@@ -294,7 +294,7 @@ def shown_unit(name: str, figure: Figure) -> tuple[float, str]:
 
 
 def missing_part(name: str, figure: Figure) -> str:
-    """Return the name of the part that a figure lacks for a quantity; empty if it lacks none.
+    """Return the name of the part that a figure lacks for a quantity; empty if none is missing.
 
     Raises
     ------

@@ -51,5 +51,5 @@ class Asked:
 
 
 def influences_kept(skinning: Skinning) -> int:
-    """Return the number of influences to compare with: the chosen limit, or four."""
+    """Return the number of influences for the comparison: the chosen limit, or four."""
     return skinning.max_influences or _FOUR

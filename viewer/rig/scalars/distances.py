@@ -15,7 +15,7 @@ __all__ = ["asymmetry", "correctives", "methods", "normalized", "pruning"]
 
 
 def pruning(asked: Asked) -> Floats:
-    """Return the distance between skinning with all influences and with few: (V,), figure units."""
+    """Return the distance between skinning with all and with few influences: (V,), figure units."""
     count = influences_kept(asked.skinning)
     # The reference has normalised weights, as the effect of normalising is a separate quantity.
     whole = replace(asked.skinning, max_influences=0, normalize=True)
@@ -29,7 +29,7 @@ def normalized(asked: Asked) -> Floats:
 
 
 def methods(asked: Asked) -> Floats:
-    """Return the largest distance between any method and the reference: (V,), figure units."""
+    """Return the largest distance of all other methods from the reference: (V,), figure units."""
     first, *others = (replace(asked.skinning, method=name) for name in PURE)
     return np.max([_distance(asked, first, other) for other in others], axis=0)
 

@@ -20,7 +20,8 @@ from viewer.rig.skinning import deform
 
 __all__ = ["area", "stretch", "stretch_mean"]
 
-_NO_LENGTH = 1e-9  # fraction of the figure's size; shorter edges have no meaningful ratio
+# Minimum length of edges with a meaningful ratio, as a fraction of the figure's size.
+_NO_LENGTH = 1e-9
 _PERCENT = 100.0
 
 _edges: Memo[Figure, Ints] = Memo()

@@ -70,4 +70,4 @@ def entropy(asked: Asked) -> Floats:
     counts = sizes > 0.0
     fractions = sizes[counts] / totals[vertices[counts]]
     found = np.bincount(vertices[counts], -fractions * np.log2(fractions), skin.n_vertices)
-    return np.maximum(found, 0.0)  # replaces -0 by 0
+    return np.maximum(found, 0.0)  # this replaces -0 by 0

@@ -19,7 +19,7 @@ from viewer.rig.kinematics import posed_skeleton, skinning_matrices, world_matri
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
-from viewer.rig.shape import rest_positions, shaped
+from viewer.rig.shape import rest_positions, shaped, shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rig.skin import Skin
@@ -86,17 +86,16 @@ PURE = tuple(name for name, method in METHODS.items() if not method.ends)
 
 @dataclass(slots=True)
 class Skinning:
-    """Skinning options; the defaults follow the file.
+    """Skinning options; by default, weights are used as stored.
 
     Attributes
     ----------
     method : str
         A key of ``METHODS``.
     blend_factor : float
-        For methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
+        Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
     max_influences : int
-        Keep only this many of the strongest influences, scaled to a sum of 1; 0 keeps all as
-        stored.
+        Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
     normalize : bool
         Scale each vertex's weights to a sum of 1.
     correctives : bool
@@ -184,7 +183,7 @@ def skinned(
     skinning : Skinning
         Method and influences.
     vertices : (N,), optional
-        Indices of these vertices; all if omitted.
+        Indices of the vertices to transform; all if omitted.
 
     Returns
     -------
@@ -258,8 +257,7 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     (J, 4, 4)
         Joint space to figure space.
     """
-    skeleton = shaped(figure, pose.shape_weights).skeleton
-    assert skeleton is not None  # shaping preserves it
+    skeleton = shaped_skeleton(figure, pose.shape_weights)
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
 
 

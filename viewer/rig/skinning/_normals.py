@@ -13,8 +13,8 @@ _FLAT = 1e-5
 def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
     """Multiply normals by the inverse transpose of matrices, n' = |det A| A^-T n.
 
-    The columns a, b, c of A give the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
-    stays finite if A is singular. Its sign is changed to that of the inverse transpose, so that
+    The columns a, b, c of A define the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
+    stays finite if A is singular. Its sign is changed to the sign of the inverse transpose, so that
     outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
     reverses the winding, not the normals). Shapes: (3, 3, N) and (N, 3) to (N, 3), any length.
     """

@@ -23,9 +23,9 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["deform", "linear_maps", "split_palette"]
 
-_CHUNK = 1 << 16  # vertices per chunk, which bounds the memory for large meshes
-_RIGID = 1e-12  # a stretch this close to the identity is a rounding error
-_TINY = 1e-12  # a shorter blended quaternion defines no rotation
+_CHUNK = 1 << 16  # number of vertices per chunk, which limits the memory for large meshes
+_RIGID = 1e-12  # tolerance within which a stretch is treated as the identity
+_TINY = 1e-12  # minimum length of a blended quaternion that defines a rotation
 
 
 def deform(
@@ -152,7 +152,7 @@ def _blended(
 def _blend(
     skin: Skin, starts: Ints, listing: np.ndarray, duals: Floats, stretches: Floats
 ) -> tuple[Floats, Floats, Bools]:
-    """Blend the influences of one chunk; the mask is False if those of a vertex cancel out."""
+    """Blend the influences of one chunk; the mask is False for vertices where they cancel out."""
     span = slice(starts[0], starts[-1])
     edges = starts[listing] - starts[0]
     joints, weights = skin.joints[span], skin.weights[span]

@@ -15,7 +15,8 @@ from viewer.rig.skinning._normals import inverse_transposed
 
 __all__ = ["blended_matrices", "deform", "move"]
 
-_CHUNK = 1 << 14  # matrices per chunk, which fit into the processor's cache and limit the memory
+# Number of matrices per chunk, which fits into the processor's cache and limits the memory.
+_CHUNK = 1 << 14
 _IDENTITY = np.eye(3, 4).reshape(12)
 
 

@@ -28,7 +28,7 @@ from viewer.rig.springs.springs import Springs
 __all__ = ["STEPS_PER_SECOND", "Simulation", "Tails"]
 
 STEPS_PER_SECOND = 60
-"""Steps of the simulation per second; the result depends on this rate, as in other programs."""
+"""Simulation steps per second; the result depends on this rate, as in other programs."""
 
 _STEP = 1.0 / STEPS_PER_SECOND
 _SHORT = 1e-12
@@ -86,7 +86,7 @@ class Simulation:
         return self._rests
 
     def start(self, world: Floats, local: Floats, scales: Floats, place: Floats) -> Tails:
-        """Return points at rest, in the rest pose of the spring joints; as for ``step``."""
+        """Return points at rest, with spring joints in rest pose; arguments as for ``step``."""
         springs, world = self._springs, world.copy()
         points = np.zeros((springs.n_joints, 3))
         for level in self._levels:
@@ -246,7 +246,7 @@ def _inverse(matrices: Floats) -> Floats:
 def _regular(linear: Floats) -> Floats:
     """Return matrices (N, 3, 3), with singular ones replaced by the identity.
 
-    Joints are hidden by a scale of 0, which leaves nothing to swing.
+    A scale of 0 hides joints, whose points then cannot swing.
     """
     is_flat = np.abs(np.linalg.det(linear)) < _FLAT
     found: Floats = np.where(is_flat[:, None, None], np.eye(3), linear)

@@ -1,4 +1,4 @@
-"""Spring joints of a skeleton and the shapes that they collide with, as in VRM."""
+"""Spring joints of a skeleton and the shapes with which they collide, as in VRM."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def _no_colliders() -> Colliders:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Springs:
-    """Joints whose rotation follows from the inertia of a point below them.
+    """Joints whose rotation is determined by the inertia of a point below them.
 
     Attributes
     ----------

@@ -21,7 +21,7 @@ __all__ = ["PosedJoints", "PosesAt", "SpringTrack"]
 
 _BLOCK = 64  # number of steps that are computed and cached together
 _MOST_BLOCKS = 256  # maximum number of cached blocks; others are recomputed from their stored start
-_ON_STEP = 1e-6  # fraction of a step; times this close to a step are treated as that step
+_ON_STEP = 1e-6  # tolerance, as a fraction of a step, for times that are treated as that step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class SpringTrack:
     skeleton : Skeleton
         Skeleton with springs.
     start, end : float
-        Range of the motion in seconds; the rotations are constant outside.
+        Range of the motion in seconds; the rotations are constant outside this range.
     """
 
     def __init__(self, skeleton: Skeleton, start: float, end: float) -> None:

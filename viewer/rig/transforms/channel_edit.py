@@ -18,7 +18,7 @@ _SAME, _SINGLE = 1e-6, 2.0**-22
 
 
 def key_at(channel: TransformChannel, time: float) -> int:
-    """Return the key at a time, within the rounding of files; -1 if there is none."""
+    """Return the key at a time, within the rounding errors of files; -1 if there is none."""
     near = int(np.abs(channel.times - time).argmin())
     is_same = abs(channel.times[near] - time) <= max(_SAME, _SINGLE * abs(time))
     return near if is_same else -1
@@ -49,8 +49,8 @@ def added_key(
     time : float
         Seconds. An existing key at this time is changed instead.
     value : (C,), optional
-        Its value; by default the curve keeps its shape. A cubic key with a value gets the slope
-        between its neighbours.
+        Its value; by default the shape of the curve is unchanged. A cubic key with a value gets the
+        slope between its neighbours.
     """
     there = key_at(channel, time)
     if there >= 0:
@@ -101,7 +101,7 @@ def _smooth(times: Floats, values: Floats) -> Floats:
 def _spline(channel: TransformChannel, time: float) -> tuple[Floats, Floats]:
     """Return the value and slope of a cubic channel, before normalisation of rotations: (C,)."""
     times, values = channel.times, channel.values
-    assert channel.tangents is not None  # the caller checked for cubic interpolation
+    assert channel.tangents is not None  # the caller has checked for cubic interpolation
     if not times[0] < time < times[-1]:
         return values[0 if time <= times[0] else -1], np.zeros(channel.n_components)
     key = int(np.searchsorted(times, time, side="right")) - 1

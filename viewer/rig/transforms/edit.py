@@ -1,8 +1,8 @@
 """Editing of keyed transforms: every function returns a new clip; the original is unchanged.
 
 The three components of a translation, rotation or scale share their keys, and so do the weights of
-one channel: keys are moved in time, added and deleted for all of them. Keys keep their order and
-therefore their indices: a moved key stops before an unmoved neighbour.
+one channel: keys are moved in time, added and deleted for all of them. The order of keys and
+therefore their indices never change: a moved key stops before an unmoved neighbour.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ __all__ = [
 Place = tuple[int, int]
 """Index of a curve in ``rows_of``, and index of one of its keys."""
 
-_STEEPEST = math.radians(90.0)  # limit of the middle angle; beyond it, angles are ambiguous
+_STEEPEST = math.radians(90.0)  # limit of the middle angle, beyond which angles are ambiguous
 
 
 def with_transform_channel(
@@ -123,8 +123,8 @@ def add_transform_key(
     time : float
         Seconds.
     value : (C,), optional
-        Value of the key, a quaternion for rotations; by default the value of the curve, which keeps
-        its shape. Required if the row has no channel.
+        Value of the key, a quaternion for rotations; by default the value of the curve, whose shape
+        is then unchanged. Required if the row has no channel.
     """
     if row.channel >= 0:
         channel = added_key(clip.channels[row.channel], time, value)[0]
@@ -186,7 +186,7 @@ def _by_channel(
 
 
 def _line(channel: TransformChannel) -> Channel:
-    """Return a curve with the key times of a channel, which can then be moved like a curve's."""
+    """Return a curve with a channel's key times, which can then be moved like keys of a curve."""
     count = len(channel.times)
     return Channel(0, channel.times, np.zeros(count), (("flat", "flat"),) * count)
 

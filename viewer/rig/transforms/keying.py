@@ -17,8 +17,9 @@ from viewer.rig.transforms.channel_edit import added_key, value_at
 
 __all__ = ["joint_values", "key_transform_pose"]
 
-_UNCHANGED = 1e-9  # lengths, factors and weights this close to their curve are unchanged
-_SAME_ROTATION = 1e-9  # difference of unit quaternions, about half the angle in radians
+_UNCHANGED = 1e-9  # tolerance within which lengths, factors and weights equal their curves
+# Tolerance of the difference of unit quaternions, about half the angle in radians.
+_SAME_ROTATION = 1e-9
 
 
 def joint_values(skeleton: Skeleton, pose: Pose) -> dict[TransformPath, Floats]:

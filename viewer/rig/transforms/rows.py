@@ -45,7 +45,7 @@ class TransformRow:
     channel : int
         Index of the channel; -1 for a rotation without keys.
     shape : int
-        Blend shape of a weight, else -1.
+        Index of the blend shape of a weight; -1 for other curves.
     """
 
     path: TransformPath

@@ -58,7 +58,7 @@ def sample_transforms(clip: TransformClip, times: Floats) -> TransformSamples:
     a span of h seconds (glTF 2.0, appendix C):
     (2 u^3 - 3 u^2 + 1) p0 + h (u^3 - 2 u^2 + u) b0 + (3 u^2 - 2 u^3) p1 + h (u^3 - u^2) a1, with
     incoming tangents a and outgoing tangents b; rotations are normalised afterwards. Before its
-    first key and after its last key, a channel keeps the value of that key.
+    first key and after its last key, a channel has the value of that key.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from viewer.rig.motion.transform_clip import TRANSFORM_PATHS, TransformChannel, 
 
 __all__ = ["Arcs", "Curves", "Targets", "Timelines", "TransformTable", "transform_table"]
 
-_SMALLEST = 1e-9  # radians; at smaller angles slerp equals linear interpolation
+_SMALLEST = 1e-9  # angle in radians below which slerp equals linear interpolation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -171,7 +171,8 @@ def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
     for channel, _ in channels:
         unit = channel.values / np.linalg.norm(channel.values, axis=1, keepdims=True)
         unit = np.concatenate([unit, unit[-1:]])
-        # A quaternion and its negative are the same rotation; the nearer one gives the shorter arc.
+        # A quaternion and its negative are the same rotation; the nearer one yields the shorter
+        # arc.
         far = np.einsum("na,na->n", unit[1:], unit[:-1]) < 0.0
         unit[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
         chords = np.linalg.norm(np.diff(unit, axis=0, append=unit[-1:]), axis=1)

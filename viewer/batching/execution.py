@@ -1,4 +1,4 @@
-"""An attempt to run one item in this process; its output and errors become a result."""
+"""Execution of one item in this process; its output and errors become a result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of actors whose placement is singular: flattened, or scaled to zero."""
+"""Images of actors whose placement is singular because it flattens or scales to zero."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from viewer.rendering.view import normal_matrix
 SHEAR = np.array([[2.0, 1.0, 0.0], [0.0, 3.0, 0.0], [0.0, 0.0, -0.5]])
 
 
-def test_normals_stay_perpendicular_to_the_surface():
+def test_normals_remain_perpendicular_to_the_surface():
     along, across = np.array([1.0, 2.0, 3.0]), np.array([-2.0, 1.0, 0.5])
     normal = normal_matrix(SHEAR) @ np.cross(along, across)
     assert_allclose([normal @ (SHEAR @ along), normal @ (SHEAR @ across)], 0.0, atol=1e-12)
     assert_allclose(normal_matrix(SHEAR) @ SHEAR.T, np.eye(3), atol=1e-12)
 
 
-def test_normals_of_a_flattened_surface_point_across_the_plane():
+def test_normals_of_a_flattened_surface_are_perpendicular_to_the_plane():
     flat = np.diag([2.0, 0.0, 3.0])
-    # The plane y = 0 remains; slanted surfaces are pressed into it.
+    # Only the plane y = 0 remains; slanted surfaces are projected onto it.
     normals = np.array([[0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [0.0, -1.0, 2.0]]) @ normal_matrix(flat).T
     assert_allclose(normals[:, [0, 2]], 0.0)
     assert (np.sign(normals[:, 1]) == [1.0, 1.0, -1.0]).all()
@@ -35,7 +35,7 @@ def offscreen():
 
 
 @pytest.mark.parametrize("placed", [True, False])
-def test_an_actor_scaled_to_zero_draws_nothing(offscreen, placed):
+def test_actor_scaled_to_zero_is_invisible(offscreen, placed):
     scene = alone(grid_figure())
     if placed:
         scene.actors[0].placement = np.diag([0.0, 0.0, 0.0, 1.0])
@@ -44,7 +44,7 @@ def test_an_actor_scaled_to_zero_draws_nothing(offscreen, placed):
     assert not drawn(front_view(offscreen, scene)).any()
 
 
-def test_an_actor_flattened_along_the_view_looks_the_same(offscreen):
+def test_actor_flattened_along_the_view_direction_looks_the_same(offscreen):
     scene = alone(grid_figure())
     before = front_view(offscreen, scene)
     scene.actors[0].placement = np.diag([1.0, 1.0, 0.0, 1.0])

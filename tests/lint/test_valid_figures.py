@@ -1,4 +1,4 @@
-"""Valid figures have no errors or warnings; known errors in real files are listed here."""
+"""Valid figures without errors or warnings, and the known errors in real files."""
 
 from __future__ import annotations
 
@@ -27,18 +27,18 @@ def notes(findings: list[Finding]) -> set[str]:
     return {finding.code for finding in findings if finding.severity == "note"}
 
 
-def test_the_bundled_fox_has_no_findings() -> None:
+def test_bundled_fox_has_no_findings() -> None:
     _, findings = lint_files(bundled_files())
     assert heavy(findings) == []
-    assert notes(findings) == {"W007", "W008", "S005"}  # up to 14 influences; hinges
+    assert notes(findings) == {"W007", "W008", "S005"}  # the fox has up to 14 influences and hinges
 
 
-def test_the_bundled_body_has_no_findings() -> None:
+def test_bundled_body_has_no_findings() -> None:
     _, findings = lint_files([bundled_body()])
     assert findings == []
 
 
-def test_a_tiny_rig_has_no_findings(tmp_path: Path) -> None:
+def test_tiny_rig_has_no_findings(tmp_path: Path) -> None:
     _, findings = lint_files(write_rig(tmp_path))
     assert [finding for finding in findings if finding.severity == "error"] == []
 
@@ -46,36 +46,37 @@ def test_a_tiny_rig_has_no_findings(tmp_path: Path) -> None:
 COURSE = {
     ("wasp.skel", "wasp.skin", "wasp_walk.anim"): set(),
     ("tube.skel", "tube.skin"): set(),
-    # The right knee's pose is -3, 1, 2, its limits are -2 to 0, 0 and 0: a real error.
+    # The pose of the right knee is -3, 1, 2 and its limits are -2 to 0, 0 and 0, which is a real
+    # error.
     ("test.skel",): {"S004"},
 }
 
 
 @pytest.mark.parametrize("names", COURSE)
-def test_skel_and_skin_files(shared: Path, names: tuple[str, ...]) -> None:
+def test_skel_and_skin_files_have_only_known_findings(shared: Path, names: tuple[str, ...]) -> None:
     _, findings = lint_files([shared / name for name in names])
     assert {code for code, _ in heavy(findings)} == COURSE[names]
 
 
-def test_the_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> None:
+def test_pig_has_two_pairs_of_joints_with_equal_names(shared_data: Path) -> None:
     for name in ("PIG_core.pkl", "core_txt_files"):
         _, findings = lint_files([shared_data / "pig" / name])
         assert heavy(findings) == [
             ("S006", '4 joints with duplicate names: "R leg" (2), "L leg" (2)')
         ]
-        # Its weights are raw, with sums off by at most 0.002.
+        # The weights are not normalised; their sums have errors of at most 0.002.
         assert "W001" in notes(findings)
 
 
 @pytest.mark.parametrize("name", ["SMPL_NEUTRAL.npz", "SMPL_NEUTRAL.pkl", "easymocap"])
 def test_synthetic_models_and_captures_have_no_findings(shared_data: Path, name: str) -> None:
     _, findings = lint_files([shared_data / "smpl_synthetic" / name])
-    # One of the two captured people has a different pose in every frame.
+    # One of the two captured people has an unrelated pose in every frame.
     assert {code for code, _ in heavy(findings)} == ({"C014"} if name == "easymocap" else set())
 
 
 @pytest.mark.usefixtures("quick_fits")
-def test_an_automatically_rigged_mesh_has_no_findings(tmp_path: Path) -> None:
+def test_automatically_rigged_mesh_has_no_findings(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
     body = viewer.load(bundled_body()).actors[0]
     moved = 1.3 * viewer.deform(body.figure, body.pose)[0] + [0.2, 0.0, 0.1]

@@ -10,7 +10,7 @@ from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.joint_map import JointMap
 
-__all__ = ["carrying_drive", "has_joints"]
+__all__ = ["body_drive", "has_joints"]
 
 _ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 
@@ -29,7 +29,7 @@ def has_joints(figure: Figure, names: Sequence[str]) -> bool:
     return names[0] in own and sum(name in own for name in names) >= _ENOUGH * len(names)
 
 
-def carrying_drive(
+def body_drive(
     body: Figure,
     clip: SampledClip,
     up: str,

@@ -1,0 +1,222 @@
+"""Conversion of long BVH files part by part, compared with conversion of the whole file."""
+
+from __future__ import annotations
+
+import tracemalloc
+
+import numpy as np
+import pytest
+
+from viewer.cli import run
+from viewer.commands._writing import streamed_bvh
+from viewer.formats import Source
+from viewer.formats._bvh import streaming
+
+FRAMES = 300
+PART = 3000  # bytes: about ten frames
+ORDERS = ("Zrotation Xrotation Yrotation", "Xrotation Yrotation Zrotation", "Yrotation Zrotation")
+PLACES = "Xposition Yposition Zposition"
+
+
+@pytest.fixture
+def converted(tmp_path, monkeypatch, capsys):
+    """Return a function that converts a text, and returns text, output, errors and exit code."""
+    monkeypatch.setattr(streaming, "_PART", PART)
+
+    def convert(data, options=(), streams=True):
+        source, target = tmp_path / "a.bvh", tmp_path / "b.bvh"
+        source.write_bytes(data if isinstance(data, bytes) else data.encode())
+        monkeypatch.setattr(streamed_bvh, "_LARGE", 0 if streams else 1 << 40)
+        code = run(["convert", str(source), "-o", str(target), "--force", *options])
+        written = target.read_bytes() if target.exists() else None
+        target.unlink(missing_ok=True)
+        assert [path.name for path in tmp_path.iterdir()] == ["a.bvh"]
+        return written, *capsys.readouterr(), code
+
+    return convert
+
+
+@pytest.fixture
+def streamed(converted, monkeypatch):
+    """Return a function that also requires that the file was read part by part."""
+    taken = []
+    known = streamed_bvh.convert_streamed
+
+    def convert(*arguments):
+        found = known(*arguments)
+        taken.append(found is not None)
+        return found
+
+    monkeypatch.setattr("viewer.commands.convert.convert_streamed", convert)
+
+    def both(data, options=(), expected=True):
+        taken.clear()
+        parts, whole = (converted(data, options, streams) for streams in (True, False))
+        assert taken == [expected, False]
+        assert parts == whole
+        return parts
+
+    return both
+
+
+def motion(
+    moves_inner: bool = False, roots: int = 1, size: float = 1.0, frames: int = FRAMES
+) -> str:
+    """Return a random walk of a chain per root, through gimbal lock and several revolutions."""
+    lines = ["HIERARCHY"]
+    for root in range(roots):
+        for joint in range(5):
+            turns = ORDERS[joint % 3]
+            channels = f"{PLACES} {turns}" if joint == 0 or (moves_inner and joint == 2) else turns
+            kind = "JOINT" if joint else "ROOT"
+            lines += [f"{kind} part {root}-{joint}", "{", f"OFFSET {0.1 * size} {0.5 * size} 0"]
+            lines += [f"CHANNELS {len(channels.split())} {channels}"]
+        lines += ["End Site", "{", f"OFFSET 0 {0.3 * size} 0.01", "}", *["}"] * 5]
+    width = sum(line.count("rotation") + line.count("position") for line in lines)
+    steps = np.random.default_rng(3).normal(size=(frames, width)).cumsum(axis=0)
+    steps[:, 4::7] = 90.0  # gimbal lock of some joints, in some orders
+    steps[frames // 2 :, 4::7] *= 3.0
+    steps[:, :3] *= 0.01 * size
+    rows = [" ".join(f"{value:.5f}" for value in row) for row in steps]
+    head = [*lines, "MOTION", f"Frames: {frames}", "Frame Time: 0.0166667"]
+    return "\n".join([*head, *rows]) + "\n"
+
+
+OPTIONS = (
+    "",
+    "--to-unit m --to-up z",
+    "--rotation-order xyz --digits 9",
+    "--rest-frame --digits 2",
+    "--up z --unit in",
+    "--up -y --fps 25",
+    "--frames 95:207",
+    "--frames 250: --as bvh --gaps hold",
+)
+
+
+@pytest.mark.parametrize("options", OPTIONS)
+def test_options_produce_the_same_file_and_notes(streamed, options):
+    written, _, _, code = streamed(motion(), options.split())
+    assert code == 0
+    frames = {"--frames 95:207": 112, "--rest-frame --digits 2": 301}.get(options)
+    frames = 50 if options.startswith("--frames 250") else frames or FRAMES
+    assert f"Frames: {frames}\n".encode() in written
+
+
+@pytest.mark.parametrize("options", ("", "--rest-frame", "--frames 1:299", "--unit cm"))
+@pytest.mark.parametrize(
+    "kind", ({"moves_inner": True}, {"roots": 3}, {"size": 100.0}, {"frames": 3})
+)
+def test_skeletons_produce_the_same_file_and_notes(streamed, kind, options):
+    if kind.get("frames") != 3 or "299" not in options:
+        assert streamed(motion(**kind), options.split())[-1] == 0
+
+
+@pytest.mark.parametrize(
+    "change",
+    (
+        lambda text: text.replace("\n", "\r\n"),
+        lambda text: "\ufeff" + text,
+        lambda text: text + "\n\n  \n",
+        lambda text: text.rstrip(),
+        lambda text: text.replace("Time: 0.0166667\n", "Time: 0.0166667 \n\n\t"),
+        lambda text: text.replace("Frames: 300\nFrame Time: 0.0166667", "Frame Time:1\nframes 300"),
+        lambda text: text.replace("OFFSET 0.1 0.5 0\n", "", 1),
+        lambda text: text.replace("}\nMOTION", "}\n}\nMOTION"),
+        lambda text: text.replace("0.0166667", "0"),
+    ),
+)
+def test_unusual_spellings_are_read_part_by_part(streamed, change):
+    assert streamed(change(motion()))[-1] == 0
+
+
+def broken(line: int, new: str):
+    """Return a function that replaces one line, counted from the end."""
+
+    def change(text):
+        lines = text.splitlines()
+        lines[-line] = new.replace("$", lines[-line])
+        return "\n".join(lines) + "\n"
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "code"),
+    (
+        (broken(20, "$ 1.0"), 2),
+        (broken(2, "$ up"), 2),
+        (broken(2, ""), 0),
+        (broken(150, "nan" + " 0" * 16), 2),
+        (broken(150, "1e30" + " 0" * 16), 2),
+        (broken(1, "1 2 3"), 0),
+        (lambda text: text.replace("Frames: 300", "Frames: 299"), 0),
+        (lambda text: text.replace("Frames: 300\n", ""), 0),
+        (lambda text: text.replace("Frame Time: 0.0166667\n", ""), 0),
+        (lambda text: text.replace("MOTION", "MOTIONS"), 2),
+        (lambda text: text[:300], 2),
+        (lambda text: text.rsplit("\n", 100)[0].replace("\n", "\r"), 0),
+    ),
+)
+def test_irregular_files_are_read_as_a_whole(streamed, change, code):
+    # Frames after the requested ones are also checked.
+    for options in ((), ("--frames", "10:20")):
+        assert streamed(change(motion()), options, False)[-1] == code
+
+
+@pytest.mark.parametrize(
+    "options", ("--trim 10:20", "--resample 30", "--smooth", "--frame 3", "--time 0", "--mirror")
+)
+def test_options_that_need_the_whole_motion_read_it_as_a_whole(streamed, options):
+    streamed(motion(frames=40), options.split(), False)
+
+
+def test_position_channels_that_are_all_zero_are_read_as_a_whole(streamed):
+    text = motion(moves_inner=True)
+    head, rows = text.split("Frame Time: 0.0166667\n")
+    numbers = [row.split() for row in rows.splitlines()]
+    for row in numbers:
+        row[9:12] = ["0", "0", "0"]
+    lines = "\n".join(" ".join(row) for row in numbers)
+    _, _, errors, code = streamed(f"{head}Frame Time: 0.0166667\n{lines}\n", (), False)
+    assert code == 0
+    assert "position" in errors
+
+
+def test_files_that_change_between_the_passes_are_read_as_a_whole(tmp_path):
+    path = tmp_path / "a.bvh"
+    path.write_text(motion())
+    stream = streaming.open_stream(Source(path))
+    path.write_text(motion(frames=299))
+    with pytest.raises(streaming.Irregular):
+        list(stream.clips(0, 300))
+
+
+def test_standard_output_receives_the_same_file(tmp_path, monkeypatch, capfdbinary):
+    path = tmp_path / "a.bvh"
+    path.write_text(motion(frames=5))
+    outputs = []
+    for large in (0, 1 << 40):
+        monkeypatch.setattr(streamed_bvh, "_LARGE", large)
+        link = tmp_path / f"{large}.bvh"
+        link.symlink_to("/dev/stdout")
+        assert run(["convert", str(path), "-o", str(link)]) == 0
+        outputs.append(capfdbinary.readouterr().out)
+    assert outputs[0] == outputs[1]
+    assert outputs[0].startswith(b"HIERARCHY")
+
+
+def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    monkeypatch.setattr(streaming, "_PART", 20_000)
+    peaks = []
+    for frames in (100, 500, 5000):
+        path = tmp_path / f"{frames}.bvh"
+        path.write_text(motion(frames=frames))
+        tracemalloc.start()
+        assert run(["convert", str(path), "-o", str(tmp_path / "b.bvh"), "--force"]) == 0
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    # A frame has 17 numbers and 5 joints: its rotations need 160 bytes. Only the numbers of lines
+    # and rows are kept, at most 16 bytes per frame.
+    assert (peaks[2] - peaks[1]) / 4500 < 40

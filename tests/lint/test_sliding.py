@@ -1,0 +1,56 @@
+"""Sliding feet: drifts are found; swings close to the ground, landings and steps are not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from lint.sound import FRAMES, RATE, legs, scene_of, standing
+
+from viewer.lint import lint_scene
+
+_K = np.arange(FRAMES)
+
+
+def codes(left: np.ndarray, right: np.ndarray) -> list[str]:
+    """Check legs whose ankles move along z by given distances, always 2 mm above the ground."""
+    figure = legs()
+    clip, count = standing(figure), len(left)
+    places = np.zeros((count, figure.skeleton.n_joints, 3))
+    names = figure.skeleton.names
+    for name, path in (("left_ankle", left), ("right_ankle", right)):
+        places[:, names.index(name), 2] = path
+    clip = replace(clip, rotations=np.tile(clip.rotations[:1], (count, 1, 1)), translations=places)
+    return [finding.code for finding in lint_scene(scene_of(figure, clip))]
+
+
+def steps(start: int, length: int, distance: float) -> np.ndarray:
+    """Return a path that moves smoothly by a distance in some frames and rests otherwise."""
+    x = np.clip((_K - start) / length, 0.0, 1.0)
+    return distance * x * x * (3.0 - 2.0 * x)
+
+
+STILL = np.zeros(FRAMES)
+
+
+def test_low_swings_next_to_a_standing_foot_are_not_slides() -> None:
+    # 0.5 m in 0.4 s, at up to 1.9 m/s.
+    swings = steps(5, 12, 0.5) + steps(40, 12, 0.5)
+    assert codes(swings, STILL) == []
+    assert codes(STILL, swings) == []
+
+
+@pytest.mark.parametrize("speed", [0.3, 0.5, 0.8])
+def test_feet_that_slide_together_are_found(speed: float) -> None:
+    # The body moves with the feet, as if on wheels.
+    assert "C007" in codes(speed * _K / RATE, speed * _K / RATE)
+
+
+def test_standing_foot_that_starts_to_drift_is_found() -> None:
+    assert "C007" in codes(steps(10, 20, 0.2), STILL)
+
+
+def test_short_landings_are_not_slides() -> None:
+    # Each foot lands within 0.13 s.
+    assert codes(steps(10, 4, 0.06), steps(30, 4, 0.06)) == []

@@ -1,0 +1,1 @@
+"""Textures, toon shading, and changes of materials by expressions."""
