@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
 from viewer.batching.items import Item
 from viewer.errors import ViewerError
+from viewer.media.saving import save_parts
 
 
 def misbehave(item: Item) -> dict[str, int]:
@@ -53,3 +55,13 @@ def write_numbers(folder: Path, count: int) -> list[str]:
         text = "1 zero" if index % 20 == 7 else f"1 {index}"
         (folder / f"pose{index}.txt").write_text(text)
     return [f"pose{index}.txt" for index in range(7, count, 20)]
+
+
+def kill_while_writing(item: Item) -> None:
+    """End the process, as the system does if memory runs out, while the output is written."""
+
+    def parts() -> Iterator[bytes]:
+        yield b"1"
+        os.kill(os.getpid(), signal.SIGKILL)
+
+    save_parts(item.output, parts())

@@ -10,7 +10,13 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
-from batching.batch_jobs import add_numbers, items_called, misbehave, write_numbers
+from batching.batch_jobs import (
+    add_numbers,
+    items_called,
+    kill_while_writing,
+    misbehave,
+    write_numbers,
+)
 
 import viewer
 from viewer import interrupts
@@ -201,6 +207,16 @@ def test_python_callers_get_their_interrupt_after_running_items_are_done(
     with pytest.raises(KeyboardInterrupt):
         viewer.batch("in/*.txt", struck(ctrl_c, "pose1.txt").function, on_result=found.append)
     assert [one.item.name for one in found] == ["pose0.txt", "pose1.txt"]
+
+
+@pytest.mark.slow
+def test_temporary_files_of_killed_workers_are_removed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_numbers(tmp_path / "in", 1)
+    limits = {"workers": 1, "retries": 1}
+    report = viewer.batch("in/*.txt", kill_while_writing, "out", to="sum", **limits)
+    assert [(one.status, one.attempts) for one in report.results] == [("crashed", 2)]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["report.jsonl"]
 
 
 def test_attempts_turn_every_failure_into_a_result():

@@ -38,7 +38,8 @@ FIELDS = {
 """Fields of templates."""
 
 _NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of ``{index}``
-_LEFT = ("frame",)  # fields that commands replace, for numbered images and meshes
+_LEFT = ("frame", "person")  # fields that commands replace, for numbered files
+_OWN_FIELD = re.compile(rf"\{{({'|'.join(_LEFT)})([^{{}}]*)\}}")
 _LONGEST = 300  # maximum length of a name in a message, characters
 
 
@@ -153,6 +154,9 @@ def _filled(
         "suffix": suffix[1:],
         "index": index,
     }
+    for name in ("parent", "folder", "stem", "name"):
+        # The command would treat such a part of the output's name as its own field.
+        values[name] = _OWN_FIELD.sub(r"(\1\2)", str(values[name]))
     text = ""
     for literal, field, spec, _ in pieces:
         text += literal
@@ -232,8 +236,8 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
             clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
     if clashes:
         raise ViewerError(
-            f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; use "
-            "{parent}, {name} or {index} in the template"
+            f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; "
+            "use a template with {parent}, {name} or {index}, such as 'out/{parent}/{name}.bvh'"
         )
     files = [file for item in items for file in item.files] + list(more_inputs)
     real = _RealPaths()
@@ -271,6 +275,10 @@ def check_summaries(
         return
     # Resolving a million paths takes seconds, so only paths with the same name are resolved.
     last = {os.path.basename(path).casefold() for path in given.values()}
+    for option, path in given.items():
+        folder = os.path.join(_identity(here, path), "")
+        if any(item.output and _identity(here, item.output).startswith(folder) for item in items):
+            raise ViewerError(f"{option}: {_shown(path)}: expected a file, found the output folder")
 
     def is_near(path: str) -> bool:
         return os.path.basename(path).casefold() in last

@@ -53,6 +53,10 @@ class Report:
     signal: int = 0
     path: Path | None = None
 
+    def __repr__(self) -> str:
+        counts = ", ".join(f"{count} {status}" for status, count in sorted(self.counts.items()))
+        return f"<Report of {self.n_items} items: {counts or 'no results'}; {self.seconds:.1f} s>"
+
     @property
     def counts(self) -> Counter[str]:
         """Number of results by status."""

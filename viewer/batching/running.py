@@ -18,7 +18,10 @@ from viewer.batching.report import Report, ReportFile, read_results
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import postponed, watched
+from viewer.media.unfinished import remove_leftovers
 from viewer.phrases import printable
+
+_KILLED = ("crashed", "timeout", "memory")  # the worker could not remove its temporary files
 
 __all__ = ["KeyedJob", "Settings", "related_reports", "run_batch", "shard_of"]
 
@@ -157,6 +160,8 @@ def run_batch(
     if settings.report is not None:
         keyed = KeyedJob(job, settings.identity, settings.shared, frozenset(earlier))
     report = Report(n_items=len(items), path=settings.report)
+    if settings.existing == "resume":
+        remove_leftovers(item.output for item in items if item.output)
     with contextlib.ExitStack() as stack:
         file = None
         if settings.report is not None:
@@ -172,6 +177,8 @@ def run_batch(
                 result = replace(earlier[result.key], item=result.item, status="unchanged")
             elif file is not None:
                 file.add(result)
+            if result.item.output and (result.attempts > 1 or result.status in _KILLED):
+                remove_leftovers([result.item.output])
             report.results.append(result)
             if on_result is not None:
                 on_result(result)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 
 from viewer.commands._batch.display import Display, summary_lines
@@ -79,10 +80,10 @@ def run(arguments: argparse.Namespace) -> int:
     request, job = request_of(arguments)
     plan = plan_of(request)
     print_warnings(plan.notes)
-    prints = JOBS[arguments.job].prints
-    with Display(arguments.job, plan.items, prints) as display:
+    prints, is_json = JOBS[arguments.job].prints, getattr(arguments, "json", False)
+    with Display(arguments.job, plan.items, prints, is_json) as display:
         report = run_batch(plan.items, job, plan.settings, display.show)
-    stream = summary_stream(plan.settings.report or "")
+    stream = sys.stderr if is_json else summary_stream(plan.settings.report or "")
     print("\n".join(summary_lines(report)), file=stream)
     for line in save_results(arguments.job, request.table, request.overview, report.results):
         print(line, file=stream)

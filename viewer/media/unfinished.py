@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 import contextlib
-from collections import deque
+import os
+import re
+from collections import defaultdict, deque
+from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["note_unfinished", "remove_unfinished"]
+__all__ = [
+    "PREFIX",
+    "note_unfinished",
+    "remove_leftovers",
+    "remove_unfinished",
+]
+
+PREFIX = 40
+"""Characters of a file's name with which the name of its temporary file begins, after a dot."""
 
 # Maximum number of registered files in all threads; far fewer are written simultaneously.
 _MOST = 64
@@ -30,3 +41,30 @@ def remove_unfinished() -> None:
     for path in [*_unfinished]:
         with contextlib.suppress(OSError):
             path.unlink(missing_ok=True)
+
+
+# The random part of the names that the module tempfile makes.
+_LEFTOVER = re.compile(r"\.(.+)\.[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
+
+
+def remove_leftovers(targets: Iterable[str]) -> None:
+    """Remove temporary files next to some files, left by processes that were killed.
+
+    Parameters
+    ----------
+    targets : iterable of str
+        Files that no other process is writing.
+    """
+    folders = defaultdict[str, set[str]](set)
+    for target in targets:
+        folder, name = os.path.split(target)
+        path = Path(name)
+        # Libraries that write a file by its name need its suffix.
+        folders[folder] |= {f"{name[:PREFIX]}\n", f"{path.stem[:PREFIX]}\n{path.suffix}"}
+    for folder, names in folders.items():
+        with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
+            for entry in entries:
+                found = _LEFTOVER.fullmatch(entry.name)
+                if found and f"{found[1]}\n{found[2] or ''}" in names:
+                    with contextlib.suppress(OSError):
+                        os.unlink(entry.path)  # noqa: PTH108

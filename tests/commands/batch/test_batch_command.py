@@ -217,6 +217,8 @@ def test_python_refuses_limits_below_zero(rigs, wrong):
             "no.skin: no such",
         ),
         (["convert", "in", "-o", "{suffix}.obj"], "2 outputs would be written twice"),
+        (["convert", "in", "-o", "out", "--to", "bvh", "--report", "out"], "the output folder"),
+        (["convert", "in", "-o", "{suffix}.obj"], "a template with {parent}, {name} or {index}"),
         (["convert", "in/a", "-o", "{folder}/{name}"], "1 output is an input: in/a/one.skel"),
         (
             ["convert", "in", "-o", "out", "--to", "bvh", "--save-joint-map", "map.txt"],
@@ -249,6 +251,43 @@ def test_invalid_usage_is_refused_before_the_start(rigs, capsys, words, part):
     said = capsys.readouterr()
     assert said.err.count("\n") == 1 and part in said.err, said.err
     assert not said.out and not (rigs / "out").exists()
+
+
+def test_json_is_one_line_per_input(rigs, capsys):
+    assert run(["batch", "info", "in", "--json"]) == 1
+    said = capsys.readouterr()
+    lines = [json.loads(line) for line in said.out.splitlines()]
+    assert [line["name"] for line in lines] == ["a/one.skel", "b/bad.skel", "b/two.skel"]
+    assert [line["status"] for line in lines] == ["done", "failed", "done"]
+    assert lines[1]["content"] is None and "in/b/bad.skel:2: " in lines[1]["message"]
+    assert run(["info", "in/a/one.skel", "--json"]) == 0
+    assert lines[0]["content"] == json.loads(capsys.readouterr().out)
+    assert "3 items" in said.err
+
+
+def test_inputs_named_like_a_field_get_an_output_without_it(rigs):
+    (rigs / "in/a{frame}.skel").write_text(SKEL)
+    assert run(["batch", "convert", "in/a{frame}.skel", "--to", "bvh", "-o", "out"]) == 0
+    assert (rigs / "out/a(frame).bvh").is_file()
+
+
+def test_resumption_removes_temporary_files_of_killed_runs(rigs):
+    command = ["batch", "convert", "in/a", "in/b/two.skel", "--to", "bvh", "-o", "out"]
+    assert run(command) == 0
+    (rigs / "out/a/one.bvh").unlink()
+    # As after SIGKILL: an unfinished file of an output, and files of others.
+    left = rigs / "out/a/.one.bvh.a1_b2c3d"
+    others = [rigs / "out/a" / name for name in (".one.bvh", ".two.bvh.a1_b2c3d", "one.a1_b2c3d")]
+    for path in (left, *others):
+        path.write_text("x")
+    assert run([*command, "--resume"]) == 0
+    assert not left.exists() and all(path.exists() for path in others)
+    assert (rigs / "out/a/one.bvh").is_file()
+
+
+def test_report_is_short_in_an_interpreter(rigs):
+    report = viewer.batch("in", "convert", "out", to="bvh")
+    assert repr(report).startswith("<Report of 3 items: 2 done, 1 failed; ")
 
 
 def test_help_of_a_job_has_the_options_of_its_command(capsys):

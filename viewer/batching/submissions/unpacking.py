@@ -13,7 +13,7 @@ from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import Diagnostic
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats import Source
 from viewer.formats._archive.stored_file import StoredFile
@@ -31,6 +31,16 @@ MOST_FILES = 5_000
 _ENCRYPTED = 0x41  # bits 0 and 6 of the flags
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 _DAMAGE = (*DAMAGE, NotImplementedError)
+# Parts of the messages of zipfile and zlib, and what they mean.
+_REASONS = {
+    "not a zip file": "zip-end",
+    "eof": "zip-short",
+    "truncated": "zip-short",
+    "crc": "zip-checksum",
+    "magic number": "zip-header",
+    "differ": "zip-header",
+    "overlap": "zip-overlap",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,5 +161,9 @@ def _is_full(problem: Exception) -> bool:
     return isinstance(problem, OSError) and problem.errno in _FULL
 
 
-def _reason(problem: Exception) -> str:
-    return printable(getattr(problem, "strerror", None) or problem, 100)
+def _reason(problem: Exception) -> str | Phrase:
+    """Return what is wrong with an archive, without the terms of the library that reads it."""
+    if isinstance(problem, OSError) and problem.strerror:
+        return printable(problem.strerror, 100)
+    text = str(problem).lower()
+    return Phrase(next((key for part, key in _REASONS.items() if part in text), "zip-data"))

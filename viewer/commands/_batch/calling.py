@@ -90,7 +90,8 @@ def batch(
     retries : int
         Number of times an input is retried after its worker has failed.
     timeout : float, optional
-        Seconds per attempt, 600 by default; 0 for no limit. Applies to worker processes only.
+        Seconds per attempt; 0 for no limit. By default 600, without limit for ``"render"``.
+        Applies to worker processes only.
     memory : int, optional
         Bytes that a worker may use.
     report : str or path
@@ -188,7 +189,7 @@ def _command(job: str, request: Request, options: Sequence[str]) -> tuple[Job, R
         name: getattr(found, name)
         for name in (
             *("paths", "notes", "to", "identity", "shared", "few", "keeps_folders"),
-            *("table", "overview"),
+            *("table", "overview", "usual_timeout"),
         )
     }
     return command, replace(request, **added)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 import time
 from collections import deque
@@ -25,9 +26,13 @@ class Display:
     ``title``: name of the work.
     ``items``: the items of the batch.
     ``prints``: whether the text of items is printed, in their order.
+    ``is_json``: whether that text is JSON, which is printed in one line per item.
     """
 
-    def __init__(self, title: str, items: Sequence[Item], prints: bool) -> None:
+    def __init__(
+        self, title: str, items: Sequence[Item], prints: bool, is_json: bool = False
+    ) -> None:
+        self._is_json = is_json
         self._title, self.total = title, len(items)
         self._progress = Progress(title, self.total)
         self._start = self._said = time.monotonic()
@@ -57,7 +62,11 @@ class Display:
     def _print(self, result: Result) -> None:
         text = result.text.rstrip("\n")
         name = printable(result.item.name, 300)
-        self._texts[result.item.index] = f"{name}:\n{text}" if text and self.total > 1 else text
+        if self._is_json:
+            text = _json_line(result)
+        elif text and self.total > 1:
+            text = f"{name}:\n{text}"
+        self._texts[result.item.index] = text
         while self._order and self._order[0] in self._texts:
             if found := self._texts.pop(self._order.popleft()):
                 print(found)
@@ -67,6 +76,17 @@ class Display:
 
     def __exit__(self, *_: object) -> None:
         self._progress.__exit__()
+
+
+def _json_line(result: Result) -> str:
+    """Return the JSON that an item printed, with its name and status, as one line."""
+    found = {"name": result.item.name, "files": [*result.item.files], "status": result.status}
+    try:
+        content = json.loads(result.text)
+    except ValueError:  # it failed before it printed
+        content = None
+    parts = {**found, "message": result.message, "content": content}
+    return json.dumps(parts, allow_nan=False)
 
 
 def duration(seconds: float) -> str:

@@ -13,7 +13,7 @@ from viewer.batching.execution import attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.naming import filled
 from viewer.batching.worker import worker_rank
-from viewer.commands._batch.options import add_batch_arguments
+from viewer.commands._batch.options import TIMEOUT, add_batch_arguments
 from viewer.commands._batch.results import add_result_arguments
 from viewer.commands._usage import Parser
 from viewer.data_classes import dataclass
@@ -35,6 +35,7 @@ class JobKind:
     ``prints``: whether its text is the result and is therefore printed.
     ``few``: maximum number of items for which no worker process is started.
     ``is_folder_input``: whether each folder is an input.
+    ``timeout``: default time limit in seconds; None if the time depends on the requested frames.
     """
 
     title: str
@@ -43,11 +44,14 @@ class JobKind:
     prints: bool = False
     few: int = 16
     is_folder_input: bool = False
+    timeout: float | None = TIMEOUT
 
 
 JOBS = {
     "convert": JobKind("convert many files", writes="always"),
-    "render": JobKind("render an image or video of each of many files", "png", "always", few=4),
+    "render": JobKind(
+        "render an image or video of each of many files", "png", "always", few=4, timeout=None
+    ),
     "lint": JobKind("check many files", prints=True),
     "diff": JobKind(
         "compare many files or folders with one reference",
@@ -70,7 +74,7 @@ def job_parser(job: str) -> Parser:
     add_job_arguments(parser, job)
     kind = JOBS[job]
     known = {action.dest for action in parser._actions}
-    add_batch_arguments(parser, kind.suffix, kind.writes, "common" in known)
+    add_batch_arguments(parser, kind.suffix, kind.writes, "common" in known, kind.timeout)
     add_result_arguments(parser, job)
     if "force" not in known:
         parser.add_argument("--force", action="store_true", help="replace an existing report")

@@ -17,6 +17,7 @@ def add_batch_arguments(
     suffix: str = "",
     writes: str = "always",
     has_fixed: bool = False,
+    timeout: float | None = TIMEOUT,
 ) -> None:
     """Add the options.
 
@@ -24,6 +25,7 @@ def add_batch_arguments(
     ``suffix``: default of ``--to``.
     ``writes``: whether the job writes files: ``always``, ``maybe`` or ``never``.
     ``has_fixed``: whether the job itself has an option for files shared by all items.
+    ``timeout``: default of ``--timeout``.
     """
     group = parser.add_argument_group("batch")
     if writes != "never":
@@ -51,7 +53,7 @@ def add_batch_arguments(
         metavar="FILE|-",
         help="file with one path per line, or - for standard input",
     )
-    _add_processes(group)
+    _add_processes(group, timeout)
     _add_progress(group)
 
 
@@ -77,7 +79,8 @@ def _add_progress(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def _add_processes(group: argparse._ArgumentGroup) -> None:
+def _add_processes(group: argparse._ArgumentGroup, timeout: float | None) -> None:
+    usual = "0" if timeout is None else f"{timeout:g}; 0 for render"
     group.add_argument(
         "--workers",
         type=_whole,
@@ -105,7 +108,7 @@ def _add_processes(group: argparse._ArgumentGroup) -> None:
         type=number,
         metavar="SECONDS",
         help="terminate workers that take longer for one input; 0: never (default: "
-        f"{TIMEOUT:g}; no limit with --workers 0)",
+        f"{usual}; no limit with --workers 0)",
     )
     group.add_argument(
         "--limit-memory",

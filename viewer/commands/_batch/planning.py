@@ -41,6 +41,7 @@ class Request:
     ``identity``: job, options and version, which are part of the items' keys.
     ``shared``: files that all items read.
     ``few``: maximum number of items for which no worker process is started.
+    ``usual_timeout``: the time limit if ``timeout`` is None.
     ``memory``: bytes that a worker may use; None for no limit.
     ``notes``: messages about the paths.
     ``joint_map``: template for the joint map of each item.
@@ -61,6 +62,7 @@ class Request:
     force: bool = False
     retries: int = RETRIES
     timeout: float | None = None
+    usual_timeout: float | None = TIMEOUT
     memory: int | None = None
     report: str = ""
     notes: Sequence[str] = ()
@@ -172,7 +174,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
 
     Few small inputs are run in this process, because starting workers takes about a second.
     """
-    timeout = TIMEOUT if request.timeout is None else request.timeout or None
+    timeout = request.usual_timeout if request.timeout is None else request.timeout or None
     if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
     for name, value in (("workers", request.workers), ("retries", request.retries)):

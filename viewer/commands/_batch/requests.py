@@ -62,6 +62,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         force=arguments.force,
         retries=arguments.retries,
         timeout=arguments.timeout,
+        usual_timeout=kind.timeout,
         memory=_memory(arguments),
         report=arguments.report or "",
         notes=notes,

@@ -53,7 +53,7 @@ MESSAGES = {
     "F001.submission-size": "expected at most {most} bytes of files, found {found}",
     "F001.submission-count": "expected at most {most:#file}, found {found}",
     "F002.submission-kind": _SUBMISSION + "a {suffix:text} file",
-    "F002.submission-zip": _SUBMISSION + "a damaged archive ({reason:text})",
+    "F002.submission-zip": _SUBMISSION + "a damaged archive ({reason})",
     "F002.submission-ratio": "expected a compression ratio of at most {most}, found {found} bytes "
     "in {size}",
     "F002.submission-encrypted": "{item:text}: expected an unencrypted file, found an encrypted "
@@ -75,6 +75,12 @@ MESSAGES = {
 }
 
 PHRASES = {
+    "zip-end": "its table of contents at the end is missing: incomplete, or no zip archive",
+    "zip-short": "its data ends too early",
+    "zip-checksum": "a file in it differs from its checksum",
+    "zip-header": "the headers of its files differ from its table of contents",
+    "zip-overlap": "files in it overlap",
+    "zip-data": "its compressed data is invalid",
     # Locations in text tables
     "row": "row {index}",
     "word": "word {index}",
