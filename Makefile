@@ -1,7 +1,7 @@
 # Two commands for a fresh machine with python3 and make:
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
-#   make quick  run those that neither draw nor start programs, in about a minute
+#   make quick  run those that neither draw, start programs nor compute for long: about a minute
 # Others: make lint, make bench, make golden [NAME...], make manual, make gallery,
 # make figure, make clean.
 
