@@ -1,13 +1,14 @@
 # Two commands for a fresh machine with python3 and make:
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
-#   make quick  run those that neither draw nor start programs, in about a minute
+#   make quick  run those that neither draw, start programs nor compute for long: about a minute
 # Others: make lint, make bench, make golden [NAME...], make manual, make gallery,
 # make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
-WORKERS ?= $(shell expr $$(getconf _NPROCESSORS_ONLN) + 1)
+CORES := $(shell getconf _NPROCESSORS_ONLN)
+WORKERS ?= $(shell expr $(CORES) + 1)
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
@@ -37,10 +38,11 @@ test: $(READY)
 suite: system compiled
 	@VIEWER_TEST_BUDGET=300 $(TESTING) -n $(WORKERS) --dist worksteal $(TESTS)
 
-# A test that draws all the same fails: it finds no OpenGL.
+# A test that draws all the same fails: it finds no OpenGL. None of these tests waits, so there is one
+# process per core.
 quick: $(READY)
 	@__EGL_VENDOR_LIBRARY_DIRS=/nonexistent DISPLAY= VIEWER_TEST_BUDGET=60 \
-		$(TESTING) -n $(WORKERS) --dist worksteal -m "not slow" $(TESTS)
+		$(TESTING) -n $(CORES) --dist worksteal -m "not slow" $(TESTS)
 
 lint: $(READY)
 	@$(BIN)/ruff check --fix viewer tests assets

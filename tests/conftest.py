@@ -35,6 +35,14 @@ def pytest_configure(config: pytest.Config) -> None:
         config.pluginmanager.register(RunTime())
 
 
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Ignore files whose tests all draw, if no test that draws is selected."""
+    if config.option.markexpr != "not slow" or not collection_path.is_relative_to(ROOT):
+        return None
+    path = collection_path.relative_to(ROOT).as_posix()
+    return f"{path}/".startswith(DRAWING) or path in DRAWING or None
+
+
 def pytest_collection_finish() -> None:
     # Tests, modules and libraries live until the end of the run, so the garbage collector need not
     # scan them repeatedly.

@@ -219,6 +219,7 @@ def test_any_file_name_is_accepted(files, name):
     assert viewer.load(other).warnings == ()
 
 
+@pytest.mark.slow
 def test_5_million_blank_lines_before_a_skeleton_are_accepted(tmp_path):
     path = tmp_path / "a.skel"
     path.write_bytes(b"\n" * 5_000_000 + b"balljoint a { }")

@@ -17,7 +17,7 @@ from .anatomy import Bend, Bulge, bend_of, samples
 from .joints import CENTRES, NAMES, PARENTS, PARTNERS, index
 from .pose import rotation, skin, world
 
-SAMPLES = 24  # number of random rotations per joint, in addition to those about single axes
+SAMPLES = 24  # number of random rotations per joint, in addition to rotations about single axes
 RIDGE = 0.05
 ROUNDS = 3  # iterations of correction and smoothing
 SMOOTHING = 3  # smoothing passes per iteration

@@ -8,13 +8,13 @@ LATTICE = np.random.default_rng(20).standard_normal((48, 48, 48))
 
 
 def rise(low: float, high: float, value: Floats) -> Floats:
-    """Rise smoothly from 0 at ``low`` to 1 at ``high``; ``low`` may be the larger."""
+    """Rise smoothly from 0 at ``low`` to 1 at ``high``; ``low`` may be greater than ``high``."""
     t = np.clip((value - low) / (high - low), 0, 1)
     return t * t * (3 - 2 * t)
 
 
 def noise(points: Floats, size: float) -> Floats:
-    """Return smooth random values (N,) of about unit spread, features ``size`` metres wide."""
+    """Return smooth random values (N,) of about unit spread, with features ``size`` metres wide."""
     return 1.6 * map_coordinates(LATTICE, (points / size).T, order=1, mode="grid-wrap")
 
 

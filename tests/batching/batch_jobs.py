@@ -58,7 +58,7 @@ def write_numbers(folder: Path, count: int) -> list[str]:
 
 
 def kill_while_writing(item: Item) -> None:
-    """End the process, as the system does if memory runs out, while the output is written."""
+    """Kill the process while it writes the output, as the system does if memory runs out."""
 
     def parts() -> Iterator[bytes]:
         yield b"1"

@@ -28,8 +28,9 @@ def test_fields_of_templates_are_replaced():
     names = ["out/a/0000-x.npz.png", "out/b/0001-x.v2.npz.png", "out/0002-take.1.png"]
     assert outputs("out/{parent}/{index:04}-{name}.png") == names
     assert outputs("{folder}/{stem}-{suffix}.bvh")[:2] == ["d/a/x-npz.bvh", "d/b/x.v2-npz.bvh"]
-    # Numbered images and meshes keep the field of the command.
+    # Numbered images and meshes, and files of people, keep the field of the command.
     assert outputs("o/{stem}_{frame:05}.obj")[0] == "o/x_{frame:05}.obj"
+    assert outputs("o/{stem}-{person}.glb")[0] == "o/x-{person}.glb"
 
 
 def test_items_are_named_by_their_path_below_the_common_folder():

@@ -29,6 +29,7 @@ from viewer.errors import ViewerError
 ROOT = Path(__file__).resolve().parents[2]
 
 
+@pytest.mark.slow
 def test_two_thousand_files_with_one_in_twenty_broken_are_processed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     broken = write_numbers(tmp_path / "in", 2000)

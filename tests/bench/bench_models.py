@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,8 @@ from measure import interleaved, report, run_process
 import viewer
 from viewer.formats import Source
 from viewer.formats._archive.opening import open_archive
+from viewer.rig.blendshapes import Correctives
+from viewer.rig.bodies.sparse_offsets import SparseOffsets
 
 GOAL = 1.5
 MEMORY_GOAL = 3.0
@@ -107,6 +110,41 @@ def _correctives(folder: Path) -> None:
     work = {"the array": lambda: read_all(path), "numpy alone": lambda: numpy_alone(path, [])}
     times = interleaved(work, 5)
     report(f"{offsets.nbytes / 1e6:.0f} MB of compressed correctives", times, (*work,), GOAL)
+    _poses(path, len(offsets))
+
+
+class _AnyWeights:
+    """A feature with a given number of weights, which are set by the benchmark."""
+
+    def __init__(self, count: int) -> None:
+        self.n_weights = count
+
+
+def _poses(path: Path, count: int) -> None:
+    """Time the first pose with these correctives, and a further one, without and with zeros."""
+    weights = np.random.default_rng(1).normal(size=count)
+
+    def opened(is_sparse: bool) -> Correctives:
+        array = open_archive(Source.open(path)).array("corrective_blendshapes")
+        if is_sparse:
+            array = SparseOffsets(array.shape, array.dtype, array.values, partial(array.blocks, 8))
+        return Correctives(array, _AnyWeights(count))
+
+    known = {name: opened(name == "without zeros") for name in ("without zeros", "with zeros")}
+    first = {
+        f"first pose {name}": partial(
+            lambda is_sparse: opened(is_sparse).displacement(weights), name == "without zeros"
+        )
+        for name in known
+    }
+    further = {
+        f"further pose {name}": partial(correctives.displacement, weights)
+        for name, correctives in known.items()
+    }
+    for correctives in known.values():
+        correctives.displacement(weights)
+    for work in (first, further):
+        report("correctives of MHR", interleaved(work, 5), (*work,), 1.0)
 
 
 def numpy_alone(path: Path, raw: list[Path]) -> int:

@@ -37,6 +37,7 @@ def completed(script: str, *words: str, cwd=None) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(BASH is None, reason="needs bash")
 def test_bash_completes_commands(script):
     assert set(completed(script, "")) == set(COMMANDS)

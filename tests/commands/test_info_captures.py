@@ -7,9 +7,8 @@ import json
 import numpy as np
 import pytest
 from app.tiny import write_rig
-from formats.capture_files import body, write_frames
+from formats.capture_files import body, standing, write_frames
 from formats.synthetic_smpl import model
-from test_convert_captures import standing
 
 from viewer.cli import run
 
@@ -76,7 +75,7 @@ def test_morphs_are_listed_with_their_vertex_counts(info, tmp_path):
     assert "  morph      smile: moves 2 vertices" in lines
     assert "  morph      frown: moves 1 vertex" in lines
     assert found["actors"][0]["morphs"] == [
-        {"name": "smile", "vertices": 2},
-        {"name": "frown", "vertices": 1},
+        {"name": "smile", "vertices": 2, "materials": 0},
+        {"name": "frown", "vertices": 1, "materials": 0},
     ]
     assert "morphs" not in info(skel, skin)[1]["actors"][0]

@@ -23,6 +23,7 @@ def convert(walk, out, *options):
     return run(["convert", str(walk), "--body", "-o", str(walk.parent / out), *map(str, options)])
 
 
+@pytest.mark.slow
 def test_saved_map_can_be_edited_and_used_again(walk, tmp_path, capsys):
     saved = tmp_path / "map.txt"
     assert convert(walk, "own.bvh", "--save-joint-map", saved) == 0

@@ -57,6 +57,7 @@ def test_list_shows_models_of_both_folders(tmp_path, capsys):
     assert models.resolve("mhr") == folder / "mhr" / "rig.npz"
 
 
+@pytest.mark.slow
 def test_add_downloads_with_pip_into_the_data_folder(tmp_path, monkeypatch, capsys):
     content, _ = files(ACTIONS)
     content |= {f"{INFO}METADATA": METADATA, f"{INFO}WHEEL": WHEEL, f"{INFO}RECORD": b""}

@@ -147,6 +147,7 @@ quarter = st.integers(-8, 8).map(lambda n: n * np.pi / 4)
 angle = quarter | st.floats(-7, 7)
 
 
+@pytest.mark.slow
 @given(
     st.sampled_from(ROTATION_ORDERS),
     st.lists(st.tuples(angle, angle, angle), min_size=1, max_size=8),

@@ -94,6 +94,7 @@ def test_fox_positions_match_skinning(tmp_path):
     ]
 
 
+@pytest.mark.slow
 def test_body_is_baked_in_shape_and_pose(tmp_path):
     actor = viewer.load(bundled_body()).actors[0]
     pose = actor.pose

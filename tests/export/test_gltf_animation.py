@@ -196,6 +196,7 @@ def test_animated_fox_matches_its_frames(tmp_path):
     assert_allclose(found, positions[figure.mesh.triangles], rtol=0, atol=2e-6 * size)
 
 
+@pytest.mark.slow
 def test_error_of_a_body_with_correctives_and_shape_is_reported(tmp_path):
     figure = viewer.load(bundled_body()).actors[0].figure
     animation = family_animation(figure, family_motion(24, frames=40))

@@ -100,6 +100,7 @@ class HalfWay:
         self.stream.write(data[len(data) // 2 :])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", ["open", "write", "flush", "rights", "rename"])
 @pytest.mark.parametrize("is_there", [False, True], ids=["new", "replaced"])
 @pytest.mark.parametrize("suffix", SUFFIXES)

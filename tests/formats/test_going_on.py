@@ -131,6 +131,7 @@ def test_errors_of_body_models_state_vertex_and_joint(tmp_path: Any) -> None:
     assert sums[5] == pytest.approx(0.5) and np.delete(sums, [4, 5]) == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(4))
 def test_readers_continue_only_after_recoverable_errors(seed: int) -> None:
     """Files refused by the strict reader have an error; files accepted by it have none."""

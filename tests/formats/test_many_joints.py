@@ -84,6 +84,7 @@ def read_it(name, text, takes_faults):
         return problem
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("takes_faults", [False, True], ids=["reading", "lint"])
 @pytest.mark.parametrize("name", FILES)
 def test_work_of_readers_is_linear_in_the_number_of_joints(name, takes_faults):

@@ -40,6 +40,7 @@ def test_feet_are_planted_by_default(walking):
     np.testing.assert_array_equal(named.actors[0].clip.rotations, planted.clip.rotations)
 
 
+@pytest.mark.slow
 def test_option_and_note_are_the_same_in_every_command(walking, capsys):
     out = str(walking.with_name("out.bvh"))
     for words, is_said in ((), True), (("--feet", "on"), True), (("--feet", "off"), False):

@@ -29,6 +29,7 @@ def test_chain_equals_the_direct_product(n_joints):
     assert_allclose(forward_kinematics(parents, local), expected, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_chain_of_1000_equals_the_direct_product():
     parents = np.arange(-1, 999, dtype=np.int32)
     local = random_locals(1000, 7)

@@ -38,7 +38,7 @@ FIELDS = {
 """Fields of templates."""
 
 _NUMBER = re.compile(r"0?[1-9]?[0-9]?d?")  # formats of ``{index}``
-_LEFT = ("frame",)  # fields that commands replace, for numbered images and meshes
+_LEFT = ("frame", "person")  # fields that commands replace, for numbered files
 _OWN_FIELD = re.compile(rf"\{{({'|'.join(_LEFT)})([^{{}}]*)\}}")
 _LONGEST = 300  # maximum length of a name in a message, characters
 

@@ -342,12 +342,13 @@ def _with_models(problem: FormatError, files: Sequence[str]) -> ViewerError:
     return FormatError(Diagnostic(key, problem.path, values=values))
 
 
-def print_warnings(warnings: Iterable[str | Diagnostic]) -> None:
+def print_warnings(warnings: Iterable[str | Diagnostic], plain: str = "warning") -> None:
     """Print one line per warning or note to the error stream, unless the run is recorded.
 
-    Plain strings are warnings, as are errors in a file that was opened nevertheless.
+    Plain strings have the severity ``plain``; errors in a file that was opened nevertheless are
+    warnings.
     """
     for warning in warnings:
-        if not note_found(warning):
-            is_note = isinstance(warning, Diagnostic) and warning.severity == "note"
-            print(f"{'note' if is_note else 'warning'}: {warning}", file=sys.stderr)
+        if not note_found(warning, plain):
+            severity = warning.severity if isinstance(warning, Diagnostic) else plain
+            print(f"{'note' if severity == 'note' else 'warning'}: {warning}", file=sys.stderr)

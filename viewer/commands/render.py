@@ -202,12 +202,13 @@ def draw_scene(
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.quality_limits import limit_passes, time_note
 
+    def report_time(seconds: float, count: int) -> None:
+        print_warnings(time_note(seconds, count), "note")
+
     with deferred(), Offscreen(graphics=thread_graphics(device)) as offscreen:
         notes = [] if is_chosen else limit_passes(options, scene, size, offscreen.context)
-        print_warnings(notes)
-        pixels = offscreen.render(
-            scene, size, camera, options, box, lambda *times: print_warnings(time_note(*times))
-        )
+        print_warnings(notes, "note")
+        pixels = offscreen.render(scene, size, camera, options, box, report_time)
         print_warnings(offscreen.renderer.notes)
         if options.joint_names:
             left_out, n_seen = offscreen.renderer.names_left_out

@@ -57,15 +57,18 @@ def is_recorded() -> bool:
     return _current is not None
 
 
-def note_found(found: Diagnostic | str) -> bool:
-    """Record a warning or note; return whether a run is being recorded."""
+def note_found(found: Diagnostic | str, severity: str = "warning") -> bool:
+    """Record a warning or note; return whether a run is being recorded.
+
+    ``severity`` applies to plain texts.
+    """
     if _current is None:
         return False
     if isinstance(found, Diagnostic):
         _current.diagnostics.append(described(found))
     else:
         text = printable(found, 2000)
-        _current.diagnostics.append({"severity": "warning", "message": text})
+        _current.diagnostics.append({"severity": severity, "message": text})
     return True
 
 

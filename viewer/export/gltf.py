@@ -30,6 +30,7 @@ from viewer.export._gltf.sampled import (
     add_sampled,
     common_name,
     motion_remarks,
+    others_left,
     placed_actor,
     sampled_losses,
     sampled_of,
@@ -260,6 +261,7 @@ def export_animations(
         own += sampled_losses(written_part(path, file, made), sampled, options)
         own += resampling_losses(path, sampled.animation, how)
         own += not_held(sampled.animation.figure, sampled.body.shape)
+        own += others_left(part)
         notes += [_of_figure(part.actor, note) for note in own]
     for actor, each in zip(others, added, strict=True):
         notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]

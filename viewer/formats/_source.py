@@ -27,7 +27,6 @@ _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
 # Files with these first bytes are binary and may end with any byte.
 _ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
-_CARRIAGE_RETURNS = re.compile(rb"\r+\n?")
 _MAGIC = (
     (b"\x1f\x8b", "gzip data"),
     (b"\x7fELF", "a program (ELF)"),
@@ -175,10 +174,18 @@ class Source:
         line += self.data.count(b"\n", start, offset)
         lone = self.data.count(b"\r", start, offset) - self.data.count(b"\r\n", start, offset)
         if lone:
-            runs = (run.group() for run in _CARRIAGE_RETURNS.finditer(self.data, start, offset))
-            line += sum(len(run) for run in runs if not run.endswith(b"\n"))
+            line += self._lone_returns(start, offset)
         self._counted = offset, line
         return line
+
+    def _lone_returns(self, start: int, end: int) -> int:
+        """Return the number of carriage returns in runs that no line feed follows."""
+        letters = np.frombuffer(self.data, dtype=np.uint8, count=end - start, offset=start)
+        is_return = np.concatenate([[False], letters == ord("\r"), [False]])
+        begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
+        # A run at the end of the part is followed by anything but a line feed.
+        after = np.append(letters, 0)[ends]
+        return int((ends - begins)[after != ord("\n")].sum())
 
     @property
     def end(self) -> int:

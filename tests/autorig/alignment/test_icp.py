@@ -36,6 +36,7 @@ def test_iterate_followed_by_slide_finds_the_alignment_exactly():
     assert_allclose(found.shift, [0.02, -0.03, 0.05], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_iterate_converges_monotonically_without_slide():
     template, target = sides()
     errors = [
@@ -54,6 +55,7 @@ def test_fixed_scale_is_kept():
     assert_allclose(found.rotation, ROTATION, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_holes_do_not_attract_points():
     positions, triangles = tube()
     heights = positions[triangles][:, :, 1].mean(axis=1)

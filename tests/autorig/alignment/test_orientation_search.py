@@ -85,6 +85,7 @@ def test_mesh_is_not_rotated_for_a_marginally_better_fit():
     assert (found.similarity.rotation == np.diag([-1.0, 1.0, -1.0])).all()
 
 
+@pytest.mark.slow
 def test_search_finds_a_rotated_scaled_and_moved_mesh():
     positions, triangles = tube()
     rotation = turn([0.2, 1, 0.1], 2.2)

@@ -138,6 +138,7 @@ def test_paths_outside_the_archive_are_refused(tmp_path, name) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["bob.zip"]
 
 
+@pytest.mark.slow
 def test_bombs_are_refused_before_anything_is_unpacked(tmp_path, monkeypatch) -> None:
     path = zipped(tmp_path / "bob.zip", {"a.skel": bytes(80 << 20), "a.skin": "x"})
     size = path.stat().st_size

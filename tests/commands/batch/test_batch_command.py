@@ -265,7 +265,7 @@ def test_json_is_one_line_per_input(rigs, capsys):
     assert "3 items" in said.err
 
 
-def test_inputs_named_like_a_field_get_an_output_without_it(rigs):
+def test_braces_in_names_of_inputs_are_replaced_by_parentheses(rigs):
     (rigs / "in/a{frame}.skel").write_text(SKEL)
     assert run(["batch", "convert", "in/a{frame}.skel", "--to", "bvh", "-o", "out"]) == 0
     assert (rigs / "out/a(frame).bvh").is_file()
@@ -275,7 +275,7 @@ def test_resumption_removes_temporary_files_of_killed_runs(rigs):
     command = ["batch", "convert", "in/a", "in/b/two.skel", "--to", "bvh", "-o", "out"]
     assert run(command) == 0
     (rigs / "out/a/one.bvh").unlink()
-    # As after SIGKILL: an unfinished file of an output, and files of others.
+    # After SIGKILL, there are an unfinished file of an output, and files of other programs.
     left = rigs / "out/a/.one.bvh.a1_b2c3d"
     others = [rigs / "out/a" / name for name in (".one.bvh", ".two.bvh.a1_b2c3d", "one.a1_b2c3d")]
     for path in (left, *others):

@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from formats.capture_files import body, points, write_frames
+from formats.capture_files import body, points, standing, write_frames
 from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -16,13 +16,6 @@ from viewer.cli import run
 
 def convert(*arguments):
     return run(["convert", *map(str, arguments)])
-
-
-def standing(person, x):
-    """Return keypoints of a person upright along z, of whom only hips and nose are detected."""
-    rows = np.zeros((25, 4))
-    rows[8], rows[0] = (x, 0, 1, 1.0), (x, 0, 1.6, 0.5)
-    return {"id": person, "keypoints3d": rows.tolist()}
 
 
 @pytest.fixture

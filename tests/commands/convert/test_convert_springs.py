@@ -20,6 +20,7 @@ def places(actor, time):
     return matrices[[names.index(name) for name in HAIR], :3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bakes", [False, True])
 def test_springs_are_written_only_on_request(tmp_path, capsys, bakes):
     path, out = tmp_path / "ada.vrm", tmp_path / "out.glb"

@@ -131,7 +131,7 @@ def test_pairing_by_different_names_is_reported(tmp_path, capsys):
     (tmp_path / "other" / "a.skel").rename(tmp_path / "other" / "b.skel")
     (tmp_path / "other" / "a.skin").rename(tmp_path / "other" / "b.skin")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
-    assert not any("held against" in line for line in lines)  # the only figure is compared
+    assert not any("compared with" in line for line in lines)  # the only figure is compared
     (tmp_path / "other" / "c.skel").write_text(SKEL % "3")
     _, lines, _ = said(capsys, reference, other, "--poses", "0")
     assert lines[1:4] == [

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from export.stretched import POSITIONS, chain
 from formats.gltf.spec_evaluator import Evaluator
+from two_parts import two_parts
 
 import viewer
 from viewer.errors import RigError
@@ -152,3 +153,13 @@ def test_unknown_handling_of_gaps_is_refused(tmp_path):
     with pytest.raises(RigError):
         write(crowd(), tmp_path / "a.glb", gaps="none")
     assert not [*tmp_path.iterdir()]
+
+
+def test_animations_that_are_not_played_are_reported(tmp_path: Path) -> None:
+    figure = two_parts()
+    played = Actor(figure, clip=figure.animations[1].clip(), animation=1)
+    scene = Scene([crowd().actors[0], played])
+    notes = write(scene, tmp_path / "both.glb")
+    (lost,) = [each for each in notes if "not played" in str(each)]
+    assert lost.values["figure"] == "bender"
+    assert lost.values["remark"].values["names"] == ["wave"]

@@ -17,6 +17,7 @@ from viewer.formats import Source, bvh
 from viewer.rig.motion.evaluation import frames_of, world_frames
 
 
+@pytest.mark.slow
 def test_many_static_joints_in_many_frames_are_refused_before_allocating() -> None:
     joints = "JOINT a { OFFSET 0 1 0 } " * 20000
     text = (
@@ -69,6 +70,7 @@ def test_truncated_file_is_read_or_refused_in_one_line() -> None:
         check(GOOD[:cut].encode())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("token", [b"3.4e38", b"-3.4e38", b"1e-300", b"0", b"-1", b"{", b"}", b"x"])
 def test_file_with_an_inserted_word_is_read_or_refused_in_one_line(token: bytes) -> None:
     words = re.split(rb"(\s+)", GOOD.encode())

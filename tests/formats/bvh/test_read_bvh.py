@@ -74,6 +74,7 @@ def test_rotation_channels_multiply_from_left_to_right(order: str) -> None:
     np.testing.assert_allclose(worlds(motion)[0, 0, :3, :3], expected, atol=1e-14)
 
 
+@pytest.mark.slow
 @given(st.permutations(["Xposition", "Zposition", "Yposition", "Zrotation", "Xrotation"]))
 def test_channels_may_be_in_any_order(channels: list[str]) -> None:
     values = {"Xposition": 1.0, "Yposition": 2.0, "Zposition": 3.0, "Zrotation": 50, "Xrotation": 7}

@@ -301,6 +301,7 @@ def test_two_dimensional_points_are_refused(tmp_path):
     assert found == ("F002.record", 1, {"item": "person 0", "problem": problem})
 
 
+@pytest.mark.slow
 def test_mutated_records_are_read_or_refused_in_one_line(tmp_path):
     record = body(0, 78) | points(0, 17) | {"expression": [[0.5] * 10]}
     good = json.dumps([record, body(-1, 78)])

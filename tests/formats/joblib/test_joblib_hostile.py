@@ -115,6 +115,7 @@ def test_decompressed_data_above_the_size_limit_are_refused(data: bytes) -> None
     assert cost(look) < 3 * BOUND  # the xz decoder needs 8 MiB
 
 
+@pytest.mark.slow
 def test_decompression_bombs_are_refused() -> None:
     data = zlib.compress(bomb(70 << 20), 9)
     assert refusal(data)[0] == "F002.packed-size"

@@ -373,6 +373,7 @@ def test_exported_files_record_the_up_axis() -> None:
     assert (figure.up, figure.unit) == ("z", "m")
 
 
+@pytest.mark.slow
 def test_randomly_damaged_file_is_refused_in_one_line_or_read() -> None:
     good = (
         SQUARE

@@ -19,6 +19,7 @@ from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
 from viewer.rig.hands import Hand
 from viewer.rig.material import Material, Texture
+from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
@@ -44,6 +45,9 @@ def glazed() -> Material:
         alpha_mode="mask",
         alpha_cutoff=0.75,
         double_sided=False,
+        shade_color=(0.5, 0.25, 0.0),
+        rim=Rim((0.5, 2.0, 0.0), 2.0, 0.25, 0.5, texture=rough, matcap=replace(bumps, uv_set=0)),
+        outline=Outline(0.01, "screen", (0.5, 0.0, 0.0), 0.25, rough),
         is_physical=True,
     )
 
@@ -100,7 +104,7 @@ def same(found, wanted):
         one, other = getattr(found, part.name), getattr(wanted, part.name)
         if isinstance(other, np.ndarray):
             assert_array_equal(one, other, err_msg=part.name)
-        elif isinstance(other, Texture):
+        elif isinstance(other, Texture | Rim | Outline):
             same(one, other)
         else:
             assert one == other, part.name

@@ -243,12 +243,14 @@ def test_truncated_file_is_refused_or_loads_with_a_warning(cut):
 # Large files
 
 
+@pytest.mark.slow
 def test_100_000_nested_joints_are_read():
     skeleton = silent("balljoint a{" * 100_000 + "}" * 100_000)
     assert skeleton.n_joints == 100_000
     assert skeleton.parents[[0, 1, -1]].tolist() == [-1, 0, 99_998]
 
 
+@pytest.mark.slow
 def test_100_000_unclosed_joints_are_refused_at_the_innermost():
     values = {"found": None, "joint": Phrase("joint", name="a"), "line": 100_000}
     assert refusal("balljoint a{\n" * 100_000) == ("F002.joint-open", 100_000, values)
@@ -259,6 +261,7 @@ def test_20_000_siblings_are_read():
     assert skeleton.parents.tolist() == [-1] + [0] * 20_000
 
 
+@pytest.mark.slow
 def test_unknown_block_nested_a_million_deep_is_skipped():
     _, warnings = read("balljoint a { foo " + "{" * 1_000_000 + "}" * 1_000_000 + " }")
     assert warnings == [("F006.unknown", 1, {"found": b"foo"})]
@@ -269,6 +272,7 @@ def test_20_000_different_unknown_words_are_skipped():
     assert len(read(f"balljoint a {{ {words} }}")[1]) == 101
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["\n", "\r", "\r\n", "\r\r\n", " "])
 def test_5_million_blank_lines_are_counted(end):
     text = end * 5_000_000 + "balljoint a { offset up }"
@@ -281,6 +285,7 @@ def test_name_of_5_mb_is_read():
     assert silent(f"balljoint {'x' * 5_000_000} {{}}").names == ("x" * 5_000_000,)
 
 
+@pytest.mark.slow
 def test_refusal_needs_little_memory():
     text = b"balljoint a {\n" + b"offset 0 0 0\n" * 20_000 + b"pose up"
     tracemalloc.start()

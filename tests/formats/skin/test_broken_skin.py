@@ -235,6 +235,7 @@ def test_absurd_number_of_influences_is_refused_without_allocating():
     assert peak < 200_000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("end", ["\n", "\r", "\r\n", " "])
 def test_5_million_blank_lines_are_counted(end):
     line = 1 if end == " " else 5_000_001
@@ -245,12 +246,14 @@ def test_5_million_blank_lines_are_counted(end):
     assert refusal_of(lambda: read(rows)) == ("F002.number", line, number(0, b"up"))
 
 
+@pytest.mark.slow
 def test_word_of_5_mb_is_refused():
     text = f"positions 1 {{ 0 0 {'9' * 5_000_000}x }}"
     word = b"9" * 5_000_000 + b"x"
     assert refusal_of(lambda: read(text)) == ("F002.number", 1, number(0, word))
 
 
+@pytest.mark.slow
 def test_20_000_materials_are_read():
     figure, warnings = read(BARE + "material a { texture gone.png }" * 20_000 + TRIANGLES)
     assert len(figure.mesh.materials) == 20_000
@@ -258,6 +261,7 @@ def test_20_000_materials_are_read():
     assert len(warnings) == 3
 
 
+@pytest.mark.slow
 def test_20_000_sections_of_triangles_are_read():
     assert read(BARE + "triangles 1 {2 1 0}" * 20_000)[0].mesh.n_triangles == 20_001
 

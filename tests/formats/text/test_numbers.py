@@ -49,6 +49,7 @@ def parsed(text):
     return values.tolist(), bad
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(NUMBERS, SPACES), max_size=40))
 @settings(max_examples=400)
 @example([("-0", " "), ("-0.0", " "), ("+0", " "), ("-.0", " "), ("-0.", "\n"), ("0e0", " ")])
@@ -129,6 +130,7 @@ def test_single_invalid_number_is_refused(word):
     assert to_number(word.encode()) is None
 
 
+@pytest.mark.slow
 @given(st.lists(st.text("0123456789.+-eEf_x \n\x00\u0663", max_size=20), max_size=10))
 @settings(max_examples=400)
 def test_parsing_of_blocks_and_single_words_agrees(parts):
@@ -174,6 +176,7 @@ def test_largest_float32_is_the_limit():
     assert parsed("340282346638528900000000000000000000000") == ([], 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "word", [b"9" * 5_000_000 + b"x", b"0." + b"0" * 5_000_000 + b"e", b"." * 5_000_000]
 )

@@ -191,6 +191,7 @@ def test_nested_streams_are_refused() -> None:
         assert problem_of(finished(mapping(v=bytes_of(stream)))) == "pickle-arguments"
 
 
+@pytest.mark.slow
 def test_repeated_loading_of_the_same_bytes_is_refused() -> None:
     stream = legacy_file(KEPT, {"0": (12, ROWS.tobytes())})
     once = named("torch.storage", "_load_from_bytes") + b"(h\1tR0"

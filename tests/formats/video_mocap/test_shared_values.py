@@ -44,6 +44,7 @@ def refused(data: bytes) -> str:
     return caught.value.diagnostic.key
 
 
+@pytest.mark.slow
 def test_people_with_shared_frames_are_refused() -> None:
     one = {
         "pose_world": np.zeros((1000, 72), np.float32),
@@ -61,6 +62,7 @@ def test_nested_dicts_without_poses_are_refused() -> None:
     assert refused(shared({"a": 1}, 400, outer=400)) == "F002.unknown-archive"
 
 
+@pytest.mark.slow
 def test_pictures_with_the_same_people_are_refused() -> None:
     nobody = {key: 1 for key in person() if key != "pred_cam_t"}
     assert refused(shared(nobody, 2000, outer=2000)) == "F002.unknown-archive"

@@ -9,6 +9,7 @@ from viewer.rig.comparison import compare
 from viewer.rig.comparison.contents import content_notes
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material
+from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 
@@ -43,6 +44,16 @@ def test_changed_materials_and_unmatched_names_are_noted() -> None:
     assert content_notes(first, first) == []
     # Missing materials or parts in a format are not a difference.
     assert content_notes(first, figure(parts=())) == []
+
+
+def test_rim_lights_and_outlines_are_compared_by_value() -> None:
+    one, same, other = (
+        Material("a", rim=Rim((0.5, 0.0, 0.0)), outline=Outline(width), is_physical=True)
+        for width in (0.01, 0.01, 0.02)
+    )
+    assert content_notes(figure(one), figure(same)) == []
+    (note,) = content_notes(figure(one), figure(other))
+    assert note.message == 'material "a" differs: outline'
 
 
 def test_offsets_of_blend_shapes_are_compared() -> None:

@@ -68,6 +68,7 @@ def check(points, positions, triangles):
     assert found.barycentric.min() >= 0.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.01, 0.1, 1.0])
 def test_closest_agrees_with_brute_force(size):
     rng = np.random.default_rng(1)

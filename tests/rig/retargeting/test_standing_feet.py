@@ -139,3 +139,21 @@ def test_noise_of_standing_feet_does_not_affect_the_knees() -> None:
         for each in (clip, smooth)
     ]
     assert peaks[0] < 2.0 * peaks[1]
+
+
+def test_feet_follow_a_sudden_jump_of_the_recording_instead_of_bending_the_knees() -> None:
+    rotations, path = walk()
+    jumped = path.copy()
+    jumped[30] += [1.5, -1.0, 0.0]  # cm, for one frame; the left foot stands
+    rate = 4.0 * RATE
+    clips = [
+        plant_feet(retargeted(written(t_pose(), rotations, way, rate=rate), OTHER), OTHER)[0]
+        for way in (path, jumped)
+    ]
+    calm, wild = (places(OTHER, clip) for clip in clips)
+    moved = wild["LeftToeBase_"] - calm["LeftToeBase_"]
+    assert moved[30, 0] > 0.75
+    # The knee bends less than if the foot remained in place, and the sole remains near the ground:
+    # 0.1 % of 174.
+    assert np.abs(moved[30, 1]) < 0.174
+    assert np.abs(np.delete(moved, range(25, 36), axis=0)).max() < 0.1

@@ -32,7 +32,7 @@ def add_vrm_arguments(parser: argparse.ArgumentParser, upgrades: bool = False) -
     if upgrades:
         group.add_argument(
             "--vrm-version",
-            choices=("1.0",),
+            choices=("1.0", "1"),
             help="write characters from VRM 0.x files as VRM 1.0 (default: the file's version)",
         )
 

@@ -133,7 +133,7 @@ def _halves(quads: NDArray[np.integer]) -> Ints:
 
 
 def _closed(quads: _Faces, ring: int, inside: int, direction: int) -> _Faces:
-    """Return the quads except those at 16 vertices, and quads that close the ring around them."""
+    """Return the quads without those at 16 vertices, and quads that close the resulting ring."""
     lost = ((quads[:, 0] >= inside) & (quads[:, 0] < inside + _RING)).any(axis=1)
     uv_of = dict(zip(quads[lost, 0].ravel().tolist(), quads[lost, 1].ravel().tolist(), strict=True))
     corners = ring + np.array(_CAP)[:, ::direction]

@@ -154,7 +154,7 @@ def _numbered(folder: Path) -> dict[int, Path]:
 def _from_first(files: dict[int, Path], frames: range) -> dict[int, Path]:
     """Return images with the numbers of a capture's frames.
 
-    Programs that save the frames of a video often count from 1, captures from 0.
+    Programs that save the frames of a video often count from 1, whereas captures count from 0.
     """
     is_shifted = files and min(files) == frames.start + 1 == 1 and max(files) == frames.stop
     return {number - 1: path for number, path in files.items()} if is_shifted else files

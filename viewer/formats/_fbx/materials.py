@@ -65,23 +65,34 @@ def _material(source: Source, told: dict[str, Any], texture: Any) -> Material:
         source.warn("F007.fbx-opacity", material=told["name"], texture=cut.name)
         cut = None
     has_alpha = cut is not None and base is not None and _has_alpha(base.image)
+    # In FBX, a texture replaces the value of its property; in a material, it multiplies the value.
+    metallic, roughness = (
+        texture(told["metalness"]["texture"]),
+        texture(told["roughness"]["texture"]),
+    )
+    glow = texture(told["emission_color"]["texture"])
+    emission = [1.0] * 3 if _is_drawn(glow) else told["emission_color"]["value"] or [0.0] * 3
     strength = number("emission_factor", 1.0)
-    emission = [max(strength * part, 0.0) for part in told["emission_color"]["value"] or [0.0] * 3]
+    red_glow, green_glow, blue_glow = (max(strength * part, 0.0) for part in emission[:3])
     return Material(
         told["name"],
         base_texture=base,
         base_color=(red, green, blue, opacity),
-        metallic=min(max(number("metalness", 0.0), 0.0), 1.0),
-        roughness=min(max(number("roughness", 0.6), 0.0), 1.0),
-        metallic_texture=texture(told["metalness"]["texture"]),
-        roughness_texture=texture(told["roughness"]["texture"]),
+        metallic=1.0 if _is_drawn(metallic) else min(max(number("metalness", 0.0), 0.0), 1.0),
+        roughness=1.0 if _is_drawn(roughness) else min(max(number("roughness", 0.6), 0.0), 1.0),
+        metallic_texture=metallic,
+        roughness_texture=roughness,
         normal_texture=texture(told["normal_map"]["texture"]),
         occlusion_texture=texture(told["ambient_occlusion"]["texture"]),
-        emissive=(emission[0], emission[1], emission[2]),
-        emissive_texture=texture(told["emission_color"]["texture"]),
+        emissive=(red_glow, green_glow, blue_glow),
+        emissive_texture=glow,
         alpha_mode="blend" if opacity < 1.0 or has_alpha else "opaque",
         is_physical=told["is_physical"],
     )
+
+
+def _is_drawn(texture: Texture | None) -> bool:
+    return texture is not None and texture.image is not None
 
 
 def _has_alpha(image: Bytes | None) -> bool:

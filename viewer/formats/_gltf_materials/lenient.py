@@ -45,7 +45,7 @@ def bounded_rows(
 
 
 def chosen(element: Element, name: str, choices: tuple[str, ...], default: str) -> str:
-    """Return a member that is one of several strings; others become the default with a warning."""
+    """Return a member that is one of several strings; warn about others and use the default."""
     word = lenient(element.source, lambda: element.text(name, default), default)
     if word in choices:
         return word

@@ -5,11 +5,14 @@
     material_names (M,)   material_textures (M,)   image_0 (H, W, 4) …            base colours
     material_records (M,): JSON, other fields of each material that differ from the default
     picture_0 (H, W, 4) …                          images of the other textures, without duplicates
+
+The rim light and the outline of a toon material are objects in its record, with their textures.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import fields, replace
 from typing import Any
 
@@ -20,12 +23,16 @@ from viewer.errors import RigError
 from viewer.formats._archive.values import Archive
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import TEXTURES, Material, Texture
+from viewer.rig.materials.toon import Outline, Rim
 from viewer.rig.mesh import Mesh
 
 __all__ = ["material_arrays", "read_materials", "texts"]
 
 _PLAIN_MATERIAL, _PLAIN_TEXTURE = Material(), Texture("")
-_NUMBERS = tuple(field.name for field in fields(Material) if field.name not in ("name", *TEXTURES))
+_LOOKS: dict[str, Callable[..., Any]] = {"rim": Rim, "outline": Outline}
+_NUMBERS = tuple(
+    field.name for field in fields(Material) if field.name not in ("name", *TEXTURES, *_LOOKS)
+)
 _PLACING = ("channel", "uv_set", "transform", "wrap", "is_smooth", "minification")
 _RECORDS = "material_records"
 
@@ -56,19 +63,37 @@ def _record(material: Material, pictures: dict[int, tuple[int, Bytes]]) -> dict[
         if getattr(material, name) != getattr(_PLAIN_MATERIAL, name):
             record[name] = getattr(material, name)
     for name, texture in material.textures.items():
-        placing: dict[str, Any] = {}
-        for part in _PLACING:
-            value = np.asarray(getattr(texture, part)).tolist()
-            if value != np.asarray(getattr(_PLAIN_TEXTURE, part)).tolist():
-                placing[part] = value
-        if name != "base_texture":
-            placing["name"] = texture.name
-            if texture.image is not None:
-                number = pictures.setdefault(id(texture.image), (len(pictures), texture.image))[0]
-                placing["picture"] = number
+        placing = _placing(texture, None if name == "base_texture" else pictures)
         if placing:
             record[name] = placing
+    for name in _LOOKS:
+        look = getattr(material, name)
+        if look is not None:
+            values = {field.name: getattr(look, field.name) for field in fields(look)}
+            record[name] = {
+                key: _placing(value, pictures) if isinstance(value, Texture) else value
+                for key, value in values.items()
+                if value is not None
+            }
     return record
+
+
+def _placing(texture: Texture, pictures: dict[int, tuple[int, Bytes]] | None) -> dict[str, Any]:
+    """Return the fields of a texture that differ from their defaults, as plain data.
+
+    ``pictures``: extended by its image; None if name and image are stored elsewhere.
+    """
+    placing: dict[str, Any] = {}
+    for part in _PLACING:
+        value = np.asarray(getattr(texture, part)).tolist()
+        if value != np.asarray(getattr(_PLAIN_TEXTURE, part)).tolist():
+            placing[part] = value
+    if pictures is not None:
+        placing["name"] = texture.name
+        if texture.image is not None:
+            number = pictures.setdefault(id(texture.image), (len(pictures), texture.image))[0]
+            placing["picture"] = number
+    return placing
 
 
 def read_materials(archive: Archive) -> tuple[Material, ...]:
@@ -117,20 +142,37 @@ def _completed(
         for name in TEXTURES:
             if name not in record:
                 continue
-            placing = {part: _tuples(value) for part, value in record.pop(name).items()}
-            number = placing.pop("picture", None)
-            if number is not None:
-                key = f"picture_{int(number)}"
-                if key not in pictures:
-                    pictures[key] = _picture(archive, key)
-                placing["image"] = pictures[key]
             base = material.base_texture if name == "base_texture" else None
-            found[name] = replace(base or Texture(""), **placing)
+            found[name] = _placed(archive, base or Texture(""), record.pop(name), pictures)
+        for name, kind in _LOOKS.items():
+            if name in record:
+                found[name] = kind(
+                    **{
+                        key: _placed(archive, Texture(""), value, pictures)
+                        if isinstance(value, dict)
+                        else _tuples(value)
+                        for key, value in record.pop(name).items()
+                    }
+                )
         return replace(material, **found, **record)
     except (ValueError, TypeError, AttributeError, RecursionError, RigError) as problem:
         raise archive.fault(
             "F002.rig-material", item=_RECORDS, index=index, problem=str(problem)[:200]
         ) from None
+
+
+def _placed(
+    archive: Archive, texture: Texture, record: Any, pictures: dict[str, Bytes | None]
+) -> Texture:
+    """Return a texture with the fields of its record."""
+    placing = {part: _tuples(value) for part, value in record.items()}
+    number = placing.pop("picture", None)
+    if number is not None:
+        key = f"picture_{int(number)}"
+        if key not in pictures:
+            pictures[key] = _picture(archive, key)
+        placing["image"] = pictures[key]
+    return replace(texture, **placing)
 
 
 def _tuples(value: Any) -> Any:

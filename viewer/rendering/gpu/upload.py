@@ -36,10 +36,10 @@ __all__ = [
 _Item = TypeVar("_Item", moderngl.Buffer, moderngl.Texture)
 
 # Fixed texture widths, on which the shaders rely: every OpenGL 3.3 driver allows at least 1024.
-_MATRICES_PER_ROW = 256  # of three texels each
+_MATRICES_PER_ROW = 256  # a matrix has three texels
 _PAIRS_PER_ROW = 1024
 _OFFSETS_PER_ROW = 4096
-_RIGID_PER_ROW = 128  # of five texels each
+_RIGID_PER_ROW = 128  # a joint has five texels
 _SRGB8_ALPHA8, _RGBA8 = 0x8C43, 0x8058
 
 

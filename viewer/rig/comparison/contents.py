@@ -10,6 +10,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.rig.figure import Figure
 from viewer.rig.material import Material, Texture
+from viewer.rig.materials.toon import Outline, Rim
 
 __all__ = ["content_notes"]
 
@@ -86,7 +87,7 @@ def _named(materials: Sequence[Material]) -> dict[str, Material]:
 
 def _different(one: Material, other: Material) -> list[str]:
     """Return the names of the properties in which two materials differ."""
-    names = [field.name for field in fields(Material) if field.name != "name"]
+    names = [each.name for each in fields(Material) if each.name != "name"]
     return [
         _WORDS.get(name, name.replace("_", " "))
         for name in names
@@ -97,6 +98,8 @@ def _different(one: Material, other: Material) -> list[str]:
 def _equal(one: object, other: object) -> bool:
     if isinstance(one, Texture) and isinstance(other, Texture):
         return _same_texture(one, other)
+    if isinstance(one, Rim | Outline) and type(one) is type(other):
+        return all(_equal(getattr(one, f.name), getattr(other, f.name)) for f in fields(one))
     if isinstance(one, float | tuple) and isinstance(other, float | tuple):
         first, second = np.asarray(one, dtype=float), np.asarray(other, dtype=float)
         return first.shape == second.shape and np.allclose(first, second, atol=_ROUNDING)

@@ -13,6 +13,9 @@ from viewer.rig.retargeting.foot_plan import FootPlan
 __all__ = ["foot_shifts"]
 
 _EASE = 0.15  # seconds over which a correction falls to 40 % outside contacts
+_JUMP = 0.03  # seconds below which a jump of the recording is sudden
+_JUMPS = (0.002, 0.004)  # its sizes, relative to the body, between which it becomes a jump
+_GAP = 0.0007  # maximum distance of a standing foot from the ground in a jump, relative to the body
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 _LIFTS, _LIFTED = 4, 20.0  # number of passes that lift sinking feet, and their weight
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
@@ -103,6 +106,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
         targets[foot] = np.where(wanted.is_flat[:, None], wanted.flat - flat, 0.0)
         targets[count + foot, :, 0] = np.where(wanted.holds > 0.0, wanted.rise - usual, 0.0)
         weights[[foot, count + foot]] = wanted.holds
+    targets = _calmed(plan, targets, weights)
     found = _smoothed(plan, targets, _strength(weights))
     result = []
     for foot, wanted in enumerate(every):
@@ -124,17 +128,32 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
     return result
 
 
+def _calmed(plan: FootPlan, targets: Floats, holds: Floats) -> Floats:
+    """Return the targets of held rows without sudden jumps of the source, which the feet then keep.
+
+    Where the whole body of a recording jumps for a frame, a foot that stays in place makes the knee
+    jump instead.
+    """
+    smooth = _smoothed(plan, targets, holds + 1e-6, _JUMP)
+    away = np.linalg.norm(targets - smooth, axis=2, keepdims=True) / plan.size
+    jumps = 1.0 - falling((away - _JUMPS[0]) / (_JUMPS[1] - _JUMPS[0]))
+    left = jumps * (smooth - targets) * (holds > 0.0)[..., None]
+    half = len(targets) // 2
+    left[half:] = np.clip(left[half:], -_GAP * plan.size, _GAP * plan.size)
+    return targets + left
+
+
 def _strength(holds: Floats) -> Floats:
     """Return the weights of rows: from 1 for free rows to the weight of an exactly held foot."""
     return 1.0 + holds * 10.0 ** (_EXACT * holds - 3.0)
 
 
-def _smoothed(plan: FootPlan, targets: Floats, weights: Floats) -> Floats:
+def _smoothed(plan: FootPlan, targets: Floats, weights: Floats, seconds: float = _EASE) -> Floats:
     """Return smooth corrections, (S, N, C); gaps in time separate them."""
     result = np.empty_like(targets)
     for start, stop in plan.spans:
         part = slice(start, stop)
-        result[:, part] = smooth_curves(targets[:, part], weights[:, part], _EASE * plan.rate)
+        result[:, part] = smooth_curves(targets[:, part], weights[:, part], seconds * plan.rate)
     return result
 
 

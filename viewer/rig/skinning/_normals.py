@@ -16,7 +16,8 @@ def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:
     The columns a, b, c of A define the cofactor matrix [b x c, c x a, a x b] = det(A) A^-T, which
     stays finite if A is singular. Its sign is changed to the sign of the inverse transpose, so that
     outward normals stay outward under a reflected joint (likewise, glTF 2.0, section 3.7.4,
-    reverses the winding, not the normals). Shapes: (3, 3, N) and (N, 3) to (N, 3), any length.
+    reverses the winding, not the normals). Matrices (3, 3, N) and normals (N, 3) result in normals
+    (N, 3) of any length.
     """
     largest = np.abs(matrices).max(axis=(0, 1))
     # Only directions matter, and products of entries near 1 do not overflow or underflow.
