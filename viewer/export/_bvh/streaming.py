@@ -114,7 +114,7 @@ class _Stream:
         ends = ends_of(self.first, figure, space, 0)
         self.writer = Writer(self.first, figure, body, ends, space, options)
         self._names = self.writer.names[-self.first.figure.require_skeleton().n_joints :]
-        self._read: SkeletonMotion | None = None  # the written joints
+        self._read: SkeletonMotion | None = None  # joints read back from the file
         self.losses = JointLosses(options.skinning, animation.n_frames)
 
     def _measure(self, n_first: int) -> None:
