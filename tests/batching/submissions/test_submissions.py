@@ -222,4 +222,4 @@ def test_end_of_an_archive_within_a_file_is_reported(tmp_path, monkeypatch) -> N
 
     path = zipped(tmp_path / "a.zip", {"a.skel": "balljoint"})
     monkeypatch.setattr(zipfile.ZipFile, "open", ends)
-    assert "its data ends too early" in refusal(path)
+    assert "its data ends too early" in refusal(path, alike=("*.skel",))
