@@ -52,13 +52,14 @@ class Parts:
         and shape are the same in all frames.
     n_frames : int
         Number of all frames, N.
-    moves_inner_joints : bool
-        Whether a joint with a parent is translated.
+    may_move_inner_joints : bool
+        Whether a joint with a parent may be translated in the file; several roots get a common
+        parent.
     """
 
     parts: Callable[[], Iterator[SampledAnimation]]
     n_frames: int
-    moves_inner_joints: bool
+    may_move_inner_joints: bool
 
 
 def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[Diagnostic]:
@@ -124,7 +125,7 @@ class _Stream:
             with np.errstate(invalid="ignore", over="ignore"):
                 self._channels(part)
             done += part.frames.n_frames
-            if not self._animation.moves_inner_joints:
+            if not self._animation.may_move_inner_joints:
                 return
 
     def _channels(self, part: SampledAnimation) -> tuple[Floats, Floats]:
