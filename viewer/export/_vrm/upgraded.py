@@ -18,6 +18,7 @@ from viewer.export._vrm.upgraded_springs import upgraded_springs, with_ends
 from viewer.export._vrm.upgraded_toon import upgraded_toon
 from viewer.formats._vrm.bones import modern_bone
 from viewer.formats._vrm.json_parts import listed, part
+from viewer.formats._vrm.numbers import rows_of
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 
@@ -100,8 +101,11 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
     gaze: dict[str, Any] = {"type": "bone" if is_bone else "expression"}
     offset = first.get("firstPersonBoneOffset")
     if isinstance(offset, dict):
-        x, y, z = (offset.get(axis, 0.0) for axis in "xyz")
-        gaze["offsetFromHeadBone"] = [x, y, 0.0 - z]
+        place = rows_of([offset.get(axis) or 0.0 for axis in "xyz"], (0.0, 0.0, 0.0))
+        if place is None:
+            lost.append("firstPerson.firstPersonBoneOffset")
+        else:
+            gaze["offsetFromHeadBone"] = (place * (1.0, 1.0, -1.0) + 0.0).tolist()
     for name in _RANGES:
         given = first.get(f"lookAt{name}")
         if not isinstance(given, dict):
