@@ -161,3 +161,48 @@ def test_captures_are_retargeted_to_the_end_in_the_background(drive, monkeypatch
     assert actor.clip.n_rows == 100 and actor.clip.timing.frame_rate == 12.0
     assert plants_feet(hand.state)
     assert len(threads) == 1 and threads[0] != threading.get_ident()
+
+
+def test_undo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    first = actor.clip, actor.drive
+    toggle_feet(hand.state)
+    hand.step(2)
+    undone = threading.Event()
+
+    def waits(*arguments):
+        undone.wait(60.0)
+        return driven_clip(*arguments)
+
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    monkeypatch.setattr(drive_changes, "driven_clip", waits)
+    toggle_feet(hand.state)
+    hand.key("z", "ctrl")
+    hand.step(2)
+    undone.set()
+    assert actor.clip is first[0] and hand.state.job is not None
+    hand.finish_job()
+    assert actor.clip is first[0] and actor.drive is first[1] and hand.state.history.can_redo
+    assert hand.says("the motion was changed meanwhile")
+
+
+@pytest.mark.parametrize("frames", (10, 10_000))
+def test_unexpected_errors_of_retargeting_are_shown(walker, monkeypatch, frames):
+    hand, actor = walker, walker.state.actor
+    monkeypatch.setattr(drive_changes, "_SHORT", frames)
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+
+    def fails(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    before = actor.clip, actor.drive
+    monkeypatch.setattr(driven_clip_module, "plant_feet", fails)
+    monkeypatch.setattr(driven_clip_module, "retargeted", fails)
+    if frames > 1000:
+        with pytest.raises(np.linalg.LinAlgError):
+            toggle_feet(hand.state)
+    else:
+        toggle_feet(hand.state)
+        hand.finish_job()
+        assert "Singular matrix" in hand.state.error
+    assert (actor.clip, actor.drive) == before and hand.state.job is None

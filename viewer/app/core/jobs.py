@@ -7,6 +7,7 @@ from collections.abc import Callable, Generator
 from typing import Protocol
 
 from viewer.errors import ViewerError
+from viewer.phrases import printable
 
 __all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
 
@@ -78,7 +79,11 @@ class ThreadJob:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
-        self._wake()
+        except BaseException as problem:  # a programming error: the traceback is printed
+            self.error = _unexpected(self.title, problem)
+            raise
+        finally:
+            self._wake()
 
     @property
     def is_done(self) -> bool:
@@ -99,6 +104,10 @@ class ThreadJob:
     def wait(self) -> None:
         """Wait until it has ended."""
         self._thread.join()
+
+
+def _unexpected(title: str, problem: BaseException) -> str:
+    return f"{title}: unexpected {type(problem).__name__}: {printable(problem, 300)}"
 
 
 class _EndedError(ViewerError):
@@ -146,6 +155,9 @@ class CountedJob:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
+        except BaseException as problem:  # a programming error: the traceback is printed
+            self.error = _unexpected(self.title, problem)
+            raise
 
     def _report(self, done: int, total: int, what: str) -> None:
         if self._is_cancelled:
