@@ -13,6 +13,8 @@ from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.two_people import BODY, figure_of
 from rig.retargeting.walking import RATE, walk
 
+from viewer.app.core.reasons import no_undo
+from viewer.app.core.undo_actions import undo
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.app.retargeting import drive_changes
@@ -100,6 +102,24 @@ def test_cancelled_retargeting_changes_nothing(walker, monkeypatch):
     hand.finish_job()
     hand.step(3)
     assert (actor.clip, actor.drive) == before and hand.state.job is None
+
+
+def test_undo_cancels_a_change_that_is_being_computed(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    toggle_feet(hand.state)
+    hand.step(2)
+    before = actor.clip, actor.drive
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    toggle_feet(hand.state)
+    assert no_undo(hand.state) == ""
+    undo(hand.state)
+    assert hand.says("Cancelled")
+    hand.finish_job()
+    hand.step(3)
+    assert (actor.clip, actor.drive) == before and hand.state.job is None
+    undo(hand.state)  # of the earlier change
+    assert plants_feet(hand.state) and hand.says("Undone")
+    assert not hand.says("Feet: as retargeted")
 
 
 def captured(count: int) -> Capture:

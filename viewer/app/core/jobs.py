@@ -126,6 +126,11 @@ class CountedJob:
         Gets a ``Report`` and returns messages about the result; may raise ViewerError.
     finish : callable, optional
         Applies the result of a successful job; called in the frame loop.
+
+    Attributes
+    ----------
+    is_change : bool
+        Whether the job has a result to apply, which changes the scene.
     """
 
     def __init__(
@@ -136,7 +141,7 @@ class CountedJob:
     ) -> None:
         self.title, self.error, self.can_cancel = title, "", True
         self.lines: list[str] = []
-        self._act, self._finish = act, finish
+        self._act, self._finish, self.is_change = act, finish, finish is not None
         self._progress = (0, 0)
         self._is_cancelled = False
         self._thread = threading.Thread(target=self._run)
