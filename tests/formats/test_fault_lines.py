@@ -9,9 +9,9 @@ import re
 import pytest
 from formats.bvh_text import GOOD as BVH
 from formats.capture_files import body, points
+from formats.easymocap.test_camera_files import EXTRINSIC, INTRINSIC, cameras
 from formats.pig_text import GOOD as PIG
 from formats.pig_text import write as write_pig
-from test_camera_files import EXTRINSIC, INTRINSIC, cameras
 from test_count_lines import ANIM, MORPH, PLY, RIG
 from test_mutations import SKEL, SKIN, mutate
 

@@ -1,4 +1,4 @@
-"""Exporter of glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
+"""Exporter for glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
 It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are in
 metres, y is up. Data is not converted: a node above the figure rotates it if z is up, and scales

@@ -42,7 +42,7 @@ def upgraded(
 ) -> tuple[Figure, VrmRecord, list[str]]:
     """Return a figure that faces +z and has an end joint for each spring chain, and its record.
 
-    ``record``: of a VRM 0.x file.
+    ``record``: record of a VRM 0.x file.
     ``bones``: joint of each human bone.
     Also returns the members without a counterpart in VRM 1.0.
     """
@@ -67,7 +67,7 @@ def upgraded(
 
 
 def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
-    """Return the human bones; Unity's settings of muscles have no counterpart."""
+    """Return the human bones; Unity's muscle settings have no counterpart."""
     bones: dict[str, Any] = {}
     for each in listed(data, "humanoid", "humanBones"):
         bone = part(each, "bone")
@@ -83,7 +83,7 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
 
 
 def _views(data: Any, record: VrmRecord) -> list[Any]:
-    """Return annotations of nodes, made from those of meshes."""
+    """Return annotations of nodes, converted from annotations of meshes."""
     found = []
     for each in listed(data, "firstPerson", "meshAnnotations"):
         view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
