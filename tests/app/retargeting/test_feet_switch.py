@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -14,6 +16,7 @@ from rig.retargeting.walking import RATE, walk
 from viewer.app.core.reasons import no_undo
 from viewer.app.core.undo_actions import undo
 from viewer.app.files.state import Files
+from viewer.app.files.stream import Stream
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.feet import plants_feet, toggle_feet
@@ -206,3 +209,26 @@ def test_unexpected_errors_of_retargeting_are_shown(walker, monkeypatch, frames)
         hand.finish_job()
         assert "Singular matrix" in hand.state.error
     assert (actor.clip, actor.drive) == before and hand.state.job is None
+
+
+@pytest.mark.parametrize("fails", (False, True))
+def test_captures_that_end_early_stop_being_read(monkeypatch, fails):
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+    whole = captured(100)
+
+    def parts():
+        first, *_ = whole.parts()
+        yield first
+        if fails:
+            raise KeyError("poses")
+
+    builder = Builder(replace(whole, parts=parts), read(Source.open(bundled_body())))
+    stream = Stream([builder], lambda: None)
+    for _ in range(500):
+        stream.take()
+        if stream.is_done:
+            break
+        stream.wait()
+        time.sleep(0.01)
+    assert stream.is_done and builder.n_read == 20
+    assert ("poses" in stream.error) == fails

@@ -9,7 +9,7 @@ from typing import Protocol
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 
-__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
+__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob", "unexpected"]
 
 Report = Callable[[int, int, str], None]
 """Called with the completed steps, their total and the next step's name; raises to cancel."""
@@ -80,7 +80,7 @@ class ThreadJob:
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
         except BaseException as problem:  # a programming error: the traceback is printed
-            self.error = _unexpected(self.title, problem)
+            self.error = unexpected(self.title, problem)
             raise
         finally:
             self._wake()
@@ -106,7 +106,8 @@ class ThreadJob:
         self._thread.join()
 
 
-def _unexpected(title: str, problem: BaseException) -> str:
+def unexpected(title: str, problem: BaseException) -> str:
+    """Return the message about an error that a thread does not expect."""
     return f"{title}: unexpected {type(problem).__name__}: {printable(problem, 300)}"
 
 
@@ -156,7 +157,7 @@ class CountedJob:
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
         except BaseException as problem:  # a programming error: the traceback is printed
-            self.error = _unexpected(self.title, problem)
+            self.error = unexpected(self.title, problem)
             raise
 
     def _report(self, done: int, total: int, what: str) -> None:
