@@ -89,6 +89,8 @@ MESSAGES = {
     "X003.absent-in-range": "{figure:text}: absent throughout the range, not exported",
     "X003.no-motion": "{figure:text}: no motion, not written",
     "X003.no-joints": "{figure:text}: no joints, not written",
+    "X003.json-numbers": "{n:#infinite or undefined number} of the original file {n:?is|are} "
+    "omitted, or 0 in lists: JSON cannot store {n:?it|them}",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
     "only the keypoints3d folder",

@@ -1,4 +1,4 @@
-"""Part-by-part export of long motions to ``.bvh``, in memory that does not depend on their length.
+"""Part-by-part export of long motions to ``.bvh``, with memory use independent of their length.
 
 The file and the notes are those of ``viewer.export.bvh.export_animation``.
 """

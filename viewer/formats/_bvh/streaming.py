@@ -1,4 +1,4 @@
-"""Part-by-part reading of long ``.bvh`` files, in memory that does not depend on their length.
+"""Part-by-part reading of long ``.bvh`` files, with memory use independent of their length.
 
 A file can be streamed if it is regular: the number of frames is declared, each frame has its own
 line, and there is nothing to report about the frames. Any other file must be read as a whole by
