@@ -166,26 +166,29 @@ def test_captures_are_retargeted_to_the_end_in_the_background(drive, monkeypatch
     assert len(threads) == 1 and threads[0] != threading.get_ident()
 
 
-def test_undo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
+def test_redo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
     hand, actor = walker, walker.state.actor
-    first = actor.clip, actor.drive
     toggle_feet(hand.state)
     hand.step(2)
-    undone = threading.Event()
+    second = actor.clip, actor.drive
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert actor.clip is not second[0]
+    redone = threading.Event()
 
     def waits(*arguments):
-        undone.wait(60.0)
+        redone.wait(60.0)
         return driven_clip(*arguments)
 
     monkeypatch.setattr(drive_changes, "_SHORT", 10)
     monkeypatch.setattr(drive_changes, "driven_clip", waits)
     toggle_feet(hand.state)
-    hand.key("z", "ctrl")
+    hand.key("z", "ctrl shift")
     hand.step(2)
-    undone.set()
-    assert actor.clip is first[0] and hand.state.job is not None
+    redone.set()
+    assert actor.clip is second[0] and hand.state.job is not None
     hand.finish_job()
-    assert actor.clip is first[0] and actor.drive is first[1] and hand.state.history.can_redo
+    assert actor.clip is second[0] and actor.drive is second[1] and hand.state.history.can_undo
     assert hand.says("the motion was changed meanwhile")
 
 

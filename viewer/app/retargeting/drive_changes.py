@@ -37,7 +37,7 @@ def change_drive(
     """Retarget the motion of the chosen actor, and those of all people of its capture.
 
     Long motions are retargeted in the background. If retargeting fails or is cancelled, or the
-    drive is changed meanwhile, as by undo, a message is shown and nothing changes.
+    drive is changed meanwhile, as by redo, a message is shown and nothing changes.
 
     Parameters
     ----------
