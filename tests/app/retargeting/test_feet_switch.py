@@ -14,7 +14,7 @@ from rig.retargeting.two_people import BODY, figure_of
 from rig.retargeting.walking import RATE, walk
 
 from viewer.app.core.reasons import no_undo
-from viewer.app.core.undo_actions import redo, undo
+from viewer.app.core.undo_actions import undo
 from viewer.app.files.state import Files
 from viewer.app.files.stream import Stream
 from viewer.app.retargeting import drive_changes
@@ -170,24 +170,25 @@ def test_redo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
     hand, actor = walker, walker.state.actor
     toggle_feet(hand.state)
     hand.step(2)
-    plain = actor.clip, actor.drive
-    undo(hand.state)
+    second = actor.clip, actor.drive
+    hand.key("z", "ctrl")
     hand.step(2)
-    is_redone = threading.Event()
+    assert actor.clip is not second[0]
+    redone = threading.Event()
 
     def waits(*arguments):
-        is_redone.wait(60.0)
+        redone.wait(60.0)
         return driven_clip(*arguments)
 
     monkeypatch.setattr(drive_changes, "_SHORT", 10)
     monkeypatch.setattr(drive_changes, "driven_clip", waits)
     toggle_feet(hand.state)
-    redo(hand.state)
+    hand.key("z", "ctrl shift")
     hand.step(2)
-    is_redone.set()
-    assert actor.clip is plain[0] and hand.state.job is not None
+    redone.set()
+    assert actor.clip is second[0] and hand.state.job is not None
     hand.finish_job()
-    assert actor.clip is plain[0] and actor.drive is plain[1] and hand.state.history.can_undo
+    assert actor.clip is second[0] and actor.drive is second[1] and hand.state.history.can_undo
     assert hand.says("the motion was changed meanwhile")
 
 
