@@ -10,6 +10,7 @@ import pytest
 from viewer.errors import OutputError
 from viewer.formats import check_folder_target, check_targets
 from viewer.media.saving import free_path
+from viewer.media.targets import replacing_since
 
 
 def refused(files, inputs=(), force=False, check=check_targets) -> str:
@@ -116,3 +117,25 @@ def test_existing_folder_requires_force(tmp_path, old):
 def test_free_path_avoids_dangling_links(tmp_path):
     (tmp_path / "fox.png").symlink_to("elsewhere.png")
     assert free_path(tmp_path, "fox", ".png") == tmp_path / "fox-2.png"
+
+
+def test_outputs_of_an_earlier_try_are_replaced_but_nothing_older(tmp_path) -> None:
+    new, old = tmp_path / "new.obj", tmp_path / "old.obj"
+    folder = tmp_path / "smpl"
+    folder.mkdir()
+    inner = folder / "inner.npz"
+    for path, seconds in ((new, 2000), (old, 1999), (inner, 2000), (folder, 2000)):
+        path.touch()
+        os.utime(path, (seconds, seconds))
+    with replacing_since(2000):
+        check_targets([new], (), force=False)
+        check_folder_target(folder, (), force=False)
+        with pytest.raises(OutputError, match=r"old\.obj: already exists"):
+            check_targets([new, old], (), force=False)
+        with pytest.raises(OutputError, match="input files are never overwritten"):
+            check_targets([new], [new], force=False)
+        os.utime(inner, (1999, 1999))
+        with pytest.raises(OutputError, match="smpl: already exists"):
+            check_folder_target(folder, (), force=False)
+    with pytest.raises(OutputError, match=r"new\.obj: already exists"):
+        check_targets([new], (), force=False)

@@ -4,17 +4,39 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 
 from viewer.errors import OutputError
 from viewer.phrases import printable
 from viewer.streams import is_stdout, require_stdout
 
-__all__ = ["check_folder_target", "check_targets"]
+__all__ = ["check_folder_target", "check_targets", "replacing_since"]
 
 _FORCE = "--force replaces it"
 _Identity = tuple[int, int] | Path  # device and inode of an existing file, otherwise its path
+_since: ContextVar[float] = ContextVar("since", default=float("inf"))
+
+
+@contextmanager
+def replacing_since(start: float) -> Iterator[None]:
+    """Let the block replace files without ``force`` if they were written after a time.
+
+    A run that is repeated, because its process died before it reported success, replaces its own
+    outputs, but nothing that existed before.
+
+    Parameters
+    ----------
+    start : float
+        Start of the first run, in seconds since 1970.
+    """
+    token = _since.set(start)
+    try:
+        yield
+    finally:
+        _since.reset(token)
 
 
 def check_targets(
@@ -76,7 +98,7 @@ def check_folder_target(folder: Path, inputs: Iterable[Path], force: bool) -> No
                 raise _refusal(folder.parent, "nothing is written into input folders")
             if opened in (place, place.parent) or place in opened.parents:
                 raise _refusal(folder, "input folders are never overwritten")
-        if os.path.lexists(folder) and not force:
+        if os.path.lexists(folder) and not (force or _is_new_folder(folder)):
             raise _refusal(folder, f"already exists ({_FORCE})")
         there = next(parent for parent in place.parents if os.path.lexists(parent))
         if not there.is_dir():
@@ -105,10 +127,16 @@ def _checked(
         return None
     if inputs.hold(target, status):
         raise _refusal(file, "input files are never overwritten")
-    if not force:
+    if not (force or status.st_mtime >= _since.get()):
         raise _refusal(file, f"already exists ({hint})")
     _check_folder(file, target.parent, folders)
     return status.st_dev, status.st_ino
+
+
+def _is_new_folder(folder: Path) -> bool:
+    """Return whether a folder and everything in it are newer than the time of the block."""
+    start = _since.get()
+    return all(path.lstat().st_mtime >= start for path in (folder, *folder.rglob("*")))
 
 
 def _check_folder(file: Path, folder: Path, known: set[Path]) -> None:

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import worker_rank
+from viewer.errors import OutputError
+from viewer.media.targets import check_targets
 
 
 @dataclass
@@ -31,6 +33,18 @@ class Job:
             raise ZeroDivisionError("in the job")
         time.sleep(self.seconds)
         return Result(item, "done", text=str(worker_rank()))
+
+
+class Careful(Job):
+    """Write an output of which there must not be one yet, as commands do without --force."""
+
+    def __call__(self, item: Item) -> Result:
+        """Run one item."""
+        try:
+            check_targets([Path(item.output)], (), force=False)
+        except OutputError as problem:
+            return Result(item, "failed", 5, message=str(problem))
+        return super().__call__(item)
 
 
 class Missing:

@@ -6,10 +6,13 @@ import os
 import signal
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
-from tests.batching.engines.cluster_jobs import Job, Missing, items
+import viewer
+from tests.batching.batch_jobs import add_numbers, write_numbers
+from tests.batching.engines.cluster_jobs import Careful, Job, Missing, items
 from viewer.batching.engines import Limits
 from viewer.errors import ViewerError
 from viewer.version import VERSION
@@ -36,6 +39,15 @@ def address(tmp_path_factory):
     scheduler = {"cls": Scheduler, "options": options}
     with SpecCluster(workers, scheduler, silence_logs=50) as cluster:
         yield cluster.scheduler_address
+
+
+def two_workers(address):
+    """Return an address when its cluster has two workers: an earlier test may have killed one."""
+    from distributed import Client
+
+    with Client(address) as client:
+        client.wait_for_workers(2, timeout=60)
+    return address
 
 
 def finished(job, some, limits, on_result=lambda result: None):
@@ -79,14 +91,63 @@ def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path) -> No
     assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
 
 
-def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
-    from distributed import Client
+@pytest.mark.parametrize("where", ["local", "address"])
+def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path) -> None:
+    cluster = "local" if where == "local" else two_workers(request.getfixturevalue("address"))
+    some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(600)]
+    Path(some[590].output).touch()
+    os.utime(some[590].output, (1e9, 1e9))  # not written by this batch
+    killed = []
 
+    def kill(result):
+        if not killed and result.item.index > 300:
+            killed.append(int(Path(result.item.output).read_text().split()[-1]))
+            os.kill(killed[0], signal.SIGKILL)
+            for name in leftovers:
+                (tmp_path / name).touch()
+
+    leftovers = [f".{index}.abcd0123" for index in range(600)]
+    found = finished(Careful(seconds=0.005), some, Limits(2, cluster=cluster), kill)
+    failed = {n: one.message for n, one in found.items() if one.status != "done"}
+    assert failed == {590: f"{some[590].output}: already exists (--force replaces it)"}
+    runs = {item.index: Path(item.output).read_text().split() for item in some}
+    assert killed and not runs.pop(590) and all(runs.values())
+    if where == "local":  # elsewhere, the scheduler repeats the task
+        assert any(not (tmp_path / name).exists() for name in leftovers)
+    # A task takes 0.3 s; a killed worker also loses results that were not yet fetched.
+    assert 0 < sum(len(pids) > 1 for pids in runs.values()) <= 2 * 0.3 / 0.005
+
+
+def test_items_at_fault_are_found_within_tasks(tmp_path) -> None:
+    some = items(400, crash=200, hang=300, **{"raise": 380})
+    some = [replace(item, output=str(tmp_path / str(item.index))) for item in some]
+    found = finished(Job(seconds=0.005), some, Limits(2, retries=1, timeout=1.0, cluster="local"))
+    faults = {n: (one.status, one.attempts) for n, one in found.items() if one.status != "done"}
+    assert faults == {200: ("crashed", 2), 300: ("timeout", 2), 380: ("failed", 1)}
+    assert {one.attempts for one in found.values() if one.status == "done"} == {1}
+    # Once in a task with others, and then alone.
+    assert len(Path(some[200].output).read_text().split()) == 3
+
+
+def test_two_thousand_files_of_which_some_are_broken(address, tmp_path) -> None:
+    broken = write_numbers(tmp_path / "in", 2000)
+    report = viewer.batch(
+        str(tmp_path / "in" / "*.txt"), add_numbers, tmp_path / "out", to="sum", cluster=address
+    )
+    names = [result.item.name for result in report.results]
+    assert len(names) == len(set(names)) == 2000
+    assert sorted(one.item.name for one in report.failures) == sorted(broken)
+    assert len(broken) == 100
+    for number in range(2000):
+        path = tmp_path / "out" / f"pose{number}.sum"
+        assert path.exists() == (f"pose{number}.txt" not in broken)
+        assert not path.exists() or path.read_text() == str(1 + number)
+
+
+def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
-    finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
+    finished(Job(uses_gpu=True), some, Limits(2, cluster=two_workers(address)))
     assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
-    with Client(address) as client:  # an earlier test may have killed a worker
-        client.wait_for_workers(2, timeout=60)
     finished(Job(seconds=0.05), some, Limits(2, cluster=address))
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
 

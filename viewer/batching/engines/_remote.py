@@ -1,4 +1,4 @@
-"""Execution of an item on a cluster's worker: version check, cached job, time and memory limits."""
+"""Execution of items on a cluster's worker: version check, cached job, time and memory limits."""
 
 from __future__ import annotations
 
@@ -15,14 +15,16 @@ from viewer.batching.engines._process_limits import limit_memory
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import name_worker
 from viewer.data_classes import dataclass
+from viewer.media.targets import replacing_since
 from viewer.version import VERSION
 
-__all__ = ["ENDED", "Call", "OtherVersion", "run_item"]
+__all__ = ["ENDED", "Call", "OtherVersion", "Reply", "run_items"]
 
 ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
 
 _SETTLE = 0.5  # seconds in which a worker that ends itself can send its last event
+_LONGEST = 0.3  # seconds after which a task starts no further item, for another worker may be idle
 _FAILED = 70  # exit code of a worker that ends itself
 
 # A worker runs one item at a time even if it has several threads: output is captured, and
@@ -37,16 +39,36 @@ class Call:
 
     Attributes
     ----------
-    job, item : bytes
-        Pickled.
+    job, items : bytes
+        Pickled; a tuple of items.
+    since : float
+        Start of the batch, in seconds since 1970. The scheduler repeats tasks whose worker died
+        without saying so, and existing outputs that are newer are then replaced.
     timeout, memory : float, int, optional
-        As in ``Limits``.
+        As in ``Limits``, for each item.
     """
 
     job: bytes
-    item: bytes
+    items: bytes
+    since: float
     timeout: float | None = None
     memory: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """The results of a task.
+
+    Attributes
+    ----------
+    results : list of Result
+        Results of the first items, at least one; the other items were not started.
+    seconds : float
+        Time that they took.
+    """
+
+    results: list[Result]
+    seconds: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,15 +79,15 @@ class OtherVersion:
     version: str
 
 
-def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVersion:
-    """Run one item in a thread of a worker.
+def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVersion:
+    """Run items one after another in a thread of a worker.
 
     Parameters
     ----------
     version : str
         Version of the program that runs the batch.
     key : str
-        Name of the attempt, for events.
+        Name of the task, for events.
     call : tuple
         Values of a ``Call``.
     """
@@ -75,13 +97,19 @@ def run_item(version: str, key: str, call: tuple[Any, ...]) -> Result | OtherVer
     if version != VERSION:
         return OtherVersion(worker.address, VERSION)
     asked = Call(*call)
-    with _lock:
-        item: Item = pickle.loads(asked.item)
+    results = []
+    with _lock, replacing_since(asked.since):
+        start = time.monotonic()
+        items: tuple[Item, ...] = pickle.loads(asked.items)
         name_worker(worker.name)
         if asked.memory is not None:
             limit_memory(asked.memory)
-        with _ended_after(asked.timeout, worker, key):
-            return _job(asked.job)(item)
+        for number, item in enumerate(items):
+            with _ended_after(asked.timeout, worker, key, number):
+                results.append(_job(asked.job)(item))
+            if time.monotonic() > start + _LONGEST:
+                break
+        return Reply(results, time.monotonic() - start)
 
 
 def _job(pickled: bytes) -> Job:
@@ -93,14 +121,14 @@ def _job(pickled: bytes) -> Job:
 
 
 @contextmanager
-def _ended_after(timeout: float | None, worker: Any, key: str) -> Iterator[None]:
+def _ended_after(timeout: float | None, worker: Any, key: str, number: int) -> Iterator[None]:
     """End this process if the block exceeds its time limit: a thread can't be interrupted."""
     if timeout is None:
         yield
         return
 
     def end() -> None:
-        worker.log_event(ENDED, {"key": key, "status": "timeout"})
+        worker.log_event(ENDED, {"key": key, "item": number, "status": "timeout"})
         time.sleep(_SETTLE)
         os._exit(_FAILED)
 

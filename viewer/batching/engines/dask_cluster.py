@@ -1,13 +1,15 @@
 """Items on the workers of a Dask cluster: on this machine, at an address, or in SLURM jobs.
 
-Only a few items are assigned to each worker at a time, so that millions need no queue. If a worker
-dies, its items are run again elsewhere; an item that repeatedly kills its worker is reported.
+Only a few tasks are assigned to each worker at a time, so that millions of items need no queue. If
+a worker dies, its items are run again elsewhere; an item that repeatedly kills its worker is
+reported.
 """
 
 from __future__ import annotations
 
 import itertools
 import time
+from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
 from dataclasses import astuple, replace
@@ -17,10 +19,12 @@ from uuid import uuid4
 
 from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import parse_cluster
-from viewer.batching.engines._remote import ENDED, Call, OtherVersion, run_item
+from viewer.batching.engines._remote import ENDED, Call, OtherVersion, run_items
+from viewer.batching.engines._task_size import TaskSize
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
+from viewer.media.unfinished import remove_leftovers
 from viewer.phrases import printable
 from viewer.version import VERSION
 
@@ -30,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
-_PER_WORKER = 3  # items assigned to each worker: one runs while the next ones are transferred
+_PER_WORKER = 3  # tasks assigned to each worker: one runs while the next ones are transferred
 _COUNT_EVERY = 1.0  # seconds between counts of the workers, which join and leave
 _ALONE = 60.0  # seconds without any worker before the batch fails
 _RETRIED = ("crashed", "timeout", "memory")
@@ -54,17 +58,14 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
     from viewer.batching.engines._clusters import connected
 
     with connected(parse_cluster(limits.cluster or "local"), limits) as client:
-        flight = _Flight(client, job, limits)
-        waiting, left = iter(items), True
+        flight = _Flight(client, iter(items), job, limits)
         try:
             while True:
                 flight.count_workers()
-                while left and not flight.stops() and flight.has_room():
-                    item = next(waiting, None)
-                    left = item is not None
-                    if item is not None:
-                        flight.start(_Attempt(item))
-                if not flight.flying and (not left or flight.stops()):
+                while flight.has_room() and not flight.stops() and flight.starts_next():
+                    pass
+                if not flight.flying:
+                    remove_leftovers(flight.unfinished)
                     return
                 yield from flight.finished()
         finally:
@@ -73,23 +74,38 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item, and the number of workers that died while running it."""
+    """An item.
+
+    ``earlier``: number of workers that died while running it.
+    ``is_alone``: whether it is a task of its own, which shows whether it ends its worker.
+    """
 
     item: Item
     earlier: int = 0
+    is_alone: bool = False
+
+
+_Task = tuple[_Attempt, ...]
 
 
 class _Flight:
-    """The attempts that have been submitted to a cluster."""
+    """The tasks that have been submitted to a cluster; each runs one item, or several short ones.
 
-    def __init__(self, client: Client, job: Job, limits: Limits) -> None:
+    If a worker dies, the items of the task that it was running are run again one by one, including
+    those that had finished, as their results are lost.
+    """
+
+    def __init__(self, client: Client, items: Iterator[Item], job: Job, limits: Limits) -> None:
         import cloudpickle
 
         self.client, self.limits = client, limits
-        self.flying: dict[Future, _Attempt] = {}
+        self.flying: dict[Future, _Task] = {}
+        self.unfinished: list[str] = []  # outputs that a dead worker may have been writing
+        self._items, self._again = items, deque[_Attempt]()
+        self._size = TaskSize()
         self._job = cloudpickle.dumps(job)  # unlike pickle, supports functions of notebooks
         self._done: SimpleQueue[Future] = SimpleQueue()
-        self._batch = f"viewer-{uuid4().hex[:8]}-"
+        self._batch, self._start = f"viewer-{uuid4().hex[:8]}-", time.time()
         self._numbers = itertools.count()
         self._n_workers, self._counted, self._seen = 0, -_COUNT_EVERY, time.monotonic()
         # SLURM starts jobs when resources are free, and local workers are replaced.
@@ -128,22 +144,29 @@ class _Flight:
         """Return whether the batch is stopping; items not yet sent to a worker are then dropped."""
         if not self._is_stopping and self.limits.is_stopping():
             self._is_stopping = True
+            self._again.clear()
             started = {key for keys in self.client.processing().values() for key in keys}
-            dropped = [future for future in self.flying if future.key not in started]
+            # Asked for second, so that a task that ends in the meantime is found here.
+            held = {key for key, workers in self.client.who_has([*self.flying]).items() if workers}
+            dropped = [one for one in self.flying if one.key not in started | held]
             for future in dropped:
                 del self.flying[future]
             self.client.cancel(dropped)
         return self._is_stopping
 
-    def start(self, attempt: _Attempt) -> None:
-        """Submit an item to the cluster."""
+    def starts_next(self) -> bool:
+        """Submit the next task; return whether there was one."""
+        task = self._next_task()
+        if not task:
+            return False
         import pickle
 
         number = next(self._numbers)
         key = f"{self._batch}{number}"
-        call = Call(self._job, pickle.dumps(attempt.item), self.limits.timeout, self.limits.memory)
+        items = pickle.dumps(tuple(attempt.item for attempt in task))
+        call = Call(self._job, items, self._start, self.limits.timeout, self.limits.memory)
         future = self.client.submit(
-            run_item,
+            run_items,
             VERSION,
             key,
             astuple(call),
@@ -152,11 +175,21 @@ class _Flight:
             priority=-number,
             resources=self._resources,
         )
-        self.flying[future] = attempt
+        self.flying[future] = task
         future.add_done_callback(self._done.put)
+        return True
+
+    def _next_task(self) -> _Task:
+        if self._again and self._again[0].is_alone:
+            return (self._again.popleft(),)
+        size, task = self._size.now(), list[_Attempt]()
+        while len(task) < size and self._again and not self._again[0].is_alone:
+            task.append(self._again.popleft())
+        task += map(_Attempt, itertools.islice(self._items, size - len(task)))
+        return tuple(task)
 
     def finished(self) -> Iterator[Result]:
-        """Wait for attempts to end; yield the results of those that are not started again."""
+        """Wait for tasks to end; yield the results of items that are not run again."""
         done = []
         try:
             done.append(self._done.get(timeout=_TICK))
@@ -164,67 +197,99 @@ class _Flight:
                 done.append(self._done.get_nowait())
         except Empty:
             pass
-        results = self._results([future for future in done if future in self.flying])
-        for future, result in results:
-            attempt = self.flying.pop(future)
-            if result is None:
-                self.start(attempt)  # another item ended the worker
-            elif self._is_retried(result, attempt):
-                self.start(_Attempt(attempt.item, attempt.earlier + result.attempts))
+        for attempt, result in self._results([future for future in done if future in self.flying]):
+            n_attempts = attempt.earlier + result.attempts
+            if self._is_retried(result, n_attempts):
+                self._again.append(_Attempt(attempt.item, n_attempts, is_alone=True))
             else:
-                yield replace(result, attempts=attempt.earlier + result.attempts)
+                yield replace(result, attempts=n_attempts)
 
-    def _is_retried(self, result: Result, attempt: _Attempt) -> bool:
-        is_left = attempt.earlier + result.attempts <= self.limits.retries
+    def _is_retried(self, result: Result, n_attempts: int) -> bool:
+        is_left = n_attempts <= self.limits.retries
         return result.status in _RETRIED and is_left and not self.stops()
 
-    def _results(self, done: list[Future]) -> list[tuple[Future, Result | None]]:
-        """Return the result of an attempt that ended; None if the item itself was not at fault."""
-        finished: list[Future] = []
-        ended: list[Future] = []
-        for future in done:
-            (finished if future.status == "finished" else ended).append(future)
+    def _results(self, done: list[Future]) -> list[tuple[_Attempt, Result]]:
+        """Return the results of tasks that ended; items without a result are run again."""
+        finished = [future for future in done if future.status == "finished"]
         try:
-            answers = self.client.gather(finished)
+            replies = self.client.gather(finished)
         except (OSError, CancelledError):
             raise _lost() from None
-        for answer in answers:
-            if isinstance(answer, OtherVersion):
-                raise _other_version(answer)
-        return [*zip(finished, answers, strict=True), *((one, self._failure(one)) for one in ended)]
+        except Exception:
+            # The scheduler ran a task again because its result was lost, and then it failed.
+            if all(future.status == "finished" for future in finished):
+                raise
+            return self._results(done)
+        results: list[tuple[_Attempt, Result]] = []
+        for future, reply in zip(finished, replies, strict=True):
+            if isinstance(reply, OtherVersion):
+                raise _other_version(reply)
+            task = self.flying.pop(future)
+            self._size.add(reply.seconds, len(reply.results))
+            results += zip(task, reply.results, strict=False)
+            self._again.extend(task[len(reply.results) :])
+        for future in done:
+            if future in self.flying:
+                results += self._failure(future, self.flying.pop(future))
+        return results
 
-    def _failure(self, future: Future) -> Result | None:
-        """Return the result of an item that no worker has finished."""
+    def _failure(self, future: Future, task: _Task) -> list[tuple[_Attempt, Result]]:
+        """Return the result of the item due to which no worker has finished a task, if known."""
         from distributed import KilledWorker
 
-        item = self.flying[future].item
         if future.status == "cancelled":
             raise _lost()
-        if future.status != "error":
-            return None  # the worker that held the result has died
-        problem = future.exception()
-        if isinstance(problem, KilledWorker):
-            return self._killed(item, future, problem)
+        problem = future.exception() if future.status == "error" else None
         if isinstance(problem, ModuleNotFoundError) and (problem.name or "").startswith("viewer"):
             raise ViewerError(
                 f"--cluster: a worker has no viewer {VERSION} ({printable(problem)}): "
                 "install the same version in the environment of all workers"
             )
+        self.unfinished += [attempt.item.output for attempt in task if attempt.item.output]
+        if problem is None:
+            self._again.extend(task)  # the worker that held the results has died
+            return []
+        self._size.restart()
+        if isinstance(problem, KilledWorker):
+            return self._killed(future, task, problem)
+        if self._is_split(task):
+            return []
         reason = printable(f"{type(problem).__name__}: {problem}", 2000)
-        return Result(item, "failed", 1, message=reason)
+        return [(task[0], Result(task[0].item, "failed", 1, message=reason))]
 
-    def _killed(self, item: Item, future: Future, problem: KilledWorker) -> Result | None:
+    def _is_split(self, task: _Task) -> bool:
+        """Have the items of a task run again one by one; return False if there is only one."""
+        if len(task) > 1:
+            self._again.extend(replace(attempt, is_alone=True) for attempt in task)
+        return len(task) > 1
+
+    def _killed(
+        self, future: Future, task: _Task, problem: KilledWorker
+    ) -> list[tuple[_Attempt, Result]]:
         address = problem.last_worker.address
-        attempts = problem.allowed_failures + 1
-        if future.key in {event["key"] for _, event in self.client.get_events(ENDED)}:
-            message = f"no result after {self.limits.timeout:g} s"
-            return Result(item, "timeout", 2, self.limits.timeout or 0.0, attempts, message)
+        count = problem.allowed_failures + 1
+        number = self._hung(future.key)
+        if number is not None:
+            attempt = task[number]
+            self._again.extend(task[:number] + task[number + 1 :])
+            limit = self.limits.timeout or 0.0
+            message = f"no result after {limit:g} s"
+            return [(attempt, Result(attempt.item, "timeout", 2, limit, count, message))]
         if future.key != self._first_on(address):
-            return None
-        return Result(item, "crashed", 2, attempts=attempts, message=f"the worker {address} died")
+            self._again.extend(task)  # another task ended the worker
+            return []
+        if self._is_split(task):
+            return []
+        item, message = task[0].item, f"the worker {address} died"
+        return [(task[0], Result(item, "crashed", 2, attempts=count, message=message))]
+
+    def _hung(self, key: str) -> int | None:
+        """Return the position of the item of a task that exceeded its time limit, if one did."""
+        events = [event for _, event in self.client.get_events(ENDED) if event["key"] == key]
+        return events[-1]["item"] if events else None
 
     def _first_on(self, address: str) -> str:
-        """Return the attempt that a worker was running when it died; it runs them in order."""
+        """Return the task that a worker was running when it died; it runs them in order."""
         keys = [
             key
             for _, event in self.client.get_events(address)
