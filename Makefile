@@ -1,7 +1,7 @@
 # Two commands for a fresh machine with python3 and make:
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
-#   make quick  run those that neither draw, start programs nor compute for long: about a minute
+#   make quick  run the tests that do not draw, start programs or compute for long: about a minute
 # Others: make lint, make bench, make golden [NAME...], make manual, make gallery,
 # make figure, make clean.
 
@@ -12,12 +12,12 @@ WORKERS ?= $(shell expr $(CORES) + 1)
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-# One process of tests per core and one more, as some tests wait (WORKERS=0 for a single process).
-# Each computes and draws with one thread: no test waits for the threads of another one. Compiled
-# files spare the next start much time.
+# One test process per core and one more, as some tests wait (WORKERS=0 for a single process). Each
+# computes and draws with one thread, so that no test waits for the threads of another one. Compiled
+# files make the next start much faster.
 TESTING := PYTHONDONTWRITEBYTECODE= LP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 
-# The words after golden are names of pictures, not targets.
+# Words after `golden` are names of pictures, not targets.
 ifeq ($(firstword $(MAKECMDGOALS)),golden)
 PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
 .PHONY: $(PICTURES)
@@ -26,20 +26,20 @@ endif
 
 .PHONY: run test suite quick lint style types compiled bench golden manual gallery figure system clean
 
-# A window may open even where pictures cannot be drawn without one: go on either way.
+# A window may open even if pictures cannot be drawn without one, so failures are ignored here.
 run: $(READY)
 	@sh .ci/system "$(BIN)/python" || true
 	@$(BIN)/viewer $(FILES)
 
-# Types are checked while the tests run: mypy uses one core only.
+# Types are checked while the tests run, as mypy uses only one core.
 test: $(READY)
 	@$(MAKE) --no-print-directory --jobs=4 style types suite
 
 suite: system compiled
 	@VIEWER_TEST_BUDGET=300 $(TESTING) -n $(WORKERS) --dist worksteal $(TESTS)
 
-# A test that draws all the same fails: it finds no OpenGL. None of these tests waits, so there is one
-# process per core.
+# A test that draws nevertheless fails, because it finds no OpenGL. None of these tests waits, so
+# there is one process per core.
 quick: $(READY)
 	@__EGL_VENDOR_LIBRARY_DIRS=/nonexistent DISPLAY= VIEWER_TEST_BUDGET=60 \
 		$(TESTING) -n $(CORES) --dist worksteal -m "not slow" $(TESTS)
@@ -56,8 +56,8 @@ style: $(READY)
 types: $(READY)
 	@$(BIN)/mypy
 
-# The tests compile every module: where one process has done so, each of the others needs 10 s less.
-# What fails here fails in the tests too, where it is reported.
+# The tests compile every module: if one process has done so before, each of the others needs 10 s
+# less. Failures here are ignored, as they recur and are reported in the tests.
 compiled: $(READY)
 	@$(TESTING) --collect-only --quiet $(TESTS) >/dev/null 2>&1 || true
 
@@ -67,27 +67,27 @@ bench: $(READY) system
 golden: $(READY) system
 	@VIEWER_UPDATE_GOLDEN="$(or $(PICTURES),all)" $(TESTING) -q tests/rendering tests/app
 
-# Writes the reference tables of the manual anew, from the registries.
+# Regenerates the reference tables of the manual from the registries.
 manual: $(READY)
 	@$(BIN)/python tests/manual/reference.py
 
-# Draws the pictures of README and manual anew, from bundled data.
+# Redraws the pictures of README and manual from bundled data.
 gallery: $(READY) system
 	@$(BIN)/python assets/make_gallery.py
 
-# Makes the bundled figures and the studio anew; they need scipy and scikit-image beside the rest.
+# Rebuilds the bundled figures and the studio, which also need scipy and scikit-image.
 figure: $(READY)
 	@$(BIN)/pip install --quiet scipy scikit-image xatlas
 	@$(BIN)/python assets/make_fox.py
 	@$(BIN)/python assets/make_body.py
 	@$(BIN)/python assets/make_studio.py
 
-# The environment, made anew when the dependencies change.
+# The environment, rebuilt when the dependencies change.
 $(READY): pyproject.toml
 	@sh .ci/environment "$(PYTHON)" "$(VENV)"
 	@touch $@
 
-# OpenGL in software and the tools of the window tests, where they are missing.
+# Installs software OpenGL and the tools of the window tests if they are missing.
 system: $(READY)
 	@sh .ci/system "$(BIN)/python"
 

@@ -1,4 +1,4 @@
-"""Collection of doctests from the modules that contain examples, which is one in fifteen."""
+"""Collection of doctests from the modules that contain examples, one in fifteen."""
 
 from __future__ import annotations
 

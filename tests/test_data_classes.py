@@ -194,3 +194,63 @@ def test_initializer_is_compiled_once():
     kind(2)
 
     assert kind.__init__ is compiled
+
+
+def signatures(decorator):
+    """Return the signatures of classes and instances that do not use the generated initializer."""
+
+    @decorator(frozen=True)
+    class Scaled:
+        factor: float
+
+        def __init__(self, percent):
+            object.__setattr__(self, "factor", percent / 100.0)
+
+    @decorator(frozen=True, slots=True)
+    class Weight:
+        value: float
+
+        def __call__(self, left, right):
+            return self.value * (left + right)
+
+    @decorator
+    class Base:
+        size: int
+
+    class Derived(Base):
+        def __init__(self, width, height):
+            super().__init__(width * height)
+
+    return [str(inspect.signature(each)) for each in (Scaled, Weight(1.0), Derived)]
+
+
+def test_signatures_of_own_initializers_and_callable_instances_are_kept():
+    expected = ["(percent)", "(left, right)", "(width, height)"]
+
+    assert signatures(data_classes.dataclass) == signatures(dataclasses.dataclass) == expected
+
+
+def test_wrapper_of_the_initializer_stays():
+    kind = classes(data_classes.dataclass).Counter
+    original, made = kind.__init__, []
+
+    def counted(self, *arguments):
+        made.append(arguments)
+        original(self, *arguments)
+
+    kind.__init__ = counted
+    assert [kind(1).count, kind(2).count] == [1, 2]
+    assert made == [(1,), (2,)]
+
+
+@pytest.mark.parametrize("decorator", [data_classes.dataclass, dataclasses.dataclass])
+def test_frozen_classes_with_their_own_equality_are_hashable(decorator):
+    @decorator(frozen=True, slots=True)
+    class Folded:
+        text: str
+
+        def __eq__(self, other):
+            return isinstance(other, Folded) and self.text.lower() == other.text.lower()
+
+    assert Folded("A") == Folded("a")
+    assert hash(Folded("A")) == hash(("A",))

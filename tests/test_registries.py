@@ -1,4 +1,4 @@
-"""Each registry is exactly its folder, and its entries can be loaded."""
+"""Each registry lists exactly the modules of its folder, and its entries can be loaded."""
 
 from importlib import import_module
 from inspect import signature
@@ -34,14 +34,14 @@ def modules(folder: str) -> set[str]:
     ],
     ids=["formats", "skinning", "commands", "export", "engines"],
 )
-def test_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
+def test_registry_matches_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert modules(folder) == set(registry)
 
 
 @pytest.mark.parametrize(
     ("folder", "registry"), [("skin", METHODS), ("shade", SHADING)], ids=["skin", "shade"]
 )
-def test_shader_registry_is_exactly_its_folder(folder: str, registry: dict[str, object]) -> None:
+def test_shader_registry_matches_its_folder(folder: str, registry: dict[str, object]) -> None:
     assert {path.stem for path in resource("shaders", folder).glob("*.glsl")} == set(registry)
 
 
@@ -59,7 +59,7 @@ def test_exporters_write_what_they_declare() -> None:
         assert hasattr(module, "export_animation") == kind.writes_motion
 
 
-def test_table_of_panels_is_exactly_the_panels_of_all_features() -> None:
+def test_panel_table_lists_the_panels_of_all_features() -> None:
     found = {(path.parent.name, path.stem) for path in (PACKAGE / "app").rglob("*_panel.py")}
     assert found == {(panel.feature, f"{name}_panel") for name, panel in PANELS.items()}
     assert all(path.parent.parent == PACKAGE / "app" for path in PACKAGE.rglob("*_panel.py"))

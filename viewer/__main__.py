@@ -4,8 +4,8 @@ import gc
 import os
 import sys
 
-# While idle, the threads of OpenBLAS wait actively for 2**26 clock cycles, already after numpy is
-# imported: 20 to 40 ms of processor time for each. They wake up fast enough after 2**20 cycles.
+# The threads of OpenBLAS busy-wait for 2**26 clock cycles before they sleep, even right after numpy
+# is imported: 20 to 40 ms of processor time for each. They wake up fast enough after 2**20 cycles.
 _SPIN = ("OPENBLAS_THREAD_TIMEOUT", "20")
 
 

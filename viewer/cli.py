@@ -26,8 +26,8 @@ Without a command, FILES open in a window; without files, the bundled figure doe
 "viewer COMMAND --help" lists a command's options, and "viewer help" lists the manual's pages.
 
 exit codes: 0 success, 1 lint findings or diff above the tolerance, 2 bad input, 4 no usable OpenGL,
-5 output could not be written, 129 hung up, 130 interrupted (Ctrl-C), 143 terminated; a signal that
-arrives after all output is written does not change the exit code
+5 output could not be written, 129 terminal closed, 130 interrupted (Ctrl-C), 143 terminated; a
+signal that arrives after all output is written does not change the exit code
 """
 
 _DOWNWARD = ("-y", "-z")  # values of --up and --front; they are not options

@@ -78,18 +78,27 @@ def _add_methods(cls: type, frozen: bool, eq: bool) -> None:
         methods |= _refusals(cls, frozenset(field.name for field in fields))
         if "__slots__" in cls.__dict__:
             methods |= {"__getstate__": _state, "__setstate__": _set_state}
+    own = {*cls.__dict__}
+    if "__eq__" in own and cls.__dict__.get("__hash__") is None:
+        own.discard("__hash__")  # Python adds None to classes that define ``__eq__``
     for name, method in methods.items():
-        if name not in cls.__dict__:
+        if name not in own:
             setattr(cls, name, method)
-    cls.__signature__ = _Signature(frozen)  # type: ignore[attr-defined]
+    if cls.__dict__["__init__"] is methods["__init__"]:
+        cls.__signature__ = _Signature(cls, frozen)  # type: ignore[attr-defined]
 
 
 def _init(cls: type, frozen: bool) -> Callable[..., None]:
     """Return an ``__init__`` that a compiled one replaces when it is first called."""
+    compiled: list[Callable[..., None]] = []
 
     def __init__(self: object, *args: object, **kwargs: object) -> None:  # noqa: N807
-        cls.__init__ = init = _compiled_init(cls, frozen)  # type: ignore[misc]
-        init(self, *args, **kwargs)
+        if not compiled:
+            compiled.append(_compiled_init(cls, frozen))
+        if cls.__dict__.get("__init__") is __init__:
+            # A function that wraps this one stays.
+            cls.__init__ = compiled[0]  # type: ignore[misc]
+        compiled[0](self, *args, **kwargs)
 
     return __init__
 
@@ -132,13 +141,17 @@ def _compiled_init(cls: type, frozen: bool) -> Callable[..., None]:
 class _Signature:
     """Parameters of a class for ``inspect.signature``: ``__init__`` may not be compiled yet."""
 
-    def __init__(self, frozen: bool) -> None:
-        self._frozen = frozen
+    def __init__(self, cls: type, frozen: bool) -> None:
+        self._cls, self._frozen = cls, frozen
 
-    def __get__(self, instance: object, owner: type) -> object:
+    def __get__(self, instance: object, owner: Any) -> object:
+        inits = [each.__dict__["__init__"] for each in owner.__mro__ if "__init__" in vars(each)]
+        if instance is not None or inits[0] is not self._cls.__dict__["__init__"]:
+            # The signature of an instance is that of ``__call__``; a subclass has its own.
+            raise AttributeError("__signature__")
         import inspect
 
-        found = inspect.signature(_compiled_init(owner, self._frozen))
+        found = inspect.signature(_compiled_init(self._cls, self._frozen))
         return found.replace(parameters=list(found.parameters.values())[1:])
 
 

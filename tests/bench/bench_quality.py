@@ -68,7 +68,7 @@ def main(rounds: int = 9) -> None:
             work = {name: partial(draw, DisplayOptions(quality=name)) for name in QUALITIES}
             times = interleaved(work, rounds)
             passes = n_passes(DisplayOptions(quality="final"))
-            report(f"{title}, 1280 x 720, 4 samples a pixel", times, ("normal", "draft"))
+            report(f"{title}, 1280 x 720, 4 samples per pixel", times, ("normal", "draft"))
             drafts = statistics.median(times["draft"])
             ratio = statistics.median(times["final"]) / drafts
             print(

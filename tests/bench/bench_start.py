@@ -3,7 +3,7 @@
 Times are processor times of the processes, which hardly depend on other programs and include
 software drivers. A first round fills the cache of parsed numbers.
 
-Idle threads of OpenBLAS wait actively after numpy is imported; ``viewer`` shortens that time, the
+Idle threads of OpenBLAS busy-wait after numpy is imported; ``viewer`` shortens that time, the
 minimal programs do not. So each of them is also measured with the same setting, which shows the
 cost of the rest of the program.
 

@@ -28,7 +28,7 @@ def draw(tmp_path):
 
     def draw_with(*options):
         words = ["render", str(skel), "-o", str(out), "--force", "--size", "64x48", *options]
-        words += ["--quality", "normal"]  # equal to the library without options
+        words += ["--quality", "normal"]  # the same as in the library without options
         assert run(words) == 0
         return np.array(Image.open(out).convert("RGBA"))
 

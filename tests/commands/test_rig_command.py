@@ -63,7 +63,7 @@ def test_npz_opens_again_and_moves_like_the_template(folder, tmp_path, capsys):
         "alignment: the template is scaled and rotated about the shared origin; scale "
         "100, rotation 90.00 degrees, translation (0, 0, 0)"
     )
-    assert lines[-1] == f"{out}: the figure with its rig, the target's pose, confidence"
+    assert lines[-1] == f"{out}: the figure with its rig, the target's pose and the confidence"
     assert any(
         line.startswith("after posing, the mesh differs from the target by at most")
         for line in lines

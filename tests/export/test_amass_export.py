@@ -261,7 +261,7 @@ def test_unknown_options_and_empty_motions_are_refused(family, tmp_path):
     from dataclasses import replace
 
     nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(3, dtype=bool)))
-    with pytest.raises(RigError, match=r"every frame is missing: there is nothing to write$"):
+    with pytest.raises(RigError, match=r"every frame is missing, so there is nothing to write$"):
         written(nobody, tmp_path / "a.npz")
     assert not list(tmp_path.iterdir())
 

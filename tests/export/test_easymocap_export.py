@@ -265,7 +265,7 @@ def test_people_must_be_compatible(family, tmp_path):
             easymocap.export_animations(animations, tmp_path / "out", MotionOptions(), persons)
         assert str(caught.value).replace(f"{animation.name}:", "walk:") == message
     nobody = replace(animation, frames=replace(animation.frames, present=np.zeros(4, dtype=bool)))
-    with pytest.raises(RigError, match=r"every frame is missing: there is nothing to write$"):
+    with pytest.raises(RigError, match=r"every frame is missing, so there is nothing to write$"):
         easymocap.export_animations([nobody], tmp_path / "out", MotionOptions())
     assert not list(tmp_path.iterdir())
 

@@ -335,7 +335,7 @@ def test_unknown_options_are_refused(options: dict, message: str, tmp_path: Path
 def test_absent_or_non_finite_motion_is_refused(body: Figure, tmp_path: Path) -> None:
     animation = body_animation(body)
     none = replace(animation, frames=replace(animation.frames, present=np.zeros(12, dtype=bool)))
-    with pytest.raises(RigError, match="every frame is missing: there is nothing to write"):
+    with pytest.raises(RigError, match="every frame is missing, so there is nothing to write"):
         write(none, tmp_path)
     wild = animation.frames.figure_translations.copy()
     wild[3, 0] = np.inf

@@ -160,7 +160,7 @@ def test_points_of_all_frames_are_written(tmp_path):
             True,
             'unit of arrays: expected none, as in the scene, found "cm"',
         ),
-        (MotionOptions(), False, "two 4: every frame is missing: there is nothing to write"),
+        (MotionOptions(), False, "two 4: every frame is missing, so there is nothing to write"),
     ],
 )
 def test_unsupported_point_options_are_refused(tmp_path, options, present, message):

@@ -90,7 +90,7 @@ def test_fox_positions_match_skinning(tmp_path):
         "metres",
         f"up to {counts.max()} influences per vertex, all of them written, strongest first: "
         f"programs that read only JOINTS_0 have errors of up to {percent:.3g} % of the size",
-        "not stored in glTF: limits of joints",
+        "not stored in glTF: joint limits",
     ]
 
 

@@ -287,7 +287,7 @@ def test_other_skinning_is_the_reference_for_losses(tmp_path):
     worst = 1000 * np.max(apart)
     assert f"vertices differ from the motion by up to {worst:.3g} mm (vertex " in notes[1]
     assert notes[1].endswith(
-        "): Between LBS and DQS skinning is not supported, glTF uses linear blending"
+        "): Between LBS and DQS skinning is not supported: glTF uses linear blending"
     )
 
 
@@ -314,7 +314,7 @@ def test_invalid_animations_are_refused(tmp_path):
             write(tmp_path, animation, **options)
         assert str(caught.value) == message
 
-    text = "roof: every frame is missing: there is nothing to write"
+    text = "roof: every frame is missing, so there is nothing to write"
     refused(roof_animation(rows=[-1, -1]), text)
     refused(roof_animation(), 'unit of glTF: expected m, found "cm"', unit="cm")
     refused(roof_animation(), 'up axis of glTF: expected y, found "z"', up="z")

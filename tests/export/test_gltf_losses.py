@@ -113,7 +113,7 @@ def test_loss_of_other_skinning_methods_is_reported(tmp_path):
     assert_drawn(gltf, actor.figure, actor.pose)
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to {1000 * worst:.0f} mm "
-        "(vertex 3): Dual quaternion (DQS) skinning is not supported, glTF uses linear blending"
+        "(vertex 3): Dual quaternion (DQS) skinning is not supported: glTF uses linear blending"
     )
 
 
@@ -147,7 +147,7 @@ def test_distant_meshes_report_single_precision_loss(tmp_path):
     # Above 2^24 single precision represents even integers only.
     assert notes[1] == (
         f"{tmp_path}/out.glb: vertices differ from the pose by up to 1000 mm (vertex 0): the mesh "
-        "is far from its origin for glTF's single precision"
+        "is too far from its origin for glTF's single precision"
     )
 
 

@@ -86,7 +86,7 @@ def test_gltf_keeps_every_field(tmp_path):
 
 @pytest.mark.parametrize("angle", [0.0, 0.7])
 def test_gltf_preserves_texture_transforms(tmp_path, angle):
-    """T R S of the coordinates in the file, where v starts at the first row, is the same point."""
+    """T R S maps the file's coordinates, whose v starts at the first row, to the same point."""
     cos, sin = math.cos(angle), math.sin(angle)
     matrix = np.array([[2.0 * cos, -3.0 * sin, 0.25], [2.0 * sin, 3.0 * cos, -0.5]])
     material = Material("", Texture("a.png", PICTURE, transform=matrix), is_physical=True)

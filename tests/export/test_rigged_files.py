@@ -74,7 +74,7 @@ def test_npz_keeps_correctives(rigged, tmp_path):
     _, found = rigged
     lines = faults.lines(write_rigged(found, tmp_path / "arm.npz"))
     assert lines == [
-        f"{tmp_path / 'arm.npz'}: the figure with its rig, the target's pose, confidence"
+        f"{tmp_path / 'arm.npz'}: the figure with its rig, the target's pose and the confidence"
     ]
     again = viewer.load(tmp_path / "arm.npz").actors[0].figure
     assert again.correctives is not None and len(again.fields) == 3

@@ -54,7 +54,7 @@ def model(
     kind
         One of ``KINDS``: 24, 52, 55, 16 or 5 joints.
     n_vertices
-        At least 16; there are four triangles fewer than twice as many.
+        At least 16; the mesh has 2 * n_vertices - 4 triangles.
     n_shapes
         Columns of ``shapedirs`` for the shape.
     n_expressions
@@ -201,7 +201,7 @@ def _finger_step(joint: int) -> np.ndarray:
 
 
 def _order_by_distance(points: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return for each point the indices of the other points, the nearest first."""
+    """Return, for each point, the indices of the other points, nearest first."""
     whole = [np.round(places * 2.0**20).astype(np.int64) for places in (points, others)]
     gaps = whole[0][:, None] - whole[1][None]
     return np.argsort((gaps * gaps).sum(axis=2), axis=1, kind="stable")
@@ -265,7 +265,7 @@ def _landmarks(n_faces: int) -> dict[str, np.ndarray]:
 
 
 def _texture_coordinates(faces: np.ndarray, n_vertices: int) -> dict[str, np.ndarray]:
-    """Return texture coordinates with a seam up the spiral, which are more than the vertices."""
+    """Return texture coordinates; a seam up the spiral makes them outnumber the vertices."""
     index = np.arange(n_vertices)
     coordinates = np.stack([index % TURNS / TURNS, _rounded(index / (n_vertices - 1), 20)], axis=1)
     doubled = index[TURNS::TURNS]

@@ -17,7 +17,7 @@ from viewer.lint import CHECKS, CODES, SEVERITIES, Finding, lint_scene, points_o
 from viewer.rig.scene import Actor, Scene
 
 
-def test_registry_is_exactly_its_folder() -> None:
+def test_registry_matches_its_folder() -> None:
     folder = Path(viewer.lint.__file__).parent
     assert {p.stem for p in folder.glob("*.py") if not p.name.startswith("_")} == set(CHECKS)
     for name in CHECKS:

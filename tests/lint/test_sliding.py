@@ -51,6 +51,12 @@ def test_standing_foot_that_starts_to_drift_is_found() -> None:
     assert "C007" in codes(steps(10, 20, 0.2), STILL)
 
 
+@pytest.mark.parametrize("speed", [0.4, 0.8])
+def test_foot_dragged_next_to_a_standing_foot_is_found(speed: float) -> None:
+    assert "C007" in codes(speed * _K / RATE, STILL)
+    assert "C007" in codes(STILL, speed * _K / RATE)
+
+
 def test_short_landings_are_not_slides() -> None:
     # Each foot lands within 0.13 s.
     assert codes(steps(10, 4, 0.06), steps(30, 4, 0.06)) == []

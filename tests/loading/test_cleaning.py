@@ -144,7 +144,7 @@ def test_feet_are_moved_to_the_ground(upside_down):
     actor.clip = replace(actor.clip, figure_translations=places)
     scene = Scene([actor], world_up="y")
     (note,) = clean_up(scene, CleanUp(grounds=True))
-    assert str(note).endswith("lowered by 350 mm: its feet rest at height 0")
+    assert str(note).endswith("lowered by 350 mm, so that its feet rest at height 0")
     expected = -1.9 if upside_down else -0.1
     found = scene.actors[0].clip.figure_translations
     assert_allclose(found, np.tile([0.3, expected, 0.0], (60, 1)), atol=1e-12)

@@ -118,7 +118,7 @@ def test_posed_meshes_are_picked_at_their_drawn_position(offscreen):
     assert click(offscreen, scene, 1.0, 0.0) is None
 
 
-def test_picking_skins_no_actor_again(offscreen, monkeypatch):
+def test_picking_does_not_skin_actors_again(offscreen, monkeypatch):
     scene = Scene([bent(arm(3), (1, "z", 0.5))])
     offscreen.render(scene, (80, 80), parallel(), DisplayOptions(), scene_box(scene))
     before = offscreen.renderer.posed_mesh(scene.actors[0]).n_updates

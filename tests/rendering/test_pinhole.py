@@ -115,8 +115,8 @@ def test_rendered_points_match_the_projection():
         alone = offscreen.render(Scene([wall]), (640, 480), camera, options, BOX)
         marks = offscreen.render(Scene([dots]), (640, 480), camera, options, BOX)
     rows, columns = np.nonzero(alone[..., 3])
-    # Corners at +-0.5 and a distance of 8 are at 300 +- 50 and 260 +- 51.25; the ends may be
-    # covered or not.
+    # Corners at +-0.5 and a distance of 8 are at 300 +- 50 and 260 +- 51.25; the outermost
+    # pixels may or may not be covered.
     assert (columns.min(), columns.max()) in ((250, 350), (250, 349), (251, 350), (251, 349))
     assert (rows.min(), rows.max()) == (209, 311)
     rows, columns = np.nonzero(marks[..., 3])

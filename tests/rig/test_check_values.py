@@ -53,7 +53,7 @@ def test_tube_in_its_file_pose_has_the_check_values(shared):
 
 
 @pytest.mark.parametrize(("name", "move"), [("wasp", [0, -0.95, 0.15]), ("tube", [0, 0.5, 0])])
-def test_all_skinning_matrices_are_one_translation_at_zero_dofs(shared, name, move):
+def test_all_skinning_matrices_are_the_same_translation_at_zero_dofs(shared, name, move):
     figure = load(shared, name)
     pose = rest_pose(figure.skeleton)
     pose.dofs[:] = 0.0

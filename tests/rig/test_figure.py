@@ -29,15 +29,15 @@ def test_figure_requires_a_mesh_or_a_skeleton():
         ({}, "figure a: expected a mesh or a skeleton, found neither"),
         (
             {"mesh": mesh([[0, 0, 0]]), "skin": SKIN},
-            "figure a: the skin binds 2 vertices, the mesh has 1",
+            "figure a: the skin binds 2 vertices, but the mesh has 1",
         ),
         (
             {"skeleton": skeleton([-1]), "skin": SKIN},
-            "figure a: the skin binds 2 vertices, the mesh has 0",
+            "figure a: the skin binds 2 vertices, but the mesh has 0",
         ),
         (
             {"mesh": SHAPE, "skin": SKIN, "skeleton": skeleton([-1, 0])},
-            "figure a: the skin has 1 binding matrices, the skeleton has 2 joints",
+            "figure a: the skin has 1 binding matrices, but the skeleton has 2 joints",
         ),
     ],
 )

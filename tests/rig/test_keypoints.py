@@ -138,18 +138,21 @@ def test_annotations_refuse_mismatched_arrays(make, message):
 @pytest.mark.parametrize(
     ("parts", "message"),
     [
-        ({"body_parts": BodyParts(("a",), [0])}, "the body parts have 1 vertices, the mesh has 4"),
+        (
+            {"body_parts": BodyParts(("a",), [0])},
+            "the body parts have 1 vertices, but the mesh has 4",
+        ),
         (
             {"reduced": ReducedMesh([0, 4], [[0, 1, 1]])},
-            "the reduced mesh refers to vertices 0 to 4, the mesh has 4",
+            "the reduced mesh refers to vertices 0 to 4, but the mesh has 4",
         ),
         (
             {"keypoints": Keypoints(("a",), [-1], [[0, 1, 9]], [[1, 0, 0]])},
-            "the list of keypoints refers to vertices 0 to 9, the mesh has 4",
+            "the list of keypoints refers to vertices 0 to 9, but the mesh has 4",
         ),
         (
             {"symmetry": np.array([0, 1, 2, -3])},
-            "the symmetry map refers to vertices -3 to 2, the mesh has 4",
+            "the symmetry map refers to vertices -3 to 2, but the mesh has 4",
         ),
     ],
 )

@@ -162,7 +162,7 @@ class Frame:
         """Paint the panels of the last frame, and the scene behind them."""
         framebuffer.use()
         self.context.viewport = (0, 0, *size)
-        framebuffer.clear(0.10, 0.11, 0.12, 1.0)
+        framebuffer.clear(*imgui.get_style_color_vec4(imgui.Col_.title_bg))
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
 
     def _work(self) -> None:

@@ -31,6 +31,7 @@ _SHOW_PROGRESS_AFTER = 0.3  # seconds before the progress bar appears
 _BAR_WIDTH = 52.0 / 3.0  # width of the progress bar, in font sizes
 _GAP = 10.0  # points from the edges of the view
 _BETWEEN = 6.0  # points between two overlays
+_MOST_HEIGHT = 1.0 / 3.0  # maximum fraction of the view's height for several messages
 _BESIDE = 0.6  # minimum fraction of the view's width for messages next to the hints
 _MOST_NOTES = 8
 _LONGEST_NOTE = 400  # maximum length of a message in characters
@@ -151,7 +152,7 @@ def _draw_progress(state: AppState, legend: Rect | None, tools: Rect | None) -> 
 def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     """Draw the newest messages that fit, and the number of hidden ones."""
     state.messages.drop_old()
-    x, y, width, _ = state.view_rect
+    x, y, width, height = state.view_rect
     if not state.messages.notes or width <= 40:
         return
     style = imgui.get_style()
@@ -162,7 +163,9 @@ def _draw_notes(state: AppState, above: Sequence[Rect]) -> None:
     heights = [imgui.calc_text_size(text, False, wrap).y + style.item_spacing.y for text in texts]
     top = max((rect[3] + _BETWEEN for rect in above), default=y + _GAP)
     room = bottom - top - 2.0 * style.window_padding.y + style.item_spacing.y
-    count = n_newest(heights, line, room)
+    count = n_newest(heights, line, min(room, _MOST_HEIGHT * height))
+    # A long message may cover more of the view, but only a single one.
+    count = count or min(n_newest(heights, line, room), 1)
     if not count and not above:
         count = 1  # a clipped message is better than none
     if not count and room < line:

@@ -176,7 +176,7 @@ class _Search:
             notes.append(f"{counted(self._n_repeated, 'path')} named more than once, used once")
         if self._n_skipped:
             text = counted(self._n_skipped, "file")
-            notes.append(f"{text} in folders skipped: the suffix belongs to no format")
+            notes.append(f"{text} in folders skipped: unknown suffix")
         if self._n_outputs:
             notes.append(f"{counted(self._n_outputs, 'file')} in the folder of the outputs omitted")
         paths = sorted(self._found.values(), key=natural_key)

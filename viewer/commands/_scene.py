@@ -121,8 +121,8 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--model",
         metavar="FIGURE",
-        help="body model for captured bodies, or driven by BVH (default: one among FILES; for "
-        "captured bodies, otherwise the bundled body)",
+        help="body model for captured bodies, or figure that a BVH file drives (default: one of "
+        "FILES; for captured bodies, otherwise the bundled body)",
     )
     group.add_argument(
         "--motion",

@@ -76,12 +76,12 @@ def _add_poses(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=8,
         metavar="N",
-        help="test poses within the joint limits, for figures without motion (default: 8)",
+        help="compare in N poses within the joint limits if there is no motion (default: 8)",
     )
     group.add_argument(
         "--frames",
         metavar="A:B",
-        help="frames A to B - 1 of motions, by the reference's numbers (default: all)",
+        help="frames A to B - 1 of motions, numbered as in the reference (default: all)",
     )
 
 
@@ -100,7 +100,7 @@ def _add_results(parser: argparse.ArgumentParser) -> None:
         "--output",
         metavar="FILE",
         help="image of the reference, coloured by distance, in the worst pose; several comparisons "
-        "result in a sheet with a common scale",
+        "produce a sheet with a common scale",
     )
     group.add_argument("--force", action="store_true", help="replace an existing image")
 

@@ -1,8 +1,8 @@
 """Errors, warnings and notes as data: message key, location and values.
 
 A :class:`Diagnostic` refers to its message by a key, ``"W004.vertices"``: the stable code, a dot,
-and the name of one of the code's messages. ``wording/`` holds severity, title and remedy of each
-code and the template of each message. Nothing recovers meaning from text.
+and the name of one of the code's messages. ``wording/`` holds the severity, title and remedy
+of each code, and the template of each message. No code parses meaning from text.
 """
 
 from __future__ import annotations

@@ -83,7 +83,7 @@ EXPORTERS = {
         "glTF: mesh, skin and motion",
         (".glb", ".gltf"),
         "mesh, weights, materials, shapes, motion",
-        "limits of joints, pose correctives",
+        "joint limits, pose correctives",
         writes_motion=True,
         writes_keys=True,
         writes_several=True,
@@ -92,7 +92,7 @@ EXPORTERS = {
         "VRM: humanoid character",
         (".vrm",),
         "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
-        "pose, motion, limits of joints, pose correctives",
+        "pose, motion, joint limits, pose correctives",
     ),
     "vrma": Exporter(
         "VRM animation: motion of a humanoid",

@@ -1,4 +1,4 @@
-"""Exporter of AMASS files: motions of SMPL-family bodies.
+"""Exporter for AMASS files: motions of SMPL-family bodies.
 
 ::
 
@@ -63,7 +63,7 @@ def export_animation(
     path : Path
         The file; ``gaps="split"`` writes ``name-1.npz``, ``name-2.npz`` … if there are gaps.
     options : MotionOptions
-        Up axis (that of the scene if empty) and gaps.
+        Up axis (the scene's if empty) and handling of gaps.
 
     Returns
     -------
@@ -100,7 +100,7 @@ def write_layout(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     frames = filled(animation.frames, options.closing == "interpolate")
     body, notes = family_frames(animation, frames, member, options)
     is_split = options.closing == "split" and not present.all()

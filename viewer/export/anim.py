@@ -1,4 +1,4 @@
-"""Exporter of ``.anim`` files: motions of .skel-style rigs, by original keys or a key per frame."""
+"""Exporter for ``.anim`` files: motions of .skel-style rigs, as original keys or one per frame."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def export_animation(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
         )
     if not frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     if isinstance(animation.motion, Clip) and _is_whole(animation, animation.motion):
         with keeping_written() as saved:
             write(animation.motion, path)

@@ -1,4 +1,4 @@
-"""Exporter of ``.bvh`` files: a skeleton without rest rotations, and its joints' channels."""
+"""Exporter for ``.bvh`` files: a skeleton without rest rotations, and its joints' channels."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def export_animation(
     """
     check_options(options)
     if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     reference = int(animation.frames.present.argmax())
     is_split = options.closing == "split" and not animation.frames.present.all()
     frames = filled(animation.frames, options.closing == "interpolate")

@@ -1,4 +1,4 @@
-"""Exporter of EasyMocap folders: motions of SMPL-family bodies.
+"""Exporter for EasyMocap folders: motions of SMPL-family bodies.
 
 ::
 
@@ -185,7 +185,9 @@ def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> No
                 f"{animation.name}: expected frame numbers from 0, found {animation.first_frame}"
             )
         if not animation.frames.present.any():
-            raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+            raise RigError(
+                f"{animation.name}: every frame is missing, so there is nothing to write"
+            )
 
 
 class _Records:

@@ -1,4 +1,4 @@
-"""Exporter of glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
+"""Exporter for glTF 2.0, ``.glb`` or ``.gltf`` with a ``.bin``: mesh, skin, pose and motion.
 
 It follows the Khronos specification: ``registry.khronos.org/glTF/specs/2.0``. Lengths are in
 metres, y is up. Data is not converted: a node above the figure rotates it if z is up, and scales
@@ -109,7 +109,7 @@ def export_figures(
     extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
-    notes += _beside(data, path)
+    notes += _beside(data, path, document)
     file = _unplaced(data, placing)
     for actor, each in zip(actors, added, strict=True):
         own_notes = _figure_notes(path, actor, each, file, skinning, extend is not None)
@@ -179,14 +179,18 @@ def export_animation(
         documents.append(document)
     notes, lost = list[Diagnostic](), list[Diagnostic]()
     saved = _files(list(zip(paths, documents, strict=True)))
-    for file, span, data, made in zip(paths, spans, saved, built, strict=True):
+    rows = zip(paths, spans, saved, built, documents, strict=True)
+    for file, span, data, made, document in rows:
         values = {
             "counts": made.counts,
             "frames": frames_phrase(animation.first_frame + span[0], span[1] - span[0]),
             "rate": animation.frame_rate,
             "size": len(data[file]),
         }
-        notes += [Diagnostic("X001.gltf-motion", file, values=values), *_beside(data, file)]
+        notes += [
+            Diagnostic("X001.gltf-motion", file, values=values),
+            *_beside(data, file, document),
+        ]
         notes += _quantization(file, made, animation.figure)
         written = Written(file, parsed([*data.values()]), made.tree, made.meshes, span[0])
         lost += sampled_losses(written, sampled, options, span)
@@ -253,7 +257,7 @@ def export_animations(
     (data,) = _files([(path, document)])
     seconds = max(each.start + each.seconds for each in parts) - begin
     notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
-    notes += _beside(data, path)
+    notes += _beside(data, path, document)
     file = _unplaced(data, placing)
     for part, sampled, made in zip(parts, found, built, strict=True):
         own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
@@ -315,11 +319,15 @@ def _files(documents: list[tuple[Path, Document]]) -> list[dict[Path, bytes]]:
     return saved
 
 
-def _beside(data: dict[Path, bytes], path: Path) -> list[Diagnostic]:
+def _beside(data: dict[Path, bytes], path: Path, document: Document) -> list[Diagnostic]:
+    """Return notes about the file of arrays, and about numbers that JSON cannot store."""
     others = {file: len(content) for file, content in data.items() if file != path}
-    return [
+    notes = [
         Diagnostic("X001.gltf-arrays", file, values={"size": size}) for file, size in others.items()
     ]
+    if document.n_omitted:
+        notes.append(Diagnostic("X003.json-numbers", path, values={"n": document.n_omitted}))
+    return notes
 
 
 def _quantization(path: Path, built: Built, figure: Figure) -> list[Diagnostic]:

@@ -1,4 +1,4 @@
-"""Exporter of ``.npz`` files: posed figures, motions and points as named arrays.
+"""Exporter for ``.npz`` files: posed figures, motions and points as named arrays.
 
 ::
 
@@ -188,7 +188,7 @@ def _check(name: str, present: Bools, unit: str, options: MotionOptions) -> None
         known = " or ".join(QUATERNIONS)
         raise RigError(f'quaternions: expected {known}, found "{options.quaternions}"')
     if not present.any():
-        raise RigError(f"{name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{name}: every frame is missing, so there is nothing to write")
 
 
 def _point_arrays(

@@ -1,4 +1,4 @@
-"""Exporter of Wavefront ``.obj`` files, with a ``.mtl`` and image if the mesh is textured.
+"""Exporter for Wavefront ``.obj`` files, with a ``.mtl`` and image if the mesh is textured.
 
 Vertices keep their numbering: along seams faces refer to several ``vt`` for one ``v``.
 """

@@ -1,4 +1,4 @@
-"""Exporter of binary ``.ply`` files with texture coordinates per corner, and vertex colours."""
+"""Exporter for binary ``.ply`` files with texture coordinates per corner, and vertex colours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exporter of poses, by joint names (``.json``) or as the model's pose vector (``.txt``)."""
+"""Exporter for poses, by joint names (``.json``) or as the model's pose vector (``.txt``)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exporter of .skel-style rigs: a ``.skel`` and a ``.skin`` for any figure."""
+"""Exporter for .skel-style rigs: a ``.skel`` and a ``.skin`` for any figure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exporter of SMPL-X motions in the layout of programs that retarget human motion to robots.
+"""Exporter for SMPL-X motions in the layout of programs that retarget human motion to robots.
 
 ::
 

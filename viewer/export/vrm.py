@@ -1,4 +1,4 @@
-"""Exporter of VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
+"""Exporter for VRM characters, 0.x and 1.0: a ``.glb`` with human bones, meta data and more.
 
 A figure from a VRM file keeps its version and all data of its extensions, unless VRM 0.x is to
 become 1.0. Any other figure with the required human bones becomes VRM 1.0: at rest in a T-pose, in

@@ -1,4 +1,4 @@
-"""Exporter of humanoid motions, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
+"""Exporter for humanoid motions, ``VRMC_vrm_animation`` 1.0 (``.vrma``).
 
 The file has a node for each human bone in a T-pose, without rest rotations, in metres, y up, facing
 +z. With the rotation W(f) of a joint in the world of the motion, its rotation T in the T-pose, and
@@ -61,7 +61,7 @@ def export_animation(
     if options.closing == "split":
         raise RigError("gaps of .vrma: expected hold or interpolate, found split")
     if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     bones = human_bones(animation.figure)
     frames = filled(animation.frames, options.closing == "interpolate")
     document = Document(animation.name)

@@ -21,7 +21,7 @@ FOLDER = "a folder"
 
 # Maximum number of names in a folder that are compared with the name of a missing file.
 _MOST_FILES = 2000
-_ALIKE = 0.8  # minimum similarity; high, because file names share suffixes and often more
+_ALIKE = 0.8  # minimum similarity; high, because many file names share a suffix and more
 _KINDS = {
     stat.S_IFDIR: FOLDER,
     stat.S_IFIFO: "a pipe",

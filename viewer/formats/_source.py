@@ -90,7 +90,7 @@ class Source:
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Open a file or folder; errors as of ``read_bytes``."""
+        """Open a file or folder; errors as in ``read_bytes``."""
         source = cls(path, max_size=max_size, diagnostics=diagnostics)
         kind = kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
@@ -183,7 +183,7 @@ class Source:
         letters = np.frombuffer(self.data, dtype=np.uint8, count=end - start, offset=start)
         is_return = np.concatenate([[False], letters == ord("\r"), [False]])
         begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
-        # A run at the end of the part is followed by anything but a line feed.
+        # A run that ends the part counts as not followed by a line feed.
         after = np.append(letters, 0)[ends]
         return int((ends - begins)[after != ord("\n")].sum())
 

@@ -108,7 +108,7 @@ def _joint_places(finding: Finding, actor: Actor) -> Floats:
 
 
 def _middle(actor: Actor) -> Floats:
-    """Return the position of a whole actor, its roots or the mean of its points: (N, 3)."""
+    """Return the positions that stand for an actor: its roots or the mean of its points, (N, 3)."""
     figure, points = actor.figure, actor.points
     if isinstance(actor.clip, PointClip):
         seen = np.zeros((0, 3)) if points is None else points[points[:, 3] > 0.0, :3]

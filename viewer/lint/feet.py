@@ -30,6 +30,7 @@ _SLIDES = 0.15  # minimum speed that counts as sliding, per second
 _DRIFTS = 0.5  # per second: a foot that stood still and then moves faster starts to swing
 _LASTS = 0.2  # seconds for which a foot slides; starting and landing take less
 _SWINGS = 1.0  # maximum speed, per second: a faster foot swings just above the ground
+_DRAGS = 1.0  # seconds for which only a dragged foot stays low and moves: swings are shorter
 _FAR = 0.03  # minimum total distance during one contact
 _WINDOW = 0.1  # seconds over which a foot's speed is averaged: single frames are noisy
 
@@ -180,7 +181,8 @@ def _slipped(
     moved = np.linalg.norm(along[width:] - along[:-width], axis=2)
     speeds = moved / (width * step)
     low = _held(stands, width)
-    slides = _sliding(speeds / track.size, low, max(1, round(_LASTS / step)))
+    shortest, longest = (max(1, round(seconds / step)) for seconds in (_LASTS, _DRAGS))
+    slides = _sliding(speeds / track.size, low, shortest, longest)
     paths = np.array([_path(along[:, foot], slides[:, foot], width) for foot in range(len(feet))])
     if not (paths > _FAR * track.size).any():
         return []
@@ -206,12 +208,13 @@ def _slipped(
     ]
 
 
-def _sliding(speeds: Floats, low: Bools, shortest: int) -> Bools:
+def _sliding(speeds: Floats, low: Bools, shortest: int, longest: int) -> Bools:
     """Return the windows in which low feet slide: (W, N).
 
     A foot swings close to the ground as well, but while another foot stands still and only after
     speeding up. So a foot slides if it stood still before and does not speed up much, or if no
-    other foot stands still. Starting and landing feet slide only for short times.
+    other foot stands still. Starting and landing feet slide only for short times. A foot that stays
+    low and moves for longer than any swing is dragged.
 
     Parameters
     ----------
@@ -221,6 +224,8 @@ def _sliding(speeds: Floats, low: Bools, shortest: int) -> Bools:
         Windows in which feet touch the ground.
     shortest : int
         Number of windows that sliding lasts at least.
+    longest : int
+        Number of windows that a swing lasts at most.
     """
     rests = low & (speeds < _SLIDES)
     drifts = low & (speeds < _DRIFTS)
@@ -228,8 +233,11 @@ def _sliding(speeds: Floats, low: Bools, shortest: int) -> Bools:
     for foot in range(low.shape[1]):
         for first, last in runs_of(drifts[:, foot]):
             stands[first:last, foot] = rests[first:last, foot].any()
-    result = stands | (stands.sum(axis=1) == 0)[:, None]
-    result &= low & (speeds > _SLIDES) & (speeds < _SWINGS)
+    moves = low & (speeds > _SLIDES) & (speeds < _SWINGS)
+    result = moves & (stands | (stands.sum(axis=1) == 0)[:, None])
+    for foot in range(low.shape[1]):
+        for first, last in runs_of(moves[:, foot]):
+            result[first:last, foot] |= last - first > longest
     for foot in range(low.shape[1]):
         for first, last in runs_of(result[:, foot]):
             result[first:last, foot] &= last - first >= shortest

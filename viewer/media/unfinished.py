@@ -7,22 +7,34 @@ import os
 import re
 from collections import defaultdict, deque
 from collections.abc import Iterable
+from hashlib import blake2b
 from pathlib import Path
 
 __all__ = [
-    "PREFIX",
     "note_unfinished",
     "remove_leftovers",
     "remove_unfinished",
+    "temporary_prefix",
 ]
 
-PREFIX = 40
-"""Characters of a file's name with which the name of its temporary file begins, after a dot."""
-
+_LONGEST = 40  # maximum number of characters of a file's name in that of its temporary file
+_MARK = ".tmp"  # distinguishes temporary files from hidden files of the user
 # Maximum number of registered files in all threads; far fewer are written simultaneously.
 _MOST = 64
 
 _unfinished: deque[Path] = deque(maxlen=_MOST)
+
+
+def temporary_prefix(name: str) -> str:
+    """Return the beginning of the names of a file's temporary files, different for every file.
+
+    >>> temporary_prefix("walk.bvh")
+    '.walk.bvh.tmp'
+    """
+    if len(name) > _LONGEST:
+        digest = blake2b(os.fsencode(name), digest_size=8).hexdigest()
+        name = f"{name[: _LONGEST - len(digest)]}{digest}"
+    return f".{name}{_MARK}"
 
 
 def note_unfinished(path: Path) -> None:
@@ -43,8 +55,8 @@ def remove_unfinished() -> None:
             path.unlink(missing_ok=True)
 
 
-# The random part of the names that the module tempfile makes.
-_LEFTOVER = re.compile(r"\.(.+)\.[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
+# The module tempfile appends a random part of eight characters.
+_LEFTOVER = re.compile(r"(\..+)[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
 
 
 def remove_leftovers(targets: Iterable[str]) -> None:
@@ -60,7 +72,8 @@ def remove_leftovers(targets: Iterable[str]) -> None:
         folder, name = os.path.split(target)
         path = Path(name)
         # Libraries that write a file by its name need its suffix.
-        folders[folder] |= {f"{name[:PREFIX]}\n", f"{path.stem[:PREFIX]}\n{path.suffix}"}
+        own = f"{temporary_prefix(name)}\n", f"{temporary_prefix(path.stem)}\n{path.suffix}"
+        folders[folder] |= {*own}
     for folder, names in folders.items():
         with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
             for entry in entries:

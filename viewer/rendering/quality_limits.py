@@ -25,7 +25,7 @@ _PATIENCE = 5.0  # drawing time in seconds above which a message states it
 def limit_passes(
     options: DisplayOptions, scene: Scene, size: tuple[int, int], context: moderngl.Context
 ) -> list[str]:
-    """Lower the quality if it would take long in software, or need over 1 GB of memory.
+    """Lower the quality if it would take a long time in software, or need over 1 GB of memory.
 
     The work is counted, not timed, so that an image does not depend on the machine or its load.
 
@@ -69,7 +69,8 @@ def limit_passes(
         options.passes = passes
     pixels = f"{math.prod(size) / 1e6:.1f} megapixels and {n_triangles} triangles"
     return [
-        f"drawn with {what}, as {pixels} take long in software; --quality final draws all {wanted}"
+        f"drawn with {what}, as {pixels} take a long time in software; "
+        f"--quality final draws all {wanted}"
     ]
 
 

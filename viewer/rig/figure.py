@@ -116,12 +116,12 @@ class Figure:
             found = 0 if self.mesh is None else self.mesh.n_vertices
             raise RigError(
                 f"figure {self.name}: the skin binds {self.skin.n_vertices} vertices, "
-                f"the mesh has {found}"
+                f"but the mesh has {found}"
             )
         if self.skeleton is not None and self.skeleton.n_joints != self.skin.n_joints:
             raise RigError(
                 f"figure {self.name}: the skin has {self.skin.n_joints} binding matrices, "
-                f"the skeleton has {self.skeleton.n_joints} joints"
+                f"but the skeleton has {self.skeleton.n_joints} joints"
             )
 
     def _check_vertices(self) -> None:
@@ -139,7 +139,8 @@ class Figure:
         for what, found in ends.items():
             if found is not None and found != count:
                 raise RigError(
-                    f"figure {self.name}: the {what} have {found} vertices, the mesh has {count}"
+                    f"figure {self.name}: the {what} have {found} vertices, "
+                    f"but the mesh has {count}"
                 )
         indices: dict[str, Ints | None] = {
             "joint regressor": self.joint_regressor.vertices if self.joint_regressor else None,
@@ -151,7 +152,7 @@ class Figure:
             if listed is not None and listed.size and not 0 <= listed.min() <= listed.max() < count:
                 raise RigError(
                     f"figure {self.name}: the {what} refers to vertices {listed.min()} to "
-                    f"{listed.max()}, the mesh has {count}"
+                    f"{listed.max()}, but the mesh has {count}"
                 )
 
     @property

@@ -210,6 +210,28 @@ def test_messages_that_do_not_fit_are_only_counted(drive, rig, texts):
     assert "3 messages (Window > Messages)" in texts
 
 
+def test_several_messages_cover_at_most_a_third_of_the_view(drive, rig, texts):
+    hand = drive(*rig, size=(1280, 800), samples=1)
+    hand.state.messages.notes.clear()
+    hand.state.say(*("a long message, " + "and more " * 30 + str(n) for n in range(6)))
+    hand.step(3)
+    _, top, _, bottom = hand.state.item_rects["##notes"]
+    padding = 2.0 * imgui.get_style().window_padding.y
+    assert bottom - top <= hand.state.view_rect[3] / 3.0 + padding
+    assert any("more (Window > Messages)" in text for text in texts)
+
+
+def test_a_single_message_may_cover_more(drive, rig, texts):
+    hand = drive(*rig, size=(700, 250), samples=1)
+    hand.state.messages.notes.clear()
+    long = "a long message, " + "and more " * 30
+    hand.state.say(long)
+    texts.clear()
+    hand.step(3)
+    _, top, _, bottom = hand.state.item_rects["##notes"]
+    assert long in texts and bottom - top > hand.state.view_rect[3] / 3.0
+
+
 def test_interface_image_shows_warnings_even_if_rendering_is_slow(drive, rig, monkeypatch):
     scene = viewer.load(*rig)
     values = {"n": 3, "vertex": 0}

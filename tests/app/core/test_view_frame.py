@@ -20,8 +20,8 @@ def frame(**settings) -> ViewFrame:
 
 
 def test_points_project_as_through_a_pinhole() -> None:
-    # With a 90 degree field of view, the upper edge is as high above the axis as the point is
-    # distant.
+    # With a 90 degree field of view, the height of the upper edge above the axis equals
+    # its distance.
     assert_allclose(frame().project(np.zeros(3)), [300, 150], atol=1e-9)
     assert_allclose(frame().project(np.array([0.0, 5.0, 0.0])), [300, 50], atol=1e-9)
     assert_allclose(frame().project(np.array([1.0, 0.0, 3.0])), [300 + 100 / 2, 150], atol=1e-9)
@@ -41,7 +41,7 @@ def test_window_positions_unproject_to_points_at_a_depth(parallel) -> None:
 
 
 def test_world_size_of_a_pixel_grows_with_depth() -> None:
-    # At the target, 200 units of the window are 2 * 5 units of the scene.
+    # At the target, 200 window units are 2 * 5 units of the scene.
     assert frame().unit_length(np.zeros(3)) == pytest.approx(10 / 200)
     assert frame().unit_length(np.array([0.0, 0.0, 3.0])) == pytest.approx(4 / 200)
     assert frame(orthographic=True).unit_length(np.array([0.0, 0, 3])) == pytest.approx(10 / 200)

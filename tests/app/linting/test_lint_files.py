@@ -1,4 +1,4 @@
-"""Agreement of the Lint panel with ``viewer lint``, which reads files again, and jumps to gaps."""
+"""The Lint panel: agreement with ``viewer lint``, which reads files again, and jumps to gaps."""
 
 from __future__ import annotations
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from app.core.test_view_fit import reach
 from app.curves.plotted import _pick
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.animated import animated_leg, animation, bow, leg, wave
+from rig.animated import animated_leg, animation, bow, channel, clip_of, leg, wave
 
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.palette.entries import entries
@@ -123,3 +124,45 @@ def test_another_motion_is_listed_by_its_name(drive):
     assert actor.clip.name == "wave"
     assert_allclose(actor.pose.shape_weights, [0.0, 0.5])
     assert np.isfinite(actor.pose.dofs).all()
+
+
+@pytest.fixture
+def walker(drive):
+    """A test driver on a leg that can wave, or travel by 20 m, with a camera fitted to it."""
+    travel = clip_of(
+        channel(0, "translation", [0.0, 1.0], [[0.0, 0, 0], [20, 0, 0]]), name="travel"
+    )
+    figure = animated_leg(wave(), travel)
+    hand = drive(scene=scene_of(figure), size=SIZE)
+    hand.state.framing.restart()
+    hand.step(5)
+    return hand
+
+
+def test_camera_is_fitted_to_another_animation(walker):
+    near = walker.state.camera.distance
+    choose_animation(walker.state, 1)
+    walker.step(5)
+    walker.state.clock.seek(1.0)
+    walker.step(2)
+    assert reach(walker).max() < 1.0  # in view at the far end
+    choose_animation(walker.state, 0)
+    walker.step(5)
+    assert walker.state.camera.distance == pytest.approx(near)
+
+
+def test_moved_camera_stays_when_another_animation_is_chosen(walker):
+    walker.state.camera.distance = 7.0
+    walker.step(2)
+    choose_animation(walker.state, 1)
+    walker.step(5)
+    assert walker.state.camera.distance == 7.0
+
+
+def test_camera_stays_after_an_edited_motion(walker):
+    walker.state.actor.offset = 0.5
+    walker.step(5)
+    distance = walker.state.camera.distance
+    choose_animation(walker.state, 1)
+    walker.step(5)
+    assert walker.state.camera.distance == distance

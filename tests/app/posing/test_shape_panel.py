@@ -209,6 +209,8 @@ def test_open_mesh_has_no_volume(shape, texts):
     shape.step()
     # The two triangles of one side are missing; its outline has four edges.
     assert "none: open mesh (4 boundary edges)" in texts and "Mass" not in texts
+    # The text is wrapped: at the edge of the panel, where the view begins, it would be cut off.
+    assert shape.state.item_rects["measured Volume"][2] <= shape.state.view_rect[0]
 
 
 def test_mesh_with_doubled_vertices_is_still_closed(shape):

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+import time
+from dataclasses import replace
 from importlib import import_module
 
 import numpy as np
@@ -11,7 +13,10 @@ from rig.retargeting.rest_twins import t_pose, written
 from rig.retargeting.two_people import BODY, figure_of
 from rig.retargeting.walking import RATE, walk
 
+from viewer.app.core.reasons import no_undo
+from viewer.app.core.undo_actions import undo
 from viewer.app.files.state import Files
+from viewer.app.files.stream import Stream
 from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.feet import plants_feet, toggle_feet
@@ -99,6 +104,24 @@ def test_cancelled_retargeting_changes_nothing(walker, monkeypatch):
     assert (actor.clip, actor.drive) == before and hand.state.job is None
 
 
+def test_undo_cancels_a_change_that_is_being_computed(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    toggle_feet(hand.state)
+    hand.step(2)
+    before = actor.clip, actor.drive
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    toggle_feet(hand.state)
+    assert no_undo(hand.state) == ""
+    undo(hand.state)
+    assert hand.says("Cancelled")
+    hand.finish_job()
+    hand.step(3)
+    assert (actor.clip, actor.drive) == before and hand.state.job is None
+    undo(hand.state)  # of the earlier change
+    assert plants_feet(hand.state) and hand.says("Undone")
+    assert not hand.says("Feet: as retargeted")
+
+
 def captured(count: int) -> Capture:
     """Return a capture of somebody who stands still."""
 
@@ -141,3 +164,74 @@ def test_captures_are_retargeted_to_the_end_in_the_background(drive, monkeypatch
     assert actor.clip.n_rows == 100 and actor.clip.timing.frame_rate == 12.0
     assert plants_feet(hand.state)
     assert len(threads) == 1 and threads[0] != threading.get_ident()
+
+
+def test_redo_while_retargeting_runs_discards_its_result(walker, monkeypatch):
+    hand, actor = walker, walker.state.actor
+    toggle_feet(hand.state)
+    hand.step(2)
+    second = actor.clip, actor.drive
+    hand.key("z", "ctrl")
+    hand.step(2)
+    assert actor.clip is not second[0]
+    redone = threading.Event()
+
+    def waits(*arguments):
+        redone.wait(60.0)
+        return driven_clip(*arguments)
+
+    monkeypatch.setattr(drive_changes, "_SHORT", 10)
+    monkeypatch.setattr(drive_changes, "driven_clip", waits)
+    toggle_feet(hand.state)
+    hand.key("z", "ctrl shift")
+    hand.step(2)
+    redone.set()
+    assert actor.clip is second[0] and hand.state.job is not None
+    hand.finish_job()
+    assert actor.clip is second[0] and actor.drive is second[1] and hand.state.history.can_undo
+    assert hand.says("the motion was changed meanwhile")
+
+
+@pytest.mark.parametrize("frames", (10, 10_000))
+def test_unexpected_errors_of_retargeting_are_shown(walker, monkeypatch, frames):
+    hand, actor = walker, walker.state.actor
+    monkeypatch.setattr(drive_changes, "_SHORT", frames)
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+
+    def fails(*_):
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    before = actor.clip, actor.drive
+    monkeypatch.setattr(driven_clip_module, "plant_feet", fails)
+    monkeypatch.setattr(driven_clip_module, "retargeted", fails)
+    if frames > 1000:
+        with pytest.raises(np.linalg.LinAlgError):
+            toggle_feet(hand.state)
+    else:
+        toggle_feet(hand.state)
+        hand.finish_job()
+        assert "Singular matrix" in hand.state.error
+    assert (actor.clip, actor.drive) == before and hand.state.job is None
+
+
+@pytest.mark.parametrize("fails", (False, True))
+def test_captures_that_end_early_stop_being_read(monkeypatch, fails):
+    monkeypatch.setattr(threading, "excepthook", lambda _: None)
+    whole = captured(100)
+
+    def parts():
+        first, *_ = whole.parts()
+        yield first
+        if fails:
+            raise KeyError("poses")
+
+    builder = Builder(replace(whole, parts=parts), read(Source.open(bundled_body())))
+    stream = Stream([builder], lambda: None)
+    for _ in range(500):
+        stream.take()
+        if stream.is_done:
+            break
+        stream.wait()
+        time.sleep(0.01)
+    assert stream.is_done and builder.n_read == 20
+    assert ("poses" in stream.error) == fails

@@ -1,4 +1,4 @@
-"""The Rig panel, used by mouse and keys: choose, align, match, run, compare, save."""
+"""The Rig panel, operated by mouse and keys: choose, align, match, run, compare, save."""
 
 from __future__ import annotations
 
@@ -295,7 +295,7 @@ def test_confidence_maps_are_shown_by_buttons(rigging):
 
 def test_result_plays_the_template_motion_at_the_target_position(rigging):
     hand = rigging(with_clip=True)
-    # The clip's first frame is the rest pose; the target was posed otherwise.
+    # The clip's first frame is the rest pose; the target was posed differently.
     template = hand.state.scene.actors[1]
     template.pose.dofs[6:] = 0.2, -0.1, 0.7
     hand.step(2)

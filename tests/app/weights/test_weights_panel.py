@@ -241,7 +241,7 @@ def test_fixed_range_starts_with_the_automatic_range_and_stays_ordered(bent):
     assert (low, high) == (-float(f"{most:.3g}"), float(f"{most:.3g}"))
     type_into(bent, "To", "50")
     assert bent.state.options.scalar_range == (low, 50.0)
-    type_into(bent, "From", "60")  # a value above the other end
+    type_into(bent, "From", "60")  # a minimum above the maximum
     assert bent.state.options.scalar_range == (low, 50.0)
     type_into(bent, "From", "-12.5")
     assert bent.state.options.scalar_range == (-12.5, 50.0)

@@ -75,7 +75,7 @@ def test_clips_of_other_skeletons_are_refused():
     three = SampledClip("x", Timing(30.0, np.array([0])), np.ones((1, 3, 4)))
     with pytest.raises(RigError) as problem:
         transfer_clip(three, SKELETON, 1.0)
-    assert str(problem.value) == "clip x has 3 joints, the figure has 2"
+    assert str(problem.value) == "clip x has 3 joints, but the figure has 2"
     with pytest.raises(RigError) as problem:
         transfer_clip(Clip("y", (curve(9),), 0.0, 1.0), SKELETON, 1.0)
-    assert str(problem.value) == "a channel moves DOF 9, the figure has 9 DOFs"
+    assert str(problem.value) == "a channel moves DOF 9, but the figure has 9 DOFs"

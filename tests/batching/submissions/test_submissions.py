@@ -202,3 +202,24 @@ def test_submissions_are_the_folders_and_archives_of_a_folder(tmp_path) -> None:
     both = [tmp_path / "ann", tmp_path / "bob"]
     assert find_submissions(both).submissions == tuple(both)
     assert find_submissions([tmp_path / "ann"]).submissions == (tmp_path / "ann",)
+
+
+@pytest.mark.parametrize("name", ("geoffrey.obj", "overlap.obj", "it's.obj"))
+def test_reason_for_damage_does_not_depend_on_names(tmp_path, name) -> None:
+    path = tmp_path / "a.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr(name, b"v 0 0 0\n" * 20)
+    data = path.read_bytes()
+    path.write_bytes(data.replace(b"v 0 0 0", b"v 1 0 0", 1))
+    assert "a file in it differs from its checksum" in refusal(path, alike=("*.obj",))
+    path.write_bytes(data.replace(name.encode(), b"crc".ljust(len(name), b"x"), 1))
+    assert "the headers of its files differ" in refusal(path, alike=("*.obj",))
+
+
+def test_end_of_an_archive_within_a_file_is_reported(tmp_path, monkeypatch) -> None:
+    def ends(*_: object) -> None:
+        raise EOFError
+
+    path = zipped(tmp_path / "a.zip", {"a.skel": "balljoint"})
+    monkeypatch.setattr(zipfile.ZipFile, "open", ends)
+    assert "its data ends too early" in refusal(path, alike=("*.skel",))

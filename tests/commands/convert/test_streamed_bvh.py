@@ -130,6 +130,28 @@ def test_unusual_spellings_are_read_part_by_part(streamed, change):
     assert streamed(change(motion()))[-1] == 0
 
 
+def test_roots_that_begin_to_move_late_get_position_channels(streamed):
+    """Several roots become children of a common root, so their channels depend on all frames."""
+    head, rows = motion(roots=3).split("Frame Time: 0.0166667\n")
+    numbers = [row.split() for row in rows.splitlines()]
+    width = len(numbers[0]) // 3
+    for row in numbers[:200]:
+        for root in (1, 2):
+            row[root * width : root * width + 3] = ["1", "2", "3"]
+    lines = "\n".join(" ".join(row) for row in numbers)
+    written, _, _, code = streamed(f"{head}Frame Time: 0.0166667\n{lines}\n")
+    assert code == 0
+    assert written.count(b"CHANNELS 6") == 4
+
+
+def test_person_field_in_the_output_name_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    source = tmp_path / "a.bvh"
+    source.write_text(motion(frames=5))
+    assert run(["convert", str(source), "-o", str(tmp_path / "walk_{person}.bvh")]) == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.bvh", "walk_1.bvh"]
+
+
 def broken(line: int, new: str):
     """Return a function that replaces one line, counted from the end."""
 

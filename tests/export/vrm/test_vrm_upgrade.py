@@ -275,3 +275,35 @@ def test_convert_writes_version_1_if_requested(
     assert "VRM 1.0: 17 human bones, 2 expressions, 1 spring chain" in capsys.readouterr().out
     assert run([*command, "-o", str(tmp_path / "out.glb")]) == 2
     assert "--vrm-version: expected an output with .vrm" in capsys.readouterr().err
+
+
+def test_groups_and_colliders_with_invalid_numbers_are_reported(tmp_path: Path) -> None:
+    file = swinging(0)
+    springs = old_vrm(file)["secondaryAnimation"]
+    springs["boneGroups"] = [*springs["boneGroups"] * 2]
+    springs["boneGroups"][1] = springs["boneGroups"][0] | {"gravityDir": {"x": [1], "y": 0, "z": 0}}
+    (sphere,) = springs["colliderGroups"][0]["colliders"]
+    springs["colliderGroups"][0]["colliders"] = [sphere, {"offset": {"z": "far"}, "radius": 0.1}]
+    old_vrm(file)["firstPerson"]["firstPersonBoneOffset"] = {"x": 0.0, "y": {}, "z": [0.1]}
+    written, notes = upgrade(file, tmp_path)
+    told = written.root["extensions"]
+    assert len(told["VRMC_springBone"]["springs"]) == 1
+    assert len(told["VRMC_springBone"]["colliders"]) == 1
+    assert "offsetFromHeadBone" not in told["VRMC_vrm"]["lookAt"]
+    assert {
+        "firstPerson.firstPersonBoneOffset",
+        "secondaryAnimation.boneGroups[1]",
+        "secondaryAnimation.colliderGroups[0].colliders[1]",
+    } <= {*notes["X003.vrm-upgrade"].values["names"]}
+
+
+def test_numbers_that_json_cannot_store_are_omitted(tmp_path: Path) -> None:
+    file = swinging(0)
+    group = old_vrm(file)["secondaryAnimation"]["boneGroups"][0]
+    group |= {"note": float("nan"), "table": [1.0, float("inf")]}
+    path, out = tmp_path / "ada.vrm", tmp_path / "out.vrm"
+    path.write_bytes(file.glb())
+    notes = {note.key: note for note in export(load(path).actors[0], out)}
+    assert notes["X003.json-numbers"].values["n"] == 2
+    kept = Written(out).root["extensions"]["VRM"]["secondaryAnimation"]["boneGroups"][0]
+    assert "note" not in kept and kept["table"] == [1.0, 0.0]

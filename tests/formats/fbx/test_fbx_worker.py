@@ -1,4 +1,4 @@
-"""The child process that reads ``.fbx`` keeps the library's objects until it exits."""
+"""The child process that reads ``.fbx`` files, which keeps the library's objects until it exits."""
 
 from __future__ import annotations
 

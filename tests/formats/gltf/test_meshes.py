@@ -134,7 +134,9 @@ def test_joints_must_exist_in_the_skin() -> None:
     file.primitive["attributes"]["JOINTS_0"] = joints
     pointer = "/meshes/0/primitives/0/attributes/JOINTS_0"
     assert refused(file) == ("W010.gltf-joint", pointer)
-    with pytest.raises(Exception, match=r"vertex 2: expected a joint below 2 \(skin 0\), found 2$"):
+    with pytest.raises(
+        Exception, match=r"vertex 2: expected a joint index below 2 \(skin 0\), found 2$"
+    ):
         read(file)
 
 

@@ -11,7 +11,7 @@ def mesh_of(text: str) -> Mesh:
     return read(Source("a.obj", text.encode())).require_mesh()
 
 
-def test_several_objects_are_parts_and_otherwise_groups_are_parts() -> None:
+def test_several_objects_or_else_groups_are_parts() -> None:
     text = SQUARE + "f 1 2 3\no box\ng low\nf 1 2 4\ng high\nf 2 3 4\no lid\no ball\nf 1 3 4\n"
     mesh = mesh_of(text)
     assert mesh.parts == ("box", "ball")

@@ -117,3 +117,10 @@ def test_errors_and_ignored_statements_are_reported_by_line(materials):
         ("m.mtl", "F007.mtl-statements", 5, {"statements": ["map_Bump", "map_Ks"]}),
     ]
     assert (made.base_color, made.roughness, made.is_physical) == (None, 0.6, False)
+
+
+@pytest.mark.parametrize("option", ["-s 2 3", "-o", "-clamp", "-clamp on", "-bm 0.5", "-imfchan r"])
+def test_maps_without_a_file_are_ignored(materials, option):
+    (made,), _ = materials(f"newmtl a\nKd 1 0 0\nmap_Kd {option}\nbump {option}\n")
+    assert made.base_color == (1.0, 0.0, 0.0, 1.0)
+    assert made.textures == {}

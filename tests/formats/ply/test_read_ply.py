@@ -15,6 +15,7 @@ from viewer.media.png import encode_png
 VERTEX = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
 FACE = "element face 2\nproperty list uchar int vertex_indices\n"
 HEAD = "ply\nformat ascii 1.0\n"
+ORDERS = ["ascii", "binary_little_endian", "binary_big_endian"]
 POINTS = "0 0 0\n2 0 0\n2 2 0\n0 2 0\n"
 GOOD = f"{HEAD}{VERTEX}{FACE}end_header\n{POINTS}3 0 1 2\n4 0 1 2 3\n"
 SQUARE = [[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]]
@@ -233,6 +234,9 @@ def test_faces_with_fewer_than_three_corners_are_left_out() -> None:
     figure, warnings = read(GOOD.replace("3 0 1 2\n", "2 0 1\n"))
     assert figure.mesh.triangles.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert warnings == [("F007.ply-small-faces", None, {"n": 1, "face": 0})]
+    figure, warnings = read(GOOD.replace("3 0 1 2\n4 0 1 2 3\n", "0\n0\n"))
+    assert len(figure.mesh.triangles) == 0
+    assert warnings[0] == ("F007.ply-small-faces", None, {"n": 2, "face": 0})
 
 
 def changed(old: str, new: str) -> str:
@@ -250,25 +254,11 @@ def changed(old: str, new: str) -> str:
         (changed("format ascii 1.0\n", ""), ("F002.ply-no-format", 8, {})),
         (
             changed("ascii 1.0", "ascii 2.0"),
-            (
-                "F002.ply-format",
-                2,
-                {
-                    "orders": ["ascii", "binary_little_endian", "binary_big_endian"],
-                    "found": "ascii 2.0",
-                },
-            ),
+            ("F002.ply-format", 2, {"orders": ORDERS, "found": "ascii 2.0"}),
         ),
         (
             changed("ascii 1.0", "text 1.0"),
-            (
-                "F002.ply-format",
-                2,
-                {
-                    "orders": ["ascii", "binary_little_endian", "binary_big_endian"],
-                    "found": "text 1.0",
-                },
-            ),
+            ("F002.ply-format", 2, {"orders": ORDERS, "found": "text 1.0"}),
         ),
         (changed("vertex 4", "vertex four"), ("F002.ply-element", 3, {"found": "vertex four"})),
         (changed("vertex 4", "vertex -4"), ("F002.ply-element", 3, {"found": "vertex -4"})),

@@ -235,7 +235,7 @@ BROKEN = {
         (
             "F002.rig-parts",
             None,
-            {"problem": "figure scan: the skin binds 2 vertices, the mesh has 4"},
+            {"problem": "figure scan: the skin binds 2 vertices, but the mesh has 4"},
         ),
     ),
     "bindings": (
@@ -308,6 +308,6 @@ def test_correctives_for_a_different_mesh_are_refused(tmp_path):
         (
             "F002.rig-parts",
             None,
-            {"problem": "figure scan: the correctives have 5 vertices, the mesh has 4"},
+            {"problem": "figure scan: the correctives have 5 vertices, but the mesh has 4"},
         )
     )

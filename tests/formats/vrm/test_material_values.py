@@ -50,7 +50,7 @@ def test_binds_of_version_1_are_read(tmp_path: Path) -> None:
     assert shapes.is_expression(shapes.names.index("angry"))
 
 
-def old_values(*values: tuple[str, str, list[float]]) -> File:
+def old_values(*values: tuple[str, Any, list[float]]) -> File:
     file = swinging(0)
     groups = file.root["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
     groups[1]["materialValues"] = [
@@ -100,6 +100,15 @@ def test_changes_without_effect_are_reported(tmp_path: Path) -> None:
     shapes, (found,) = opened(file, tmp_path)
     assert found.values["names"] == ["Blush: cloth _Cutoff", "Blush: hood _Color"]
     assert len(rows(shapes)) == 1
+
+
+def test_invalid_values_of_version_0_are_ignored(tmp_path: Path) -> None:
+    file = old_values(("cloth", ["_Color"], [1, 0, 0, 1]), ("cloth", "_Color", [10**400, 0, 0, 1]))
+    groups = file.root["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
+    groups[0]["binds"][0]["weight"] = 10**400
+    shapes, (found,) = opened(file, tmp_path)
+    assert found.values["names"] == ["Blush: cloth ['_Color']", "Blush: cloth _Color"]
+    assert shapes.material_binds is None
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from viewer.rig.skin import skin_from_lists
 from viewer.rig.skinning import Skinning
 
 TOLERANCE = 1e-5  # relative to the figure's size, as for linear blending
-NORMAL_TOLERANCE = 5e-5  # the sum of five quaternions may have a fifth of their length
+NORMAL_TOLERANCE = 5e-5  # 5 times that: five blended quaternions may sum to a fifth of their length
 METHODS = [Skinning("dqs"), Skinning("mix", blend_factor=0.3)]
 METHOD_IDS = ["dqs", "mix"]
 
@@ -67,7 +67,7 @@ def dual(how: Skinning, **changes) -> Skinning:
 def test_gpu_matches_the_reference_for_any_number_of_joints(posed, how, n_joints):
     rng = np.random.default_rng(n_joints)
     figure = random_figure(rng, n_joints, n_vertices=max(300, n_joints))
-    # The mixture shortens normals like linear blending; normals that nearly cancel lose all digits.
+    # The mix shortens normals as linear blending does; those that nearly vanish lose all precision.
     check(posed, figure, how, seed=1, n_poses=3, normals=how.method == "dqs")
 
 
@@ -164,7 +164,7 @@ def test_vertices_without_influence_or_with_cancelling_weights_match_the_referen
 
 
 def test_twist_of_180_degrees_keeps_its_radius_on_the_gpu(posed):
-    """The quaternions are perpendicular, so their sum does not vanish like that of the matrices."""
+    """The matrices cancel out when summed; the perpendicular quaternions do not."""
     figure = random_figure(np.random.default_rng(11), 2, n_vertices=50)
     offsets = np.zeros((2, 3))
     bones = replace(figure.skeleton, rest_translations=offsets)
@@ -192,7 +192,7 @@ def test_methods_can_be_switched_on_one_mesh(posed):
 
 
 @pytest.mark.parametrize("blend_factor", [0.0, 1.0])
-def test_mix_at_0_and_1_is_one_of_the_two_methods(posed, blend_factor):
+def test_mix_at_0_and_1_equals_lbs_and_dqs(posed, blend_factor):
     figure = random_figure(np.random.default_rng(13), 10)
     pose = random_pose(figure.skeleton, np.random.default_rng(13))
     found, _ = posed(figure, pose, Skinning("mix", blend_factor=blend_factor))

@@ -82,6 +82,18 @@ def test_mirrored_texture_remains_mirrored():
     assert math.isfinite(found.sum())
 
 
+@pytest.mark.parametrize("scale", [(-1.0, 1.0), (-2.0, -1.0), (1.0, -1.0), (0.0, 2.0)])
+@pytest.mark.parametrize("weight", [0.25, 1.0])
+def test_negative_scales_without_rotation_are_blended(scale, weight):
+    before = transform_matrix(np.array([0.5, 0.25]), 0.0, np.array(scale))
+    material = Material(base_texture=Texture("a", transform=before))
+    rows = binds((0, 0, "transform", (3.0, 1.0, 0.0, 0.0)))
+    found = rows.changed([material], np.array([weight]))[0].base_texture.matrix
+    blended = (1.0 - weight) * np.array(scale) + weight * np.array([3.0, 1.0])
+    offset = (1.0 - weight) * np.array([0.5, 0.25])
+    assert_allclose(found, transform_matrix(offset, 0.0, blended), atol=1e-12)
+
+
 def test_unknown_kinds_are_refused():
     with pytest.raises(RigError, match="glow"):
         binds((0, 0, "glow", (1.0, 0, 0, 1)))

@@ -128,4 +128,4 @@ def test_motion_of_another_skeleton_is_refused():
     clip = SampledClip("c", Timing(1.0, [0]), np.tile(STILL, (1, 5, 1)))
     with pytest.raises(RigError) as caught:
         motion_path(two_joints(), clip, [0])
-    assert str(caught.value) == "clip c has 5 joints, figure f has 2"
+    assert str(caught.value) == "clip c has 5 joints, but figure f has 2"

@@ -1,6 +1,6 @@
 """Motions with known contacts: a jump, kneeling on one knee, and a walk on a treadmill.
 
-The person is that of ``rest_twins``. Hips, knees and ankles rotate about x only.
+The body is the one defined in ``rest_twins``. Hips, knees and ankles rotate about x only.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 
 RATE = 60.0
 GRAVITY = 981.0  # cm per second squared
-SPEED = 220.0  # of the take-off, cm per second
+SPEED = 220.0  # at take-off, cm per second
 KNEELING = slice(90, 150)  # frames
 
 
 def smooth(x: np.ndarray) -> np.ndarray:
-    """Return a step from 0 at 0 to 1 at 1 with continuous acceleration."""
+    """Return a smooth step from 0 at x = 0 to 1 at x = 1, with continuous acceleration."""
     x = np.clip(x, 0.0, 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
@@ -88,7 +88,7 @@ def kneel() -> tuple[np.ndarray, np.ndarray]:
     down = smooth((frames - 20) / 60.0)
     thigh, shin = np.linalg.norm(knee - hip), np.linalg.norm(ankle - knee)
     foot = np.linalg.norm(ball - ankle)
-    slope = np.arctan2(ankle[1] - ball[1], ball[0] - ankle[0])  # of the foot at rest
+    slope = np.arctan2(ankle[1] - ball[1], ball[0] - ankle[0])  # pitch of the foot at rest
     path = np.zeros((len(frames), 3))
     path[:, 1] = down * (5.0 + thigh - hip[1]) - 7.0 * (1.0 - down) * 0.2 - 1.0
     path[:, 2] = 0.0

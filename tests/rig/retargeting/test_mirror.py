@@ -119,7 +119,7 @@ def test_vertices_of_the_mirrored_pose_are_the_mirrored_vertices(axis, up, seed)
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_mirroring_twice_is_the_same_pose(seed):
+def test_mirroring_twice_restores_the_pose(seed):
     figure = symmetric_figure()
     pose = random_pose(figure, seed)
     again = mirror_pose(figure, mirror_pose(figure, pose))

@@ -1,8 +1,8 @@
 """A walk with exactly planted feet, built from the paths of the ankles by trigonometry.
 
-The person is that of ``rest_twins``. Each foot stands for 60 of 100 frames with the sole on the
-ground, and swings to the next position in the remaining frames. Hips, knees and ankles rotate about
-x only.
+The body is the one defined in ``rest_twins``. Each foot stands for 60 of 100 frames with the sole
+on the ground, and swings to the next position in the remaining frames. Hips, knees and ankles
+rotate about x only.
 """
 
 from __future__ import annotations

@@ -7,8 +7,9 @@ from collections.abc import Callable, Generator
 from typing import Protocol
 
 from viewer.errors import ViewerError
+from viewer.phrases import printable
 
-__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob"]
+__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob", "unexpected"]
 
 Report = Callable[[int, int, str], None]
 """Called with the completed steps, their total and the next step's name; raises to cancel."""
@@ -78,7 +79,11 @@ class ThreadJob:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
-        self._wake()
+        except BaseException as problem:  # a programming error: the traceback is printed
+            self.error = unexpected(self.title, problem)
+            raise
+        finally:
+            self._wake()
 
     @property
     def is_done(self) -> bool:
@@ -101,6 +106,11 @@ class ThreadJob:
         self._thread.join()
 
 
+def unexpected(title: str, problem: BaseException) -> str:
+    """Return the message about an error that a thread does not expect."""
+    return f"{title}: unexpected {type(problem).__name__}: {printable(problem, 300)}"
+
+
 class _EndedError(ViewerError):
     """Raised to unwind a cancelled job."""
 
@@ -116,6 +126,11 @@ class CountedJob:
         Gets a ``Report`` and returns messages about the result; may raise ViewerError.
     finish : callable, optional
         Applies the result of a successful job; called in the frame loop.
+
+    Attributes
+    ----------
+    is_change : bool
+        Whether the job has a result to apply, which changes the scene.
     """
 
     def __init__(
@@ -126,7 +141,7 @@ class CountedJob:
     ) -> None:
         self.title, self.error, self.can_cancel = title, "", True
         self.lines: list[str] = []
-        self._act, self._finish = act, finish
+        self._act, self._finish, self.is_change = act, finish, finish is not None
         self._progress = (0, 0)
         self._is_cancelled = False
         self._thread = threading.Thread(target=self._run)
@@ -141,6 +156,9 @@ class CountedJob:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.title}: not enough memory"
+        except BaseException as problem:  # a programming error: the traceback is printed
+            self.error = unexpected(self.title, problem)
+            raise
 
     def _report(self, done: int, total: int, what: str) -> None:
         if self._is_cancelled:

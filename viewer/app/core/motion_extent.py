@@ -52,12 +52,17 @@ class MotionExtent:
     _motions: tuple[object, ...] = ()
     _opened: dict[int, tuple[Actor, Figure, Pose]] = field(default_factory=dict)
     _grew: bool = False
+    _is_another: bool = False  # whether another motion has been chosen since the last sample
 
     def restart(self) -> None:
         """Start over, for other figures or other poses."""
         self.is_done = self.was_edited = self._grew = False
         self._clouds, self._kept, self._opened = {}, {}, {}
         self._shapes, self._motions = (), ()
+
+    def note_choice(self) -> None:
+        """Record that another motion has been chosen, which is not an edit."""
+        self._is_another = True
 
     @property
     def points(self) -> Floats:
@@ -92,7 +97,8 @@ class MotionExtent:
         if is_edited or (self._grew and not grows):
             # Frames are sampled again after an edit, and once reading is complete.
             self._kept, self._clouds = {**self._kept, **self._clouds}, {}
-        self.was_edited |= is_edited
+        self.was_edited |= is_edited and not self._is_another
+        self._is_another = False
         self._shapes, self._motions, self._grew = shapes, motions, grows
         self._keep_poses(scene)
         left = self._left(scene, clock, grows)

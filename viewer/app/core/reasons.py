@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.rig.motion.evaluation import JointMotion
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -98,7 +99,8 @@ def no_job_room(state: AppState) -> str:
 
 def no_undo(state: AppState) -> str:
     """Return the reason why there is nothing to undo."""
-    return "" if state.history.can_undo else "nothing to undo"
+    is_changing = isinstance(state.job, CountedJob) and state.job.is_change
+    return "" if is_changing or state.history.can_undo else "nothing to undo"
 
 
 def no_redo(state: AppState) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 
+from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.rig.scene import Actor
 
@@ -11,11 +12,15 @@ __all__ = ["redo", "undo"]
 
 
 def undo(state: AppState) -> None:
-    """Undo the last change of pose or display."""
+    """Cancel the change that is being computed, or undo the last change of pose or display."""
+    if _cancels_change(state):
+        state.say_status("Cancelled")
+        return
     before = state.actor
     pose_at = partial(state.clock.go_back, chosen=before)
-    if not state.history.undo(state.scene, state.options, pose_at):
-        state.say_status("Nothing to undo")
+    is_undone = state.history.undo(state.scene, state.options, pose_at)
+    # Replaces the message about the change, which would be wrong now.
+    state.say_status("Undone" if is_undone else "Nothing to undo")
     _keep_choice(state, before)
 
 
@@ -23,9 +28,22 @@ def redo(state: AppState) -> None:
     """Redo the most recently undone change."""
     before = state.actor
     pose_at = partial(state.clock.go_back, chosen=before)
-    if not state.history.redo(state.scene, state.options, pose_at):
-        state.say_status("Nothing to redo")
+    is_redone = state.history.redo(state.scene, state.options, pose_at)
+    state.say_status("Redone" if is_redone else "Nothing to redo")
     _keep_choice(state, before)
+
+
+def _cancels_change(state: AppState) -> bool:
+    """Cancel a job that is about to change the scene; return whether there was one.
+
+    It started from the current state, so its result would override an earlier change that is
+    undone meanwhile.
+    """
+    job = state.job
+    if not isinstance(job, CountedJob) or not job.is_change or job.is_done:
+        return False
+    job.cancel()
+    return True
 
 
 def _keep_choice(state: AppState, before: Actor) -> None:

@@ -240,10 +240,16 @@ def _write_together(
     path: Path,
     options: MotionOptions,
 ) -> list[Diagnostic]:
-    """Write all actors into one file, with their own keys if all of them have keys."""
+    """Write all actors into one file, with their own keys if all of them have keys.
+
+    Frames are written instead if an actor begins later than another one, because animations are
+    shared and have no delay.
+    """
     from viewer.export.gltf import export_animations
 
-    if all(part.frames is None and keeps_keys(scene, part.actor) for part in parts):
+    has_delays = len({part.actor.offset for part in parts}) > 1
+    is_keyed = all(part.frames is None and keeps_keys(scene, part.actor) for part in parts)
+    if is_keyed and not has_delays:
         actors = [placed_actor(scene, each) for each in (*(part.actor for part in parts), *still)]
         clips = [
             own_animations(each) or None if has_own_animations(each) else None for each in actors

@@ -6,6 +6,7 @@ import queue
 import threading
 from collections.abc import Callable, Sequence
 
+from viewer.app.core.jobs import unexpected
 from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.loading.capturing import Builder
@@ -69,12 +70,17 @@ class Stream:
             self.error = str(problem)
         except MemoryError:
             self.error = f"{self.builders[0].capture.name}: not enough memory"
-        self._wake()
+        except BaseException as problem:  # a programming error: the traceback is printed
+            self.error = unexpected(self.builders[0].capture.name, problem)
+            raise
+        finally:
+            if not self._stop.is_set():  # the window may have been closed
+                self._wake()
 
     def _finish(self, builder: Builder) -> bool:
         """Compute the final motions after all parts were added; return False if cancelled."""
         self._is_waiting = True
-        while not self._parts.empty() or not builder.is_done:
+        while self._parts.unfinished_tasks:
             if self._stop.wait(0.02):
                 return False
         self._is_waiting = False
@@ -125,19 +131,21 @@ class Stream:
                 builder, part = self._parts.get_nowait()
             except queue.Empty:
                 return new, notes, grew
-            if builder.is_cut:
-                continue
-            if isinstance(part, list):
-                notes += builder.finish(part)
+            try:
+                if builder.is_cut:
+                    continue
                 grew = True
-                continue
-            known = builder.actors
-            more, said = builder.add(part)
-            # The user may have changed the frame rate since the first person appeared.
-            keep_rate(known[:1], more)
-            new += more
-            notes += said
-            grew = True
+                if isinstance(part, list):
+                    notes += builder.finish(part)
+                    continue
+                known = builder.actors
+                more, said = builder.add(part)
+                # The user may have changed the frame rate since the first person appeared.
+                keep_rate(known[:1], more)
+                new += more
+                notes += said
+            finally:
+                self._parts.task_done()
 
     @property
     def is_done(self) -> bool:

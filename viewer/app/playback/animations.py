@@ -97,6 +97,7 @@ def choose_animation(state: AppState, index: int) -> None:
     for actor, (number, clip) in clips.items():
         _put_aside(state, actor)
         play_animation(actor, number, clip)
+    state.framing.extent.note_choice()
     state.clock.follow(chosen)
     state.clock.set_range(*state.clock.whole)
     if state.clock.has_motion:

@@ -52,7 +52,7 @@ def draw(state: AppState) -> None:
     if figure.blend_shapes is None or pose is None:
         offer_files(state, "This figure has no blend shapes: open a body model or a .morph file.")
         return
-    _draw_measures(figure, pose)
+    _draw_measures(state, figure, pose)
     varies = "shape" in figure.blend_shapes.groups
     if varies and button(state, "Random"):
         state.of(Posing).shape_seed += 1
@@ -83,13 +83,14 @@ def _draw_seed(state: AppState) -> None:
         random_shape(state)
 
 
-def _draw_measures(figure: Figure, pose: Pose) -> None:
+def _draw_measures(state: AppState, figure: Figure, pose: Pose) -> None:
     """Draw height, volume and mass of the shaped rest body."""
     rest = shaped(figure, pose.shape_weights)
     for name, value in _measured.get(rest, None, lambda: _measures(rest)):
         imgui.text_disabled(name)
         imgui.same_line(imgui.get_font_size() * 5)
-        imgui.text_unformatted(value)
+        imgui.text_wrapped(value)
+        note_item(state, f"measured {name}")
 
 
 def _measures(rest: Figure) -> tuple[tuple[str, str], ...]:

@@ -36,8 +36,8 @@ def change_drive(
 ) -> None:
     """Retarget the motion of the chosen actor, and those of all people of its capture.
 
-    Long motions are retargeted in the background. If retargeting fails or is cancelled, a message
-    is shown and nothing changes.
+    Long motions are retargeted in the background. If retargeting fails or is cancelled, or the
+    drive is changed meanwhile, as by redo, a message is shown and nothing changes.
 
     Parameters
     ----------
@@ -54,6 +54,7 @@ def change_drive(
     first, scene = state.actor, state.scene
     together = [actor for actor in scene.actors if _is_together(actor, first)]
     work = [(actor, change(actor.drive)) for actor in together if actor.drive is not None]
+    before = [actor.drive for actor, _ in work]
     changed: list[SampledClip] = []
 
     def act(report: Report) -> list[str]:
@@ -64,6 +65,9 @@ def change_drive(
 
     def finish() -> None:
         if state.scene is not scene:
+            return
+        if any(actor.drive is not old for (actor, _), old in zip(work, before, strict=True)):
+            state.say_status("Retargeting discarded: the motion was changed meanwhile")
             return
         for (actor, drive), clip in zip(work, changed, strict=True):
             rate = frame_rate(actor.clip) if actor.clip is not None else clip.timing.frame_rate

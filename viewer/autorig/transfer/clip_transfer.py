@@ -61,7 +61,7 @@ def transfer_clip(
         return replace(clip, channels=channels)
     if clip.n_joints != skeleton.n_joints:
         raise RigError(
-            f"clip {clip.name} has {clip.n_joints} joints, the figure has {skeleton.n_joints}"
+            f"clip {clip.name} has {clip.n_joints} joints, but the figure has {skeleton.n_joints}"
         )
     places, scales, moves = clip.figure_translations, clip.figure_scales, clip.translations
     return replace(
@@ -77,7 +77,7 @@ def _scaled(channel: Channel, skeleton: Skeleton, factors: Floats) -> Channel:
     """Scale a curve of lengths: its values, and its numeric slopes."""
     if channel.target >= skeleton.n_dofs:
         raise RigError(
-            f"a channel moves DOF {channel.target}, the figure has {skeleton.n_dofs} DOFs"
+            f"a channel moves DOF {channel.target}, but the figure has {skeleton.n_dofs} DOFs"
         )
     if skeleton.dof_kinds[channel.target] >= FIRST_ROTATION:
         return channel

@@ -74,7 +74,7 @@ def surface_shifts(
 
 
 def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
-    """Return a regressor of joint positions: b_v = w_vj w_v,parent, on vertices of both joints.
+    """Return a regressor of joint positions: b_v = w_vj w_v,parent, where both joints have weight.
 
     A root uses the boundary with its children. Rows are not normalised; a joint without a boundary
     has an empty row.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import re
 import shutil
 import stat
 import zipfile
@@ -31,10 +32,10 @@ MOST_FILES = 5_000
 _ENCRYPTED = 0x41  # bits 0 and 6 of the flags
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EMFILE, errno.ENFILE)
 _DAMAGE = (*DAMAGE, NotImplementedError)
+_QUOTED = re.compile(r"""'.*'|".*\"""", re.DOTALL)  # names in messages
 # Parts of the messages of zipfile and zlib, and what they mean.
 _REASONS = {
     "not a zip file": "zip-end",
-    "eof": "zip-short",
     "truncated": "zip-short",
     "crc": "zip-checksum",
     "magic number": "zip-header",
@@ -165,5 +166,7 @@ def _reason(problem: Exception) -> str | Phrase:
     """Return what is wrong with an archive, without the terms of the library that reads it."""
     if isinstance(problem, OSError) and problem.strerror:
         return printable(problem.strerror, 100)
-    text = str(problem).lower()
+    if isinstance(problem, EOFError):  # it has no message
+        return Phrase("zip-short")
+    text = _QUOTED.sub("", str(problem)).lower()
     return Phrase(next((key for part, key in _REASONS.items() if part in text), "zip-data"))

@@ -48,7 +48,7 @@ class Display:
         now = time.monotonic()
         rate = (self._n_done - self._n_unchanged) / max(now - self._start, 1e-3)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
-        if not (self._order and sys.stdout.isatty()):  # the text uses the same terminal
+        if not (self._order and sys.stdout.isatty()):  # printed text would break the bar
             self._progress.title = f"{self._title}, {rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
         if not sys.stderr.isatty() and now > self._said + _MINUTE:
@@ -83,7 +83,7 @@ def _json_line(result: Result) -> str:
     found = {"name": result.item.name, "files": [*result.item.files], "status": result.status}
     try:
         content = json.loads(result.text)
-    except ValueError:  # it failed before it printed
+    except ValueError:  # the item failed before it printed anything
         content = None
     parts = {**found, "message": result.message, "content": content}
     return json.dumps(parts, allow_nan=False)

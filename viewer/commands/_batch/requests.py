@@ -104,7 +104,7 @@ def _memory(arguments: argparse.Namespace) -> int | None:
 
 
 def _suffix(arguments: argparse.Namespace, default: str) -> str:
-    """Return the suffix of the outputs in a folder; a template has its own."""
+    """Return the suffix of outputs in a folder, or "" if a template includes it."""
     given: str = getattr(arguments, "to", "")
     return given or ("" if "{" in (getattr(arguments, "output", None) or "") else default)
 

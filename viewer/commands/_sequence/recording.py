@@ -55,8 +55,8 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "--onion",
         type=int,
         metavar="N",
-        help="one image of N poses, each at its place, evenly spaced over the motion, with earlier "
-        "poses fainter",
+        help="one image of N poses, each at its position, evenly spaced over the motion, with "
+        "earlier poses fainter",
     )
     group.add_argument(
         "--speed",

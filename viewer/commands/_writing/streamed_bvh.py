@@ -17,6 +17,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, OutputError, RigError, ViewerError
 from viewer.export import MotionOptions, animation_for
+from viewer.export._motion_paths import PERSON
 from viewer.formats import Source, detect
 from viewer.interrupts import raising
 from viewer.loading import Contents, MotionSettings, begin
@@ -73,7 +74,7 @@ def convert_streamed(
         return None
     first, stop = request.span
     options.world_up = request.up
-    moves = request.stream.moves_inner_joints
+    moves = request.stream.may_move_inner_joints
     animation = Parts(lambda: request.parts(options), stop - first, moves)
     try:
         with shown_progress("converting"), raising():
@@ -99,7 +100,8 @@ def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
     if arguments.kind not in (None, "bvh") or len(arguments.files) != 1:
         return False
     is_file = not is_stdout(output) and (output.is_file() or not output.exists())
-    return is_file and output.suffix.lower() == ".bvh" and "{frame" not in output.name
+    is_pattern = "{frame" in output.name or PERSON in output.name
+    return is_file and output.suffix.lower() == ".bvh" and not is_pattern
 
 
 @dataclass(frozen=True, slots=True, eq=False)

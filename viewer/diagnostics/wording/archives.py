@@ -75,7 +75,7 @@ MESSAGES = {
 }
 
 PHRASES = {
-    "zip-end": "its table of contents at the end is missing: incomplete, or no zip archive",
+    "zip-end": "its table of contents at the end is missing: incomplete, or not a zip archive",
     "zip-short": "its data ends too early",
     "zip-checksum": "a file in it differs from its checksum",
     "zip-header": "the headers of its files differ from its table of contents",
@@ -214,7 +214,7 @@ PHRASES = {
     "torch-magic": "expected a torch file, found a pickle of a different kind",
     "torch-protocol": "expected torch protocol {expected}, found a different one",
     # Arrays of joblib
-    "joblib-old": "expected arrays in the file, found {name}, which keeps them in other files: "
+    "joblib-old": "expected arrays in the file, found {name}, which stores them in separate files: "
     "load and save it again with joblib 0.10 or later",
     "joblib-wrapper": "expected a standard array description, found an unusual {name}",
     "joblib-dtype": "expected an array of numbers or strings, found {shape:axes} of {dtype}",

@@ -8,7 +8,7 @@ CODES = {
         "note", "error of a written file", "none if it is small; otherwise choose another format"
     ),
     "X003": Code("note", "data that is not written", "choose a format that can store it"),
-    "X004": Code("note", "missing frames of a written motion", "choose another --gaps"),
+    "X004": Code("note", "missing frames in a written motion", "choose another --gaps"),
     "X005": Code("note", "data that is written in a different form", "none if intentional"),
     "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
 }
@@ -37,7 +37,7 @@ MESSAGES = {
     "X001.texture": "its texture",
     "X001.one-mesh": "1 file, {first:text}{missing:+" + _MISSING,
     "X001.meshes": "{n} files, {first:text} to {last:text}{missing:+" + _MISSING,
-    "X001.no-meshes": "no person is present in these frames, nothing was written",
+    "X001.no-meshes": "no person is present in these frames: nothing was written",
     "X001.arrays": "{names:all}",
     "X001.motion-arrays": "{n:#frame} at {rate:g} fps{missing:+; {} of them missing, NaN}: "
     "{names:all}",
@@ -47,7 +47,7 @@ MESSAGES = {
     "X001.target-pose": "{n:#DOF}, the target's pose",
     "X001.skel": "{n:#joint}",
     "X001.skin": "{n:#vertex}",
-    "X001.rigged": "the figure with its rig, the target's pose, confidence",
+    "X001.rigged": "the figure with its rig, the target's pose and the confidence",
     "X001.amass": "{n:#frame} of {model} at {rate:g} fps, {up} up",
     "X001.easymocap": "{n:#frame} of {people:?1 person|{people} people}, {up} up; EasyMocap does "
     "not store the frame rate of {rate:g} fps",
@@ -65,7 +65,7 @@ MESSAGES = {
     "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
     "({})}, compared at {times:#time}{causes:+: {}}",
     # Omitted data
-    "X005.hidden-parts": "{n:#hidden part|is|are} written, too",
+    "X005.hidden-parts": "{n:#hidden part|is|are} also written",
     "X003.parts": "not stored in {format}: {parts:all}",
     "X003.clip-placement": "the placement of the whole figure is not part of its clip and is "
     "omitted",
@@ -74,7 +74,7 @@ MESSAGES = {
     "are omitted",
     "X003.clip-translations": ".anim translates only the root: translations of other joints, up to "
     "{length}, are omitted",
-    "X003.clip-shape": ".anim stores no shape: the weights of blend shapes are omitted",
+    "X003.clip-shape": ".anim cannot store a shape: blend shape weights are omitted",
     "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
     "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
     "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
@@ -89,13 +89,16 @@ MESSAGES = {
     "X003.absent-in-range": "{figure:text}: absent throughout the range, not exported",
     "X003.no-motion": "{figure:text}: no motion, not written",
     "X003.no-joints": "{figure:text}: no joints, not written",
+    "X003.json-numbers": "{n:#infinite or undefined number} of the original file {n:?is|are} "
+    "omitted, or 0 in lists: JSON cannot store {n:?it|them}",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
     "only the keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "
     "of the clip; viewer convert --bake-springs writes the simulated ones",
-    "X003.vrm-motions": "{n:#animation|is|are} not part of a VRM file: write motions as .glb",
-    "X003.vrm-pose": "the pose is not part of a VRM file, which has the rest pose",
+    "X003.vrm-motions": "{n:#animation|is|are} omitted: VRM files store no motion; "
+    "write motions as .glb",
+    "X003.vrm-pose": "the current pose is omitted: VRM files store the rest pose",
     "X003.vrm-lost": "references of the VRM file to parts that are not written: {parts:all}",
     "X003.vrm-upgrade": "{n:#member} of the VRM 0.x file {n:?has|have} no counterpart in VRM 1.0: "
     "{names:list8}",
@@ -106,8 +109,8 @@ MESSAGES = {
     "X003.of-figure": "{figure:text}: {remark}",
     "X003.idle-animations": "{n:#animation|has|have} no effect on what is written and "
     "{n:?is|are} omitted: {names:list}",
-    "X003.other-animations": "{n:#animation} not played {n:?is|are} omitted, because another "
-    "figure has sampled motion: {names:list8}",
+    "X003.other-animations": "{n:#animation} not played {n:?is|are} omitted, because all "
+    "figures share one sampled animation: {names:list8}",
     "X003.idle-shapes": "keys of {n:#blend shape} that {n:?changes|change} no vertex are omitted: "
     "{names:list}",
     "X003.camera-lenses": "glTF cannot store lens distortion, skew or principal points, which "
@@ -137,9 +140,9 @@ MESSAGES = {
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
-    "X005.as-smplx": "{figure:text} is not SMPL-X, which has another rest position of the pelvis "
-    "and different shape coefficients: for exact translations and shapes use --model with an "
-    "SMPL-X model",
+    "X005.as-smplx": "{figure:text} is not SMPL-X, which has a different rest position of the "
+    "pelvis and different shape coefficients: for exact translations and shapes use --model with "
+    "an SMPL-X model",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
@@ -223,15 +226,15 @@ PHRASES = {
     "scaled, as glTF requires",
     "weights-both": "weights of {n:#vertex} do not add up to 1 and weights of {negative:#vertex} "
     "are negative: omitted and the others scaled, as glTF requires",
-    "nonlinear-skinning": "{method} skinning is not supported, glTF uses linear blending",
+    "nonlinear-skinning": "{method} skinning is not supported: glTF uses linear blending",
     "unsupported-correctives": "pose correctives are not supported",
     "unsupported-shape-change": "the shape changes over time, which is not supported",
-    "single-precision": "the mesh is far from its origin for glTF's single precision",
+    "single-precision": "the mesh is too far from its origin for glTF's single precision",
     # Parts of a figure
     "part-blend-shapes": "{n:#blend shape}",
     "part-expressions": "{n:#expression} (combinations of morph targets, as in VRM)",
     "part-toon": "toon shading of {n:#material} (unlit in the file)",
-    "part-material-binds": "changes of materials by {n:#expression}",
+    "part-material-binds": "material changes by {n:#expression}",
     "part-humanoid": "the humanoid bone map",
     "part-vrm-meta": "authors and licence of the VRM character",
     "part-springs": "{n:#spring chain}",
@@ -245,7 +248,7 @@ PHRASES = {
     "part-reduced": "the reduced mesh",
     "part-regressor": "the joint regressor",
     "part-constraints": "{n:#constraint} (the joints have their rotations)",
-    "part-limits": "limits of joints",
+    "part-limits": "joint limits",
     "part-all-materials": "materials and textures",
     "part-materials": "material properties except one texture each",
     "part-occlusion": "occlusion maps",

@@ -31,7 +31,7 @@ MESSAGES = {
     "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
     "F007.vrma-look": "gaze direction is not shown",
     "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
-    "F007.vrm-materials": "changes of materials by expressions without effect: {names:list12}",
+    "F007.vrm-materials": "material changes by expressions have no effect: {names:list12}",
     # Containers and JSON
     "F002.glb-header": "expected a header of 12 bytes, found {found:#byte}",
     "F002.gltf-version": "expected glTF 2.0, found version {found}",
@@ -102,15 +102,15 @@ MESSAGES = {
     "G003.camera": "{problem}: default lens used",
     # Meshes
     "F002.gltf-vertices": "expected {expected:#element} as in POSITION, found {found}",
-    "F002.gltf-corner": "index {entry}: expected a vertex below {vertices}, found {found}",
+    "F002.gltf-corner": "index {entry}: expected a vertex index below {vertices}, found {found}",
     "F002.gltf-targets": "expected {expected:#morph target} as in the first primitive, found "
     "{found}",
     "F003.gltf-positions": "expected finite positions, found {n} non-finite ones (first: vertex "
     "{vertex})",
     "W003.gltf-weights": "expected finite weights, found {n} non-finite ones (first: {found} at "
     "vertex {vertex})",
-    "W010.gltf-joint": "vertex {vertex}: expected a joint below {joints} (skin {skin}), found "
-    "{found}",
+    "W010.gltf-joint": "vertex {vertex}: expected a joint index below {joints} (skin {skin}), "
+    "found {found}",
     "G002.finite": "{n:#vertex} with non-finite values (first: vertex {vertex}): set to 0",
     "G002.no-primitives": "mesh without primitives",
     "G002.no-positions": "no POSITION: not drawn",

@@ -74,9 +74,9 @@ MESSAGES = {
     f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}: {_MOVED}",
     "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
     "X006.no-legs": "{figure:text}: feet not held, since no legs were found by joint name",
-    "X006.grounded": "{figure:text}: {way} by {height}: its feet rest at height 0",
-    "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never rest clearly, their "
-    "lowest positions are at height 0",
+    "X006.grounded": "{figure:text}: {way} by {height}, so that its feet rest at height 0",
+    "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never clearly rest, so "
+    "their lowest positions are at height 0",
     "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh and "
     "no joints of known names",
     "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",

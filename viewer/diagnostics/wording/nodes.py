@@ -8,7 +8,7 @@ MESSAGES = {
     "vertex} along the edges",
     "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
-    "F007.skinning-method": "skins {names:list} require another skinning method: select it "
+    "F007.skinning-method": "skins {names:list} require a different skinning method: select it "
     "with --method {method}",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
     "W001.divided": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "

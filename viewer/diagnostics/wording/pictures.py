@@ -11,7 +11,7 @@ MESSAGES = {
     "F001.video-cameras": "expected a video with the name of one of the cameras ({names:list})",
     "F002.video": "unsupported or damaged video",
     "F002.video-picture": "expected a video, found a picture (--images takes a folder of pictures)",
-    "F002.video-stream": "expected a video, found a file without pictures",
+    "F002.video-stream": "expected a video, found a file without video frames",
     "F002.video-damaged": "damaged video at {seconds:.3f} s",
     "F007.assumed-camera": "the files have no camera: a focal length of {focal:.0f} pixels, the "
     "diagonal of {width} x {height}, is assumed",

@@ -34,8 +34,8 @@ MESSAGES = {
 
 PHRASES = {
     "repeated-name": "{name:quoted} ({n})",
-    "beyond-limits": "{dof:text} is {value}{when}, its limits are {low} and {high}",
-    "below-minimum": "{dof:text} is {value}{when}, its minimum is {low}",
-    "above-maximum": "{dof:text} is {value}{when}, its maximum is {high}",
+    "beyond-limits": "{dof:text} is {value}{when}; its limits are {low} and {high}",
+    "below-minimum": "{dof:text} is {value}{when}; its minimum is {low}",
+    "above-maximum": "{dof:text} is {value}{when}; its maximum is {high}",
     "in-frame": " in frame {frame} at {time:z.3f} s",
 }

@@ -14,10 +14,10 @@ CODES = {
     "W005": Code("error", "island without weights", "bind it rigidly to one joint"),
     "W006": Code("note", "joints without influence", "none if they are helpers"),
     "W007": Code(
-        "note", "more than 4 influences", "prune and normalise for engines that support 4"
+        "note", "more than 4 influences", "prune and normalise for engines that support only 4"
     ),
     "W008": Code(
-        "note", "more than 8 influences", "prune and normalise for engines that support 8"
+        "note", "more than 8 influences", "prune and normalise for engines that support only 8"
     ),
     "W009": Code("note", "duplicate influences", "merge them"),
     "W010": Code(

@@ -1,4 +1,4 @@
-"""Part-by-part export of long motions to ``.bvh``, in memory that does not depend on their length.
+"""Part-by-part export of long motions to ``.bvh``, with memory use independent of their length.
 
 The file and the notes are those of ``viewer.export.bvh.export_animation``.
 """
@@ -52,13 +52,14 @@ class Parts:
         and shape are the same in all frames.
     n_frames : int
         Number of all frames, N.
-    moves_inner_joints : bool
-        Whether a joint with a parent is translated.
+    may_move_inner_joints : bool
+        Whether a joint with a parent may be translated in the file; several roots get a common
+        parent.
     """
 
     parts: Callable[[], Iterator[SampledAnimation]]
     n_frames: int
-    moves_inner_joints: bool
+    may_move_inner_joints: bool
 
 
 def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[Diagnostic]:
@@ -113,7 +114,7 @@ class _Stream:
         ends = ends_of(self.first, figure, space, 0)
         self.writer = Writer(self.first, figure, body, ends, space, options)
         self._names = self.writer.names[-self.first.figure.require_skeleton().n_joints :]
-        self._read: SkeletonMotion | None = None  # the written joints
+        self._read: SkeletonMotion | None = None  # joints read back from the file
         self.losses = JointLosses(options.skinning, animation.n_frames)
 
     def _measure(self, n_first: int) -> None:
@@ -124,7 +125,7 @@ class _Stream:
             with np.errstate(invalid="ignore", over="ignore"):
                 self._channels(part)
             done += part.frames.n_frames
-            if not self._animation.moves_inner_joints:
+            if not self._animation.may_move_inner_joints:
                 return
 
     def _channels(self, part: SampledAnimation) -> tuple[Floats, Floats]:

@@ -6,6 +6,7 @@ Specification: Khronos Group, ``registry.khronos.org/glTF/specs/2.0``.
 from __future__ import annotations
 
 import json
+import math
 import struct
 from typing import Any
 from urllib.parse import quote
@@ -41,11 +42,14 @@ class Document:
         The JSON.
     extras : list of (str, Any)
         Name and application data of each figure whose file has some.
+    n_omitted : int
+        Number of infinite and NaN values of the original files that ``glb`` or ``pair`` omitted.
     """
 
     def __init__(self, name: str) -> None:
         self.root: dict[str, Any] = {"asset": {"version": "2.0", "generator": "viewer"}}
         self.extras: list[tuple[str, Any]] = []
+        self.n_omitted = 0
         self._name = name
         self._parts: list[bytes] = []
         self._size = 0
@@ -165,8 +169,11 @@ class Document:
 
     def _json(self, buffer: dict[str, Any]) -> bytes:
         whole = {**self.root, "buffers": [buffer]} if self._parts else self.root
-        text = json.dumps(whole, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-        return text.encode()
+        try:
+            return _text(whole)
+        except ValueError:
+            whole, self.n_omitted = _finite(whole)
+            return _text(whole)
 
     def _view(self, data: bytes, target: int) -> int:
         view = {"buffer": 0, "byteOffset": self._size, "byteLength": len(data)}
@@ -188,6 +195,29 @@ class Document:
                 f"{self._name}: expected numbers that fit glTF's single precision, found {worst:g}"
             )
         return single
+
+
+def _text(value: Any) -> bytes:
+    """Return JSON; raise ValueError if a number is infinite or NaN."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
+    return text.encode()
+
+
+def _finite(value: Any) -> tuple[Any, int]:
+    """Return a value without infinite and NaN members, which are 0 in lists, and their number."""
+    if isinstance(value, dict):
+        found = {key: _finite(each) for key, each in value.items() if not _is_odd(each)}
+        own = len(value) - len(found)
+        parts = found.values()
+        return {key: each for key, (each, _) in found.items()}, own + sum(n for _, n in parts)
+    if isinstance(value, list | tuple):
+        rows = [(0.0, 1) if _is_odd(each) else _finite(each) for each in value]
+        return [each for each, _ in rows], sum(n for _, n in rows)
+    return value, 0
+
+
+def _is_odd(value: Any) -> bool:
+    return isinstance(value, float) and not math.isfinite(value)
 
 
 def text_of(name: str) -> str:

@@ -146,7 +146,7 @@ def _check(animation: SampledAnimation, options: MotionOptions) -> None:
             one = "one of " * (len(list(filter(None, known))) > 1)
             raise RigError(f'{what} of glTF: expected {one}{listed}, found "{value}"')
     if not animation.frames.present.any():
-        raise RigError(f"{animation.name}: every frame is missing: there is nothing to write")
+        raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
 
 
 def add_sampled(

@@ -18,6 +18,7 @@ from viewer.export._vrm.upgraded_springs import upgraded_springs, with_ends
 from viewer.export._vrm.upgraded_toon import upgraded_toon
 from viewer.formats._vrm.bones import modern_bone
 from viewer.formats._vrm.json_parts import listed, part
+from viewer.formats._vrm.numbers import rows_of
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 
@@ -41,7 +42,7 @@ def upgraded(
 ) -> tuple[Figure, VrmRecord, list[str]]:
     """Return a figure that faces +z and has an end joint for each spring chain, and its record.
 
-    ``record``: of a VRM 0.x file.
+    ``record``: record of a VRM 0.x file.
     ``bones``: joint of each human bone.
     Also returns the members without a counterpart in VRM 1.0.
     """
@@ -66,7 +67,7 @@ def upgraded(
 
 
 def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
-    """Return the human bones; Unity's settings of muscles have no counterpart."""
+    """Return the human bones; Unity's muscle settings have no counterpart."""
     bones: dict[str, Any] = {}
     for each in listed(data, "humanoid", "humanBones"):
         bone = part(each, "bone")
@@ -82,7 +83,7 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
 
 
 def _views(data: Any, record: VrmRecord) -> list[Any]:
-    """Return annotations of nodes, made from those of meshes."""
+    """Return annotations of nodes, converted from annotations of meshes."""
     found = []
     for each in listed(data, "firstPerson", "meshAnnotations"):
         view = _VIEWS.get(str(part(each, "firstPersonFlag")).lower(), "auto")
@@ -100,8 +101,11 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
     gaze: dict[str, Any] = {"type": "bone" if is_bone else "expression"}
     offset = first.get("firstPersonBoneOffset")
     if isinstance(offset, dict):
-        x, y, z = (offset.get(axis, 0.0) for axis in "xyz")
-        gaze["offsetFromHeadBone"] = [x, y, 0.0 - z]
+        place = rows_of([offset.get(axis) or 0.0 for axis in "xyz"], (0.0, 0.0, 0.0))
+        if place is None:
+            lost.append("firstPerson.firstPersonBoneOffset")
+        else:
+            gaze["offsetFromHeadBone"] = (place * (1.0, 1.0, -1.0) + 0.0).tolist()
     for name in _RANGES:
         given = first.get(f"lookAt{name}")
         if not isinstance(given, dict):

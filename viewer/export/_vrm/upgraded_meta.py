@@ -1,4 +1,4 @@
-"""Meta data of VRM 0.x as that of VRM 1.0, without more permissions than the file grants."""
+"""Conversion of VRM 0.x meta data to VRM 1.0; no permission exceeds those that the file grants."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def upgraded_meta(data: Any, record: VrmRecord, name: str, lost: list[str]) -> d
     """Return the meta data; permissions that version 0.x does not have keep their defaults.
 
     ``data``: meta data of version 0.x.
-    ``record``: that of the file, whose textures include the thumbnail.
+    ``record``: record of the file, whose textures include the thumbnail.
     ``name``: used if the meta data has none.
     ``lost``: extended by the members without a counterpart.
     """

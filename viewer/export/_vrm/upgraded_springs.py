@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._vrm.json_parts import is_index, listed, part
+from viewer.formats._vrm.numbers import rows_of, value_of
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
@@ -97,21 +98,26 @@ def upgraded_springs(
 
     ``data``: ``secondaryAnimation``.
     ``figure``, ``record``: from ``with_ends``.
-    ``lost``: extended by the chains whose first joint the figure does not have.
+    ``lost``: extended by the chains whose first joint the figure does not have, and by groups and
+    colliders with invalid numbers.
     """
     parents = figure.require_skeleton().parents
     children = _children(record.joints, parents)
     nodes = {joint: node for node, joint in record.joints.items()}
-    colliders, groups, places = _colliders(data)
+    colliders, groups, places = _colliders(data, lost)
     springs = []
-    for group in listed(data, "boneGroups"):
+    for index, group in enumerate(listed(data, "boneGroups")):
+        swing = _swing(group)
+        if swing is None:
+            lost.append(f"secondaryAnimation.boneGroups[{index}]")
+            continue
         shared = _shared(group, places, len(listed(data, "colliderGroups")))
         for bone in listed(group, "bones"):
             if not isinstance(bone, int) or bone not in record.joints:
                 lost.append(f"secondaryAnimation.boneGroups.bones {bone}")
                 continue
             for path in _paths(record.joints[bone], children):
-                rows = [{"node": nodes[joint], **_swing(group)} for joint in path[:-1]]
+                rows = [{"node": nodes[joint], **swing} for joint in path[:-1]]
                 if rows:
                     joints = [*rows, {"node": nodes[path[-1]]}]
                     springs.append({**shared, "joints": joints})
@@ -130,24 +136,37 @@ def _shared(group: Any, places: Mapping[int, int], count: int) -> dict[str, Any]
     return {**found, "colliderGroups": [places[n] for n in used]} if used else found
 
 
-def _swing(group: Any) -> dict[str, Any]:
-    """Return the parameters of a joint; gravity is rotated with the character."""
-    direction = part(group, "gravityDir")
-    x, y, z = (part(direction or _DOWN, axis) or 0.0 for axis in "xyz")
+def _swing(group: Any) -> dict[str, Any] | None:
+    """Return the parameters of a joint, with rotated gravity; None if a number is invalid."""
+    direction = _vector(part(group, "gravityDir") or _DOWN)
     names = {"stiffiness": "stiffness", "gravityPower": "gravityPower"}
     names |= {"dragForce": "dragForce", "hitRadius": "hitRadius"}
-    found = {new: part(group, old) or 0.0 for old, new in names.items()}
+    found = {new: value_of(part(group, old), 0.0) for old, new in names.items()}
+    if direction is None or None in found.values():
+        return None
+    x, y, z = direction
     return {**found, "gravityDir": [0.0 - x, y, z]}
 
 
-def _colliders(data: Any) -> tuple[list[Any], list[Any], dict[int, int]]:
+def _vector(told: Any) -> list[float] | None:
+    """Return a vector, in which missing numbers are 0; None if a number is invalid."""
+    found = rows_of([part(told, axis) or 0.0 for axis in "xyz"], (0.0, 0.0, 0.0))
+    return None if found is None else found.tolist()
+
+
+def _colliders(data: Any, lost: list[str]) -> tuple[list[Any], list[Any], dict[int, int]]:
     """Return the colliders, their groups, and the new place of each group that is not empty."""
     colliders, groups, places = list[Any](), list[Any](), dict[int, int]()
     for index, each in enumerate(listed(data, "colliderGroups")):
         own = []
-        for sphere in listed(each, "colliders"):
-            x, y, z = (part(sphere, "offset", axis) or 0.0 for axis in "xyz")
-            shape = {"sphere": {"offset": [x, y, 0.0 - z], "radius": part(sphere, "radius") or 0.0}}
+        for number, sphere in enumerate(listed(each, "colliders")):
+            offset = _vector(part(sphere, "offset"))
+            radius = value_of(part(sphere, "radius"), 0.0)
+            if offset is None or radius is None:
+                lost.append(f"secondaryAnimation.colliderGroups[{index}].colliders[{number}]")
+                continue
+            x, y, z = offset
+            shape = {"sphere": {"offset": [x, y, 0.0 - z], "radius": radius}}
             own.append(len(colliders))
             colliders.append({"node": part(each, "node"), "shape": shape})
         if own:

@@ -1,4 +1,4 @@
-"""Part-by-part reading of long ``.bvh`` files, in memory that does not depend on their length.
+"""Part-by-part reading of long ``.bvh`` files, with memory use independent of their length.
 
 A file can be streamed if it is regular: the number of frames is declared, each frame has its own
 line, and there is nothing to report about the frames. Any other file must be read as a whole by
@@ -76,8 +76,10 @@ class BvhStream:
         return self.motion.clip.timing.n_frames
 
     @property
-    def moves_inner_joints(self) -> bool:
-        """Whether a joint with a parent has position channels."""
+    def may_move_inner_joints(self) -> bool:
+        """Whether a joint other than a single root has position channels."""
+        if self.table.parents.count(-1) > 1:
+            return bool(self.table.moves)
         return bool(inner_moves(self.table))
 
     def clips(self, first: int, stop: int) -> Iterator[SampledClip]:

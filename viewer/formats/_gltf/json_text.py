@@ -16,7 +16,7 @@ __all__ = ["parsed"]
 _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of spaces
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_BYTES = 512 << 20  # maximum size of the text; parsing takes three times as much memory
-_THOROUGH = 1 << 20  # bytes up to which texts are always searched for repeated keys
+_THOROUGH = 1 << 20  # size in bytes up to which a text is always searched for repeated keys
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 

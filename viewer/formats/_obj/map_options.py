@@ -76,9 +76,9 @@ def map_options(text: str) -> MapOptions:
 
 
 def _first_word(text: str) -> tuple[str, str]:
-    """Return the text up to the first blank, and what follows the blanks."""
-    word, *behind = text.split(None, 1)
-    return word, behind[0] if behind else ""
+    """Return the text up to the first blank, and what follows the blanks; both may be empty."""
+    word, behind = [*text.split(None, 1), "", ""][:2]
+    return word, behind
 
 
 def _vector(found: dict[str, list[str]], option: str) -> tuple[float, float]:

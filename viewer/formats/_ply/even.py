@@ -86,7 +86,7 @@ def even_binary(
 
 def _compact(values: NDArray[np.float64]) -> Numbers:
     """Return whole numbers as int32, of half the size, and others unchanged."""
-    if not (len(values) and values.min() > -_WHOLE and values.max() < _WHOLE):
+    if not (values.size and values.min() > -_WHOLE and values.max() < _WHOLE):
         return values
     whole = values.astype(np.int32)
     return whole if (whole == values).all() else values

@@ -50,7 +50,7 @@ _PARAMETERS = (
 )
 _MODEL = ("mhr_model_params", "shape_params", "expr_params")
 _MOST_POINTS = 4_000_000  # maximum number of points of a person in all frames: 128 MB
-_COST = 10  # number of frames that take about as long to read as one person takes to inspect
+_COST = 10  # number of frames whose reading takes about as long as the inspection of one person
 _LOOKED_AT = 1000  # number of frames or people of which at least one must be recognised
 _SUFFIXES = (".npz", ".pkl")
 
@@ -124,7 +124,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
 
 
 def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
-    """Return values with a first axis of frames."""
+    """Return values with the frames as first axis."""
     return values if lead else values[None]
 
 

@@ -56,7 +56,8 @@ def old_binds(told: Any, materials: list[Any]) -> tuple[list[Bind], list[str]]:
         name, value = part(each, "propertyName"), rows_of(part(each, "targetValue"), (0.0,) * 4)
         named = part(each, "materialName")
         owners = [n for n, material in enumerate(materials) if part(material, "name") == named]
-        if value is None or not owners or (name not in _COLORS and name not in _AXES):
+        is_known = isinstance(name, str) and (name in _COLORS or name in _AXES)
+        if value is None or not owners or not is_known:
             lost.append(f"{named} {name}")
             continue
         for owner in owners:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -19,12 +18,14 @@ def value_of(told: Any, default: float) -> float | None:
 
     >>> value_of(None, 2.0), value_of(1, 2.0), value_of("a", 2.0)
     (2.0, 1.0, None)
+    >>> value_of(10**400, 2.0), value_of(float("nan"), 2.0)
+    (None, None)
     """
     if told is None:
         return default
     is_number = isinstance(told, int | float) and not isinstance(told, bool)
     # Numbers far outside a plausible range would overflow in products.
-    return float(told) if is_number and math.isfinite(told) and abs(told) < _LARGEST else None
+    return float(told) if is_number and abs(told) < _LARGEST else None
 
 
 def rows_of(told: Any, default: tuple[float, ...]) -> Floats | None:

@@ -11,8 +11,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from viewer.formats._nodes.content import NodeExpression, NodeFile
 from viewer.formats._nodes.surfaces import part_name
 from viewer.formats._source import Source
@@ -21,6 +19,7 @@ from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, listed, part
 from viewer.formats._vrm.material_values import modern_binds, old_binds
+from viewer.formats._vrm.numbers import value_of
 from viewer.formats._vrm.references import named_nodes
 from viewer.formats._vrm.springs import read_springs
 from viewer.rig.expressions import OVERRIDES, PROCEDURAL
@@ -171,7 +170,8 @@ def _binds(
     """Return node, morph target and weight of each bind of an expression."""
     binds: list[tuple[int, int, float]] = []
     for each in listed(told, "binds" if version == 0 else "morphTargetBinds"):
-        index, weight = part(each, "index"), part(each, "weight")
+        index, told_weight = part(each, "index"), part(each, "weight")
+        weight = None if told_weight is None else value_of(told_weight, 0.0)
         if version == 0:
             mesh, scale = part(each, "mesh"), 1.0 / _PERCENT
             is_mesh = is_index(mesh, len(file.meshes))
@@ -179,12 +179,11 @@ def _binds(
         else:
             node, scale = part(each, "node"), 1.0
             nodes = [node] if is_index(node, file.tree.n_nodes) else []
-        is_number = isinstance(weight, int | float) and bool(np.isfinite(weight))
         valid = [node for node in nodes if _has_target(file, node, index)]
-        if not valid or not is_number:
+        if not valid or weight is None:
             source.warn("G006.bind", pointer, found=index)
             continue
-        binds += [(node, index, float(weight) * scale) for node in valid]
+        binds += [(node, index, weight * scale) for node in valid]
     return tuple(binds)
 
 

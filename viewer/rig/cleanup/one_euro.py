@@ -43,7 +43,7 @@ class OneEuro:
     speed_cutoff: float = 1.0
 
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
-        """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
+        """Return filtered unit quaternions (N, ..., 4) of frames at ``rate`` per second."""
         count = self._settling(rate)
         longer, inner = _continued(continuous(quaternions), count, _opposite_rotations)
         once = self._turned(longer, rate)

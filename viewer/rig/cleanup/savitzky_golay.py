@@ -48,7 +48,7 @@ class SavitzkyGolay:
         return window if window > self.order else 0
 
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
-        """Return filtered unit quaternions (N, ..., 4) of N frames at a rate per second."""
+        """Return filtered unit quaternions (N, ..., 4) of frames at ``rate`` per second."""
         known = continuous(quaternions)
         found = known
         for _ in range(_PASSES):

@@ -19,7 +19,7 @@ class Filter(Protocol):
     """A filter of consecutive frames."""
 
     def rotations(self, quaternions: Floats, rate: float) -> Floats:
-        """Return filtered unit quaternions (N, J, 4) of N frames at a rate per second."""
+        """Return filtered unit quaternions (N, J, 4) of N frames at ``rate`` frames per second."""
 
     def positions(self, positions: Floats, rate: float, metres: float) -> Floats:
         """Return filtered positions (N, J, 3); ``metres`` is the length of their unit."""

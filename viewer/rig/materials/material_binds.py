@@ -24,6 +24,8 @@ COLOR_KINDS = (
 TRANSFORM = "transform"
 """Kind of the placement of all textures of a material, except its matcap."""
 
+_STRAIGHT = 1e-9  # sine of the largest angle of a transform without rotation
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MaterialBinds:
@@ -140,6 +142,9 @@ def _placed(texture: Texture, moves: list[tuple[float, Floats]]) -> Texture:
     (a, b), (c, d) = (matrix[0, 0], -matrix[0, 1]), (-matrix[1, 0], matrix[1, 1])
     linear, scale = np.array([[a, b], [c, d]]), np.hypot([a, b], [c, d])
     scale[1] *= -1.0 if a * d - b * c < 0.0 else 1.0
+    if max(abs(b), abs(c)) <= _STRAIGHT * np.abs(scale).max():
+        # A negative scale along u would be a rotation by 180 degrees, too.
+        scale = np.array([a, d])
     rotation = linear / scale if scale.all() else np.eye(2)
     start = np.array([*scale, matrix[0, 2] - b, 1.0 - d - matrix[1, 2]])
     found = start.copy()

@@ -215,7 +215,7 @@ def frames_of(
         return _constrained(figure, _transform_frames(skeleton, motion, times, pose))
     if motion.n_joints != skeleton.n_joints:
         raise RigError(
-            f"clip {motion.name} has {motion.n_joints} joints, figure {figure.name} has "
+            f"clip {motion.name} has {motion.n_joints} joints, but figure {figure.name} has "
             f"{skeleton.n_joints}"
         )
     rows, count = sample_rows(motion, times, interpolate), len(times)

@@ -33,7 +33,7 @@ def dof_value_text(skeleton: Skeleton, dof: int, value: float, digits: int = 1) 
 
 
 def beyond_text(skeleton: Skeleton, dof: int, value: float, when: Phrase | str = "") -> Phrase:
-    """Return a message for a DOF beyond its limits: ``"a.x is 0.0°, its limits are …"``.
+    """Return a message for a DOF beyond its limits: ``"a.x is 0.0°; its limits are …"``.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ from viewer.rig.skeleton import FIRST_ROTATION, Skeleton
 __all__ = ["RotationFit", "nearest_dofs", "rotates_freely", "rotation_dofs"]
 
 _SWEEPS = 200
-_STILL = 1e-10  # largest change in radians of the last sweep
+_STILL = 1e-10  # largest change in the last sweep, radians
 _ROUNDING = 1e-9  # tolerance in radians for a value that exceeds its limit
 _TURN = 2.0 * math.pi
 

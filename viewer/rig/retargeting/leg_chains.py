@@ -56,7 +56,7 @@ def animal_legs(parents: Ints, points: Floats, up: Floats) -> list[Leg]:
 
 
 def _in_one_leg(parents: Ints, flat: Floats, is_foot: Bools) -> Bools:
-    """Return the joints below which all ends are toes of one foot: (J,)."""
+    """Return the joints whose chains all end in toes of the same foot: (J,)."""
     low = np.where(is_foot[:, None], flat, np.inf)
     high = np.where(is_foot[:, None], flat, -np.inf)
     for joint in range(len(parents) - 1, -1, -1):
