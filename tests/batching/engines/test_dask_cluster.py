@@ -15,6 +15,7 @@ from tests.batching.batch_jobs import add_numbers, write_numbers
 from tests.batching.engines.cluster_jobs import Careful, Job, Missing, items
 from viewer.batching.engines import Limits
 from viewer.errors import ViewerError
+from viewer.media.unfinished import temporary_prefix
 from viewer.version import VERSION
 
 pytest.importorskip("distributed")
@@ -106,7 +107,7 @@ def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path) -> 
             for name in leftovers:
                 (tmp_path / name).touch()
 
-    leftovers = [f".{index}.abcd0123" for index in range(600)]
+    leftovers = [f"{temporary_prefix(str(index))}abcd0123" for index in range(600)]
     found = finished(Careful(seconds=0.005), some, Limits(2, cluster=cluster), kill)
     failed = {n: one.message for n, one in found.items() if one.status != "done"}
     assert failed == {590: f"{some[590].output}: already exists (--force replaces it)"}
