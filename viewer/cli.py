@@ -15,7 +15,7 @@ import viewer
 from viewer.commands import COMMANDS
 from viewer.commands._usage import Parser, check_command, command_parser
 from viewer.errors import FormatError, ViewerError
-from viewer.interrupts import Interrupted, watched
+from viewer.interrupts import Interrupted, deferred, watched
 from viewer.phrases import printable
 from viewer.streams import standard_streams
 
@@ -101,7 +101,9 @@ def _dispatch(arguments: list[str]) -> int:
     end = arguments.index("--") if "--" in arguments else len(arguments)
     before_end = protect_numbers(arguments[:end])
     parser.check_options(before_end)
-    parsed = parser.parse_intermixed_args(before_end)
+    with deferred():
+        # argparse restores its actions at the end, which fails if a signal ended the beginning.
+        parsed = parser.parse_intermixed_args(before_end)
     if arguments[end + 1 :]:
         parsed.files = [*getattr(parsed, "files", []), *arguments[end + 1 :]]
     command = import_module(f"viewer.commands.{name}")

@@ -276,8 +276,9 @@ def test_resumption_removes_temporary_files_of_killed_runs(rigs):
     assert run(command) == 0
     (rigs / "out/a/one.bvh").unlink()
     # After SIGKILL, there are an unfinished file of an output, and files of other programs.
-    left = rigs / "out/a/.one.bvh.a1_b2c3d"
-    others = [rigs / "out/a" / name for name in (".one.bvh", ".two.bvh.a1_b2c3d", "one.a1_b2c3d")]
+    left = rigs / "out/a/.one.bvh.tmpa1_b2c3d"
+    names = ".one.bvh", ".one.bvh.a1_b2c3d", ".two.bvh.tmpa1_b2c3d", "one.tmpa1_b2c3d"
+    others = [rigs / "out/a" / name for name in names]
     for path in (left, *others):
         path.write_text("x")
     assert run([*command, "--resume"]) == 0
