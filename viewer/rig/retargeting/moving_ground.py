@@ -31,18 +31,7 @@ def ground_velocity(
 ) -> Floats | None:
     """Return the velocity of the ground, (3,) per second; None if it does not move.
 
-    Parameters
-    ----------
-    feet : sequence of FootPath
-        The feet.
-    spans : sequence of (int, int)
-        Ranges of rows without gaps.
-    rate : float
-        Rows per second.
-    size : float
-        Approximate height of the body.
-    up : (3,)
-        The up axis.
+    The parameters are those of ``foot_contacts``.
     """
     speeds, body = _speeds(feet, spans, rate, up)
     if not len(speeds):
