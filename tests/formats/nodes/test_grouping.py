@@ -1,6 +1,7 @@
 """Division of node files into figures, and the names of figures and parts."""
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -49,6 +50,18 @@ def test_independent_characters_and_remaining_meshes_are_separate_figures():
     assert villain.skeleton.names == ("villain", "hip", "hat")
     assert villain.mesh.parts == ("hat", "skin")
     assert rest.mesh.parts == ("chair",)
+
+
+def test_skins_name_figures_whose_topmost_node_is_a_joint():
+    tree = tree_of(
+        {"name": "root"},
+        {"name": "skin", "mesh": 0, "skin": 0},
+        {"name": "hip"},
+        {"name": "skin", "mesh": 0, "skin": 1},
+    )
+    skins = replace(skin([0], 3), name="fox"), replace(skin([2], 4), name="")
+    file = file_of(tree, meshes=(mesh(triangle(1, 1)),), skins=skins)
+    assert [figure.name for figure in group_of(file).figures] == ["fox", "hip"]
 
 
 def test_nested_skins_are_one_figure_named_after_the_file():

@@ -31,7 +31,8 @@ class Members:
     meshes : list of int
         Nodes whose meshes are parts of the figure, in tree order.
     name : str
-        Name of the topmost node that is not in another figure; empty for the only figure of a file.
+        Name of the topmost node that is not in another figure, or of the skin of which this node is
+        a joint; empty for the only figure of a file.
     """
 
     nodes: list[int] = field(default_factory=list)
@@ -243,7 +244,11 @@ class _Grouping:
         return nodes[first:]
 
     def _name(self, figures: list[Members]) -> None:
-        """Name each of several figures after its topmost node that is not in another figure."""
+        """Name each of several figures after its topmost node that is not in another figure.
+
+        If this node is a joint of a skin, the skin's name is used instead: exporters store the
+        figure's name there, and joints have names such as ``root``.
+        """
         if len(figures) < 2:
             return
         counts: dict[int, int] = {}
@@ -252,8 +257,10 @@ class _Grouping:
                 counts[node] = counts.get(node, 0) + 1
         for figure in figures:
             own = (n for n in self._with_ancestors(figure.nodes) if counts[n] == 1)
-            named = (self.tree.names[node] for node in own)
-            figure.name = next((name for name in named if name), "")
+            top = next((node for node in own if self.tree.names[node]), -1)
+            skins = (self.file.skins[number] for number in figure.skins)
+            of_skins = (skin.name for skin in skins if skin.name and top in skin.joints)
+            figure.name = next(of_skins, self.tree.names[top] if top >= 0 else "")
 
 
 def _roots(tree: NodeTree) -> Ints:
