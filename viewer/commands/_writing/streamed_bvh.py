@@ -44,9 +44,13 @@ _OTHERS = (
     "save_joint_map",
     "video",
     "images",
-    "model_path",
+    "hands",
+    "pose",
+    "shape",
+    "expression",
+    "dof",
+    "mirror",
 )
-_SINGLE = ("hands", "pose", "shape", "expression", "dof", "mirror")
 
 
 def convert_streamed(
@@ -90,7 +94,7 @@ def convert_streamed(
 
 def _is_streamable(arguments: argparse.Namespace, output: Path) -> bool:
     """Return whether the options can be applied to parts, and the output is a ``.bvh`` file."""
-    given = [name for name in (*_OTHERS, *_SINGLE) if getattr(arguments, name)]
+    given = [name for name in _OTHERS if getattr(arguments, name)]
     # Frame 0 and time 0 are values, too.
     given += [
         name for name in ("frame", "time", "model_path") if getattr(arguments, name) is not None
