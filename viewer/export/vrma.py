@@ -25,6 +25,7 @@ from viewer.export._vrm.standing import in_t_pose, standing, unit_rotation, vrm_
 from viewer.formats import save_bytes
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.evaluation import Frames, world_frames
@@ -102,7 +103,9 @@ def _fill(
         local = turns[bone]
         if above[bone]:
             local = np.swapaxes(turns[above[bone]], -1, -2) @ local
-        keys.add(nodes[bone], "rotation", _continuous(matrix_to_quaternion(local)), "VEC4")
+        quaternions = matrix_to_quaternion(local)
+        align_signs(quaternions)
+        keys.add(nodes[bone], "rotation", quaternions, "VEC4")
     keys.add(nodes["hips"], "translation", hips, "VEC3")
     extension: dict[str, Any] = {
         "specVersion": "1.0",
@@ -198,14 +201,6 @@ def _add_expressions(
         kind = "preset" if name in PRESETS else "custom"
         found.setdefault(kind, {})[text_of(name)] = {"node": node}
     return found
-
-
-def _continuous(rotations: Floats) -> Floats:
-    """Return quaternions (F, 4), each with the sign nearest to the previous one."""
-    cosines = np.einsum("fa,fa->f", rotations[1:], rotations[:-1])
-    signs = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0))
-    rotations[1:] *= signs[:, None]
-    return rotations
 
 
 class _Keys:

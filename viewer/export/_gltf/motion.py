@@ -9,6 +9,7 @@ import numpy as np
 from viewer.export._gltf.document import Document, text_of
 from viewer.export._gltf.nodes import Locals, Tree
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.skeleton import Skeleton
 
@@ -129,7 +130,5 @@ class _Keys:
 def _continuous(rotations: Floats) -> Floats:
     """Return unit quaternions, each with the sign nearest to the previous one: (F, J, 4)."""
     units = rotations / np.linalg.norm(rotations, axis=-1, keepdims=True)
-    cosines = np.einsum("fja,fja->fj", units[1:], units[:-1])
-    sides = np.cumprod(np.where(cosines < 0.0, -1.0, 1.0), axis=0)
-    units[1:] *= sides[..., None]
+    align_signs(units)
     return units

@@ -11,6 +11,7 @@ from viewer.formats._neutral import held_rows
 from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.quaternion import align_signs
 
 __all__ = [
     "Table",
@@ -109,7 +110,7 @@ def rotations_of(table: Table, values: Floats) -> Floats:
                 _rotate(parts, axis, np.sin(half), np.cos(half))
             for number, part in enumerate(parts):
                 rotations[rows, joints, number] = part
-    _keep_signs(rotations)
+    align_signs(rotations)
     rotations.flags.writeable = False  # the clip can use a read-only array without a copy
     return rotations
 
@@ -120,14 +121,6 @@ def _rotate(parts: list[Floats], axis: int, sine: Floats, cosine: Floats) -> Non
     a, b, c, w = parts[axis], parts[other], parts[third], parts[3]
     parts[axis], parts[3] = a * cosine + w * sine, w * cosine - a * sine
     parts[other], parts[third] = b * cosine + c * sine, c * cosine - b * sine
-
-
-def _keep_signs(rotations: Floats) -> None:
-    """Replace q by -q, the same rotation, if that is nearer to the previous frame; in place."""
-    products = np.einsum("nja,nja->nj", rotations[1:], rotations[:-1])
-    turned = np.logical_xor.accumulate(products < 0.0, axis=0)
-    if turned.any():
-        rotations[1:][turned] *= -1.0
 
 
 def translations_of(source: Source, table: Table, values: Floats) -> Floats | None:

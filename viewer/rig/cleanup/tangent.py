@@ -5,17 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import conjugate, multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.quaternion import (
+    align_signs,
+    conjugate,
+    multiply,
+    rotation_vector_to_quaternion,
+)
 
 __all__ = ["continuous", "moved", "relative_vectors"]
 
 
 def continuous(quaternions: Floats) -> Floats:
     """Return quaternions (N, ..., 4) with signs such that consecutive ones are nearest."""
-    dots = np.einsum("n...a,n...a->n...", quaternions[1:], quaternions[:-1])
-    signs = np.ones(quaternions.shape[:-1])
-    signs[1:] = np.cumprod(np.where(dots < 0.0, -1.0, 1.0), axis=0)
-    return quaternions * signs[..., None]
+    result = quaternions.copy()
+    align_signs(result)
+    return result
 
 
 def relative_vectors(base: Floats, quaternions: Floats) -> Floats:

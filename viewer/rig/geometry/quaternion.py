@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 
-__all__ = ["conjugate", "multiply", "rotation_vector_to_quaternion", "slerp"]
+__all__ = ["align_signs", "conjugate", "multiply", "rotation_vector_to_quaternion", "slerp"]
 
 _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u to the last digit
 
@@ -31,6 +31,22 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
     # sinc is defined at 0: np.sinc(x) = sin(pi x) / (pi x).
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
+def align_signs(quaternions: Floats) -> None:
+    """Replace q by -q, the same rotation, where it is nearer to the previous row; in place.
+
+    ``quaternions``: (N, ..., 4), with the real part last or first.
+
+    >>> rows = np.array([[0.0, 0.0, 0.0, 1.0], [0.0, 0.0, 0.0, -1.0], [0.0, 0.0, 0.6, -0.8]])
+    >>> align_signs(rows)
+    >>> rows.tolist()
+    [[0.0, 0.0, 0.0, 1.0], [-0.0, -0.0, -0.0, 1.0], [-0.0, -0.0, -0.6, 0.8]]
+    """
+    products = np.einsum("n...a,n...a->n...", quaternions[1:], quaternions[:-1])
+    is_opposite = np.logical_xor.accumulate(products < 0.0, axis=0)
+    if is_opposite.any():
+        quaternions[1:][is_opposite] *= -1.0
 
 
 def conjugate(quaternions: Floats) -> Floats:

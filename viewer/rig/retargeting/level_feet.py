@@ -17,7 +17,12 @@ from viewer.rig.arrays import Floats
 from viewer.rig.cleanup.leg_ik import Leg
 from viewer.rig.cleanup.leg_solving import falling
 from viewer.rig.cleanup.smooth_curves import smooth_curves
-from viewer.rig.geometry.quaternion import conjugate, multiply, rotation_vector_to_quaternion
+from viewer.rig.geometry.quaternion import (
+    align_signs,
+    conjugate,
+    multiply,
+    rotation_vector_to_quaternion,
+)
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_legs import DrivenLegs
@@ -78,9 +83,8 @@ def _holds(plan: FootPlan, legs: Sequence[Leg]) -> tuple[Floats, Floats]:
 
 def _steadied(plan: FootPlan, rotations: Floats, holds: Floats) -> Floats:
     """Return rotations, (2, N, L, 4), smoothed over time where feet stand."""
-    signs = np.where((rotations[:, 1:] * rotations[:, :-1]).sum(axis=-1) < 0.0, -1.0, 1.0)
-    signs = np.concatenate([np.ones_like(signs[:, :1]), np.cumprod(signs, axis=1)], axis=1)
-    rotations = rotations * signs[..., None]
+    rotations = rotations.copy()
+    align_signs(rotations.swapaxes(0, 1))
     smooth, ones = np.empty_like(rotations), np.ones(holds.shape)
     for part in (0, 1):
         smooth[part] = _curves(plan, rotations[part], ones[part], _NOISE)

@@ -22,7 +22,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import conjugate, multiply
+from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -263,8 +263,7 @@ def _target_rotations(job: _Job, worlds: Floats) -> Floats:
         rest = matrix_to_quaternion(after @ target.rotations[joint])
         found[:, joint] = multiply(multiply(rotation, worlds[:, partner]), rest)
         local[:, joint] = multiply(conjugate(above), found[:, joint])
-    signs = np.einsum("nja,nja->nj", local[1:], local[:-1]) < 0.0
-    local[1:][np.logical_xor.accumulate(signs, axis=0)] *= -1.0
+    align_signs(local)
     return local
 
 
