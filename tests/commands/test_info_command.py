@@ -123,3 +123,21 @@ def test_vertices_and_bindings_of_skin_files_are_counted(
     assert (actor["mesh"]["vertices"], actor["mesh"]["triangles"]) == (vertices, triangles)
     assert sum(actor["skin"]["influence_histogram"].values()) == vertices
     assert actor["skin"]["weight_sums"] == pytest.approx([1.0, 1.0], abs=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("joints", "dofs_listed", "summary"),
+    [
+        (8, 24, "6 more are 0 and unlimited"),
+        (9, 0, "33 are unlimited"),
+    ],
+)
+def test_many_unlimited_dofs_are_only_counted(tmp_path, capsys, joints, dofs_listed, summary):
+    # A root whose six DOFs are 0, and below it ball joints that are each rotated about x, y and z.
+    text = "".join(f"balljoint j{n} {{ pose 0.1 0.2 0.3 }}\n" for n in range(joints))
+    path = tmp_path / "hand.skel"
+    path.write_text(f"balljoint root {{\n{text}}}\n")
+    assert run(["info", str(path)]) == 0
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    assert sum(line.startswith("j") for line in lines) == dofs_listed
+    assert f"{summary} (--json lists all)" in lines

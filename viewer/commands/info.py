@@ -34,6 +34,9 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "describe", "run"]
 
+# If more unlimited DOFs than this differ from 0, only their number is printed.
+MOST_FREE_DOFS = 24
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
@@ -274,24 +277,32 @@ def _vertices(count: int) -> str:
 
 
 def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
+    table = skeleton["dof_table"]
     lines = [
         f"  skeleton   {counted(skeleton['joints'], 'joint')}, {counted(skeleton['dofs'], 'DOF')} "
         f"({skeleton['limited_dofs']} limited, {skeleton['locked_dofs']} of them locked)"
     ]
-    for dof in skeleton["dof_table"]:
-        low, high = dof["minimum"], dof["maximum"]
-        if low is None and high is None and dof["value"] == 0.0:
-            continue
-        limits = "unlimited" if low is None and high is None else f"{_bound(low)} to {_bound(high)}"
-        if low is not None and low == high:
-            limits = "locked"
-        lines.append(
-            f"    {printable(dof['name']):<24} {number_text(dof['value'], '>10.6g')}  {limits}"
-        )
-    left_out = skeleton["dofs"] - (len(lines) - 1)
-    if left_out:
-        lines.append(f"    {left_out} more are 0 and unlimited (--json lists all)")
+    # The many ball joints of glTF, FBX and BVH would bury everything else.
+    too_many = sum(_is_free(dof) and dof["value"] != 0.0 for dof in table) > MOST_FREE_DOFS
+    listed_dofs = [dof for dof in table if not _is_free(dof) or (dof["value"] and not too_many)]
+    lines += [_dof_line(dof) for dof in listed_dofs]
+    if left_out := len(table) - len(listed_dofs):
+        more = "more " if listed_dofs else ""
+        kind = "unlimited" if too_many else "0 and unlimited"
+        lines.append(f"    {left_out} {more}are {kind} (--json lists all)")
     return lines
+
+
+def _is_free(dof: dict[str, Any]) -> bool:
+    return dof["minimum"] is None and dof["maximum"] is None
+
+
+def _dof_line(dof: dict[str, Any]) -> str:
+    low, high = dof["minimum"], dof["maximum"]
+    limits = "unlimited" if low is None and high is None else f"{_bound(low)} to {_bound(high)}"
+    if low is not None and low == high:
+        limits = "locked"
+    return f"    {printable(dof['name']):<24} {number_text(dof['value'], '>10.6g')}  {limits}"
 
 
 def _bound(value: float | None) -> str:
