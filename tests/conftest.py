@@ -103,6 +103,12 @@ def own_settings(tmp_path_factory, monkeypatch) -> None:
     monkeypatch.setenv("VIEWER_CACHE", "off")
 
 
+@pytest.fixture(autouse=True)
+def no_disk_waits(monkeypatch) -> None:
+    """Leave written data in memory: waiting for the disk takes 5 to 40 ms per file."""
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+
+
 @pytest.fixture
 def quick_fits(monkeypatch) -> None:
     """Align figures with an eighth of the usual points, which is much faster and nearly as good."""
