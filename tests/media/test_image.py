@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import threading
 import warnings
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from PIL import Image
 
 from viewer.errors import FormatError
 from viewer.media import image
-from viewer.media.image import decode_picture, decode_pictures
+from viewer.media.image import decode_picture, decode_pictures, decoding_pictures
 
 
 def png(pixels: np.ndarray) -> bytes:
@@ -39,6 +40,28 @@ def test_images_are_returned_in_order_with_errors_at_their_positions():
         else:
             assert (pixels == number).all() and pixels.shape == (2, 3, 4)
             assert not pixels.flags.writeable
+
+
+def test_large_images_are_decoded_while_the_caller_works(monkeypatch):
+    monkeypatch.setattr(image, "_FEW_BYTES", 0)
+    monkeypatch.setattr(image.os, "cpu_count", lambda: 2)
+    begun, decoded = threading.Event(), image._decoded
+
+    def observed(opened):
+        begun.set()
+        return decoded(opened)
+
+    monkeypatch.setattr(image, "_decoded", observed)
+    with decoding_pictures([file(1), file(2)]) as finish:
+        assert begun.wait(10.0)
+        assert [pixels[0, 0, 0] for pixels in finish()] == [1, 2]
+
+
+def test_filters_of_warnings_are_restored_if_the_caller_fails():
+    filters = list(warnings.filters)
+    with pytest.raises(ZeroDivisionError), decoding_pictures([file(1)]):
+        raise ZeroDivisionError
+    assert warnings.filters == filters
 
 
 def test_empty_list_of_images_is_decoded():

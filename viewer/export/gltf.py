@@ -44,7 +44,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scalars import length_text
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Scene, scene_unit
 from viewer.rig.skinning import Skinning
 from viewer.rig.units import METRES, UNIT_NAMES
 
@@ -99,10 +99,11 @@ def export_figures(
         for actor, own in zip(actors, clips, strict=True)
     ]
     first, views = actors[0], () if scene is None else scene.views
-    up = first.figure.up if scene is None or len(actors) == 1 else scene.up
-    to_file = to_metres(up, first.figure.unit)
-    if len(actors) == 1:
-        to_file = to_file @ np.linalg.inv(first.placement)
+    if scene is None or len(actors) == 1:
+        own = to_metres(first.figure.up, first.figure.unit)
+        to_file = own @ np.linalg.inv(first.placement)
+    else:
+        to_file = to_metres(scene.up, scene_unit(scene))
     built = [each.built for each in added]
     placing = place_figures(document, actors, built, to_file) if len(actors) > 1 else []
     lenses = add_cameras(document, views, to_file)
@@ -251,7 +252,7 @@ def export_animations(
     added = [
         add_figure(document, actor, how, None, together, options.optimizes) for actor in others
     ]
-    to_file = to_metres(scene.up, actors[0].figure.unit)
+    to_file = to_metres(scene.up, scene_unit(scene))
     placing = place_figures(document, actors, [*built, *(each.built for each in added)], to_file)
     lenses = add_cameras(document, scene.views, to_file)
     (data,) = _files([(path, document)])

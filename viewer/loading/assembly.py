@@ -12,7 +12,12 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
-from viewer.loading.placing import place_side_by_side, placed_views, stand_up
+from viewer.loading.placing import (
+    place_side_by_side,
+    placed_views,
+    scale_to_one_unit,
+    stand_up,
+)
 from viewer.loading.settings import MotionSettings
 from viewer.loading.unused_options import unused_options
 from viewer.rig.arrays import Bytes
@@ -90,6 +95,7 @@ def begin(
     world_up = next((up for up, placed in zip(cast.ups, cast.placed, strict=True) if placed), None)
     world_up = world_up or next(iter(cast.ups), "y")
     stand_up(cast, world_up)
+    scale_to_one_unit(cast)
     if settings is not None and settings.springs:
         _switch_on_springs(cast, world_up)
     place_side_by_side(cast)

@@ -1,4 +1,4 @@
-"""Placement of the actors of a scene: upright, and side by side."""
+"""Placement of the actors of a scene: upright, in one unit of length, and side by side."""
 
 from __future__ import annotations
 
@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from viewer.diagnostics import Diagnostic
 from viewer.loading.cast import Cast
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.units import METRES, UNIT_NAMES
 
 if TYPE_CHECKING:
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.figure_group import FigureGroup
 
-__all__ = ["place_side_by_side", "placed_views", "stand_up"]
+__all__ = ["place_side_by_side", "placed_views", "scale_to_one_unit", "stand_up"]
 
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
@@ -25,6 +27,31 @@ def stand_up(cast: Cast, world_up: str) -> None:
         if up != world_up:
             quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
             actor.placement = rotation_transform(0, quarter) @ actor.placement
+
+
+def scale_to_one_unit(cast: Cast) -> None:
+    """Scale actors whose unit differs from that of the scene; a note names each of them.
+
+    The unit of the scene is that of the first actor whose motion determines its position, or else
+    of the first actor with a known unit. Actors with an unknown unit are not scaled.
+    """
+    order = sorted(range(len(cast.actors)), key=lambda index: not cast.placed[index])
+    unit = next((found for index in order if (found := _unit(cast.actors[index]))), "")
+    for actor in cast.actors:
+        own = _unit(actor)
+        if own not in ("", unit):
+            factor = METRES[own] / METRES[unit]
+            actor.placement = np.diag([factor, factor, factor, 1.0]) @ actor.placement
+            values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
+            note = Diagnostic("F007.unit-matched", values={**values, "factor": factor})
+            cast.diagnostics.append(note)
+
+
+def _unit(actor: Actor) -> str:
+    """Return the unit of an actor; empty if it is unknown."""
+    if actor.figure.points is not None:  # captured keypoints
+        return "m"
+    return actor.figure.unit if actor.figure.unit in METRES else ""
 
 
 def place_side_by_side(cast: Cast) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import os
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 __all__ = [
     "decode_picture",
     "decode_pictures",
+    "decoding_pictures",
     "encode_png",
     "is_picture",
     "picture_dimensions",
@@ -31,6 +33,7 @@ __all__ = [
 
 _MAX_PIXELS = 16384 * 16384  # limit for one image, and for all images that are decoded together
 _MOST_THREADS = 8
+_FEW_BYTES = 1 << 18  # size of encoded images that take about as long to decode as threads to start
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # raised by Pillow
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
@@ -73,18 +76,30 @@ def decode_picture(path: Path, data: bytes) -> Bytes:
 
 
 def decode_pictures(files: Sequence[tuple[Path, bytes]]) -> list[Bytes | FormatError]:
-    """Return the pixels of several images, decoded in parallel.
+    """Return the pixels of several images, decoded in parallel; see ``decoding_pictures``."""
+    with decoding_pictures(files) as finish:
+        return finish()
+
+
+@contextlib.contextmanager
+def decoding_pictures(
+    files: Sequence[tuple[Path, bytes]],
+) -> Iterator[Callable[[], list[Bytes | FormatError]]]:
+    """Decode several images in other threads while the body of the ``with`` statement runs.
+
+    Few bytes are decoded at once in the calling thread, because starting threads takes longer.
 
     Parameters
     ----------
     files : sequence of (Path, bytes)
         File names for errors, and the files.
 
-    Returns
-    -------
-    list of (H, W, 4) uint8 or FormatError
-        First row at the top, read-only; the error of an image that is not readable, or that
-        exceeds the number of pixels allowed for all images together.
+    Yields
+    ------
+    callable
+        Waits and returns a list. Its items are the pixels, (H, W, 4) uint8, first row at the top,
+        read-only; or the FormatError of an image that is not readable, or that exceeds the number
+        of pixels allowed for all images together.
     """
     from PIL import Image
 
@@ -92,24 +107,38 @@ def decode_pictures(files: Sequence[tuple[Path, bytes]]) -> list[Bytes | FormatE
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         warnings.simplefilter("error", Image.DecompressionBombWarning)
-        n_left = _MAX_PIXELS
-        opened: list[tuple[Path, Image.Image] | FormatError] = []
-        for path, data in files:
-            try:
-                picture = _opened(path, data, n_left)
-            except FormatError as problem:
-                opened.append(problem)
-                continue
-            n_left -= picture.width * picture.height
-            opened.append((path, picture))
-        n_threads = min(len(opened), os.cpu_count() or 1, _MOST_THREADS)
-        if n_threads < 2:
-            return [_decoded(one) for one in opened]
+        opened = _all_opened(files)
+        n_cores = os.cpu_count() or 1
+        if n_cores < 2 or sum(len(data) for _, data in files) < _FEW_BYTES:
+            pixels = [_decoded(one) for one in opened]
+            yield lambda: pixels
+            return
         # Importing it takes 10 ms.
         from concurrent.futures import ThreadPoolExecutor
 
-        with ThreadPoolExecutor(n_threads) as pool:
-            return list(pool.map(_decoded, opened))
+        pool = ThreadPoolExecutor(min(len(opened), n_cores, _MOST_THREADS))
+        try:
+            futures = [pool.submit(_decoded, one) for one in opened]
+            yield lambda: [future.result() for future in futures]
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _all_opened(
+    files: Sequence[tuple[Path, bytes]],
+) -> list[tuple[Path, Image.Image] | FormatError]:
+    """Return images whose pixels are not decoded yet, or their errors."""
+    n_left = _MAX_PIXELS
+    opened: list[tuple[Path, Image.Image] | FormatError] = []
+    for path, data in files:
+        try:
+            picture = _opened(path, data, n_left)
+        except FormatError as problem:
+            opened.append(problem)
+            continue
+        n_left -= picture.width * picture.height
+        opened.append((path, picture))
+    return opened
 
 
 def _opened(path: Path, data: bytes, n_left: int) -> Image.Image:

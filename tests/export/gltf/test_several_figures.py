@@ -73,6 +73,22 @@ def test_written_figures_are_read_as_several_actors(tmp_path: Path) -> None:
         assert_allclose(np.ptp(one, axis=0), np.ptp(two, axis=0), atol=SINGLE)
 
 
+@pytest.mark.parametrize("units", [("m", "cm"), ("cm", "m"), ("cm", "cm")])
+def test_sizes_are_in_metres_whatever_the_unit_of_the_scene(
+    tmp_path: Path, units: tuple[str, str]
+) -> None:
+    metres = [{"m": 1.0, "cm": 0.01}[unit] for unit in units]
+    scaled = np.diag([metres[1] / metres[0]] * 3 + [1.0])
+    first, second = (replace(two_parts(), unit=unit) for unit in units)
+    actors, path = [Actor(first), Actor(second, placement=scaled)], tmp_path / "both.glb"
+    every = [[each.clip() for each in actor.figure.animations] for actor in actors]
+    export_figures(actors, path, None, every, Scene(actors))
+    expected = np.concatenate([metres[0] * posed(actor, 1, 0.6) for actor in actors])
+    found = np.concatenate(Evaluator(path).meshes(1, 0.6))
+    apart = np.linalg.norm(found[:, None] - expected, axis=2)
+    assert apart.min(axis=0).max() < SINGLE and apart.min(axis=1).max() < SINGLE
+
+
 def test_animations_of_different_length_remain_separate(tmp_path: Path) -> None:
     longer = [replace(clip, end=clip.end + 1.0) for clip in clips()]
     actors, path = [Actor(two_parts()), Actor(two_parts())], tmp_path / "both.glb"

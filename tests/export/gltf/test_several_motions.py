@@ -96,6 +96,22 @@ def test_one_animation_moves_all_figures_as_in_the_scene(tmp_path):
     assert not [note for note in notes if note.code == "X002"]
 
 
+@pytest.mark.parametrize("unit", ["m", "cm"])
+def test_sizes_are_in_metres_whatever_figure_is_written_first(tmp_path, unit):
+    # The moving figure is written first; the scene has the unit of the still one.
+    other, factor = ("cm", 0.01) if unit == "m" else ("m", 100.0)
+    scaled = np.diag([factor, factor, factor, 1.0])
+    clip = moving("take", [True] * 3, 1.0)
+    mover = Actor(chain(other), clip=clip, placement=scaled)
+    scene = Scene([Actor(replace(chain(unit), name="post")), mover])
+    motions = [(mover, *upright_animation(scene, mover))]
+    export_animations(motions, tmp_path / "both.glb", MotionOptions(), scene, scene.actors[:1])
+    found = np.concatenate(Evaluator(tmp_path / "both.glb").meshes(0, 0.1))
+    metres = 1.0 if unit == "m" else 0.01
+    points = np.concatenate([expected(scene.actors[0], 0, 0.0), expected(mover, 1, 1.0)])
+    assert apart(found, metres * points) < SINGLE
+
+
 def test_figures_are_read_back_as_actors_with_their_motions(tmp_path):
     scene, path = crowd(), tmp_path / "crowd.glb"
     write(scene, path)

@@ -15,7 +15,7 @@ from PIL import Image
 from viewer.formats._gltf.document import open_document
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness
 from viewer.formats._gltf_materials.images import DecodedImage
-from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, reading_materials
 from viewer.formats._gltf_materials.textures import Slot, transform_matrix
 from viewer.formats._source import Source
 
@@ -37,7 +37,8 @@ def read(folder, **root):
     path = folder / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, **root}))
     source = Source.open(path)
-    return read_materials(open_document(source)), source
+    with reading_materials(open_document(source)) as finish:
+        return finish(), source
 
 
 def read_one(folder, material, **root):

@@ -9,10 +9,16 @@ from typing import Any
 import pytest
 
 from viewer.formats._gltf.document import open_document
-from viewer.formats._gltf_materials.materials import read_materials
+from viewer.formats._gltf_materials.materials import reading_materials
 from viewer.formats._source import Source
+from viewer.rig.material import Material
 
 SHADERS = ["VRM/MToon", "VRM/UnlitTexture", "VRM_USE_GLTFSHADER", 5]
+
+
+def materials_of(source: Source) -> tuple[Material, ...]:
+    with reading_materials(open_document(source)) as finish:
+        return finish()
 
 
 @pytest.mark.parametrize(
@@ -36,7 +42,7 @@ def test_toon_materials_ignore_the_studio_light_with_a_note(
     path = tmp_path / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, "materials": materials, **members}))
     source = Source.open(path)
-    found = read_materials(open_document(source))
+    found = materials_of(source)
     assert [material.unlit for material in found] == unlit
     assert found[0].base_color == (0.5, 0.25, 0.125, 1.0)
     (note,) = source.diagnostics
@@ -46,7 +52,7 @@ def test_toon_materials_ignore_the_studio_light_with_a_note(
 def _read(tmp_path: Path, **members: Any) -> Any:
     path = tmp_path / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, "materials": [{}], **members}))
-    return read_materials(open_document(Source.open(path)))[0]
+    return materials_of(Source.open(path))[0]
 
 
 def test_modern_toon_materials_have_a_shade_colour_and_a_step(tmp_path: Path) -> None:
@@ -86,7 +92,7 @@ def _warned(tmp_path: Path, **members: Any) -> tuple[Any, Any]:
     path = tmp_path / "hero.gltf"
     path.write_text(json.dumps({"asset": {"version": "2.0"}, "materials": [{}], **members}))
     source = Source.open(path)
-    found = read_materials(open_document(source))[0]
+    found = materials_of(source)[0]
     (note,) = [each for each in source.diagnostics if each.key == "F007.gltf-toon"]
     return found, note
 

@@ -61,6 +61,20 @@ def test_camera_placed_with_its_scene_shows_the_same_pixels() -> None:
     assert_allclose(after.rotation, view_at(after, 0.0).rotation)
 
 
+def test_camera_scaled_with_its_scene_shows_the_same_pixels() -> None:
+    placement = np.diag([0.01, 0.01, 0.01, 1.0])
+    placement[:3, :3] = placement[:3, :3] @ axis_rotations(1, np.array(0.4))
+    placement[:3, 3] = 4.0, -1.0, 2.5
+    point, before = np.array([40.0, 20.0, 700.0]), moving([0, -1, 1])
+    after = placed_view(before, placement)
+    for seconds in (0.0, 0.1, 0.17):
+        old, new = view_at(before, seconds), view_at(after, seconds)
+        seen = new.rotation @ (placement[:3, :3] @ point + placement[:3, 3]) + new.translation
+        # Only the depths of all points change, by the same factor.
+        assert_allclose(seen, 0.01 * (old.rotation @ point + old.translation), atol=1e-12)
+        assert_allclose(new.rotation @ new.rotation.T, np.eye(3), atol=1e-12)
+
+
 def test_motion_times_skip_gaps_and_include_both_ends() -> None:
     assert_allclose(motion_times(moving([-1, 0, -1, 1]), 5), [0.1, 0.3])
     rotations = np.tile(np.eye(3), (11, 1, 1))

@@ -57,6 +57,18 @@ def test_figure_has_no_differences_from_itself() -> None:
     assert_allclose(found.size, np.sqrt(2.0))
 
 
+def test_lengths_are_compared_in_the_unit_of_the_first() -> None:
+    joints, moved = arm((100.0, 0.0, 0.0)), 100.0 * CORNERS + [0.0, 0.0, 2.0]
+    first = replace(figure(), unit="m")
+    second = replace(figure(positions=moved, joints=joints), unit="cm")
+    found = compare(Actor(first), Actor(second), n_poses=0)
+    assert [note.key for note in found.notes] == ["D002.unit"]
+    assert_allclose(measures(found)["joint positions"].maximum, 0.0, atol=1e-12)
+    assert_allclose(measures(found)["vertices"].maximum, 0.02, atol=1e-12)
+    # An unknown unit is not converted.
+    assert compare(Actor(figure()), Actor(second), n_poses=0).notes == ()
+
+
 def test_moved_joint_is_reported_with_its_distance() -> None:
     found = compare(Actor(figure()), Actor(figure(joints=arm((1.0, 0.03, 0.04)))), n_poses=0)
     places = measures(found)["joint positions"]

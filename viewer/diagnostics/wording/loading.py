@@ -66,6 +66,8 @@ MESSAGES = {
     "F004.vrm-meta": "{figure:text} cannot be written as VRM without author and licence: add "
     "--vrm-author NAME and --vrm-licence {licence}, the VRM Public Licence with the strictest "
     "permissions",
+    "F007.unit-matched": "{figure:text} is in {unit}: scaled by {factor:g} to match the scene, "
+    "which is in {wanted}",
     "F007.unit-taken": "{note}; --unit overrides it",
     "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the others; --unit "
     "overrides it",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import field, replace
 from functools import partial
+from operator import le
 from typing import Any
 
 from viewer.data_classes import dataclass
@@ -134,23 +135,36 @@ def _any_channels(
 
 def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[float, float]:
     """Return the times of the first and the last key in seconds, as declared by the accessors."""
+    if not inputs:
+        return 0.0, 0.0
     accessors = document.table("accessors")
+    declared = _declared(accessors, inputs)
+    if declared is not None:
+        return declared
     ends: list[tuple[float, float]] = []
     for index in inputs:
         if type(index) is not int or not 0 <= index < len(accessors):
             samplers = animation.table("samplers")
             for place in range(len(samplers)):
                 samplers[place].required_index("input", len(document.accessors), "accessors")
-        ends.append(_declared(accessors, index) or _read_range(document, animation, index))
-    start = min((first for first, _ in ends), default=0.0)
-    return start, max((last for _, last in ends), default=0.0)
+        ends.append(_declared(accessors, {index}) or _read_range(document, animation, index))
+    return min(first for first, _ in ends), max(last for _, last in ends)
 
 
-def _declared(accessors: Table, index: int) -> tuple[float, float] | None:
-    """Return the minimum and maximum that an accessor declares; None if they are unusable."""
+def _declared(accessors: Table, inputs: set[int]) -> tuple[float, float] | None:
+    """Return the least minimum and the largest maximum that accessors declare.
+
+    None if any is unusable. Files may have a separate accessor for each of their thousands of
+    channels, so a valid one costs little.
+    """
     try:
-        values = accessors.items[index]
-        low, high = values["min"][0], values["max"][0]
+        if min(inputs) < 0 or set(map(type, inputs)) != {int}:
+            return None
+        used = [accessors.items[index] for index in inputs]
+        lows, highs = ([one[end][0] for one in used] for end in ("min", "max"))
+        if not all(map(le, lows, highs)):
+            return None
+        low, high = min(lows), max(highs)
         return (float(low), float(high)) if -math.inf < low <= high < math.inf else None
     except (KeyError, TypeError, IndexError, OverflowError):
         return None

@@ -31,7 +31,7 @@ from viewer.formats._gltf.scenes import shown_roots
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
-from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, read_materials
+from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, reading_materials
 from viewer.formats._gltf_materials.stored import stored_textures, stored_toon
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
 from viewer.formats._source import Source
@@ -57,12 +57,14 @@ def read_nodes(source: Source) -> NodeFile:
     """
     document = open_document(source)
     check_extensions(document)
-    materials = read_materials(document)
-    tree, skins = _without_empty(read_tree(document), read_skins(document))
-    meshes = checked_bindings(document, tree, read_meshes(document), skins)
-    tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
-    if source.diagnostics.keeps_errors:
-        check_conformance(document, tree, meshes, skins)
+    with reading_materials(document) as finish_materials:
+        tree, skins = _without_empty(read_tree(document), read_skins(document))
+        meshes = checked_bindings(document, tree, read_meshes(document), skins)
+        tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
+        if source.diagnostics.keeps_errors:
+            check_conformance(document, tree, meshes, skins)
+        animations = read_animations(document, Targets(tree, meshes))
+        materials = finish_materials()
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
         meshes = tuple(_with_material(mesh, len(materials)) for mesh in meshes)
         materials = (*materials, DEFAULT_MATERIAL)
@@ -75,7 +77,7 @@ def read_nodes(source: Source) -> NodeFile:
         meshes=meshes,
         skins=skins,
         materials=materials,
-        animations=read_animations(document, Targets(tree, meshes)),
+        animations=animations,
         cameras=read_cameras(document),
         extensions=extensions,
         extras=root.values.get("extras"),

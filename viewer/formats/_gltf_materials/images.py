@@ -5,17 +5,18 @@ Only images that textures use are read. They are decoded in parallel, each only 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import contextlib
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.formats._gltf.buffers import EncodedImage
 from viewer.formats._gltf.document import Document
-from viewer.media.image import decode_pictures
+from viewer.media.image import decoding_pictures
 from viewer.rig.arrays import Bytes
 
-__all__ = ["DecodedImage", "decoded_images"]
+__all__ = ["DecodedImage", "decoding_images"]
 
 _KEPT = (b"\x89PNG", b"\xff\xd8\xff")  # formats that every glTF file may contain
 _UNSUPPORTED = {b"\xabKTX": "KTX2", b"DDS ": "DDS"}
@@ -40,8 +41,11 @@ class DecodedImage:
     encoded: bytes | None = None
 
 
-def decoded_images(document: Document, indices: Iterable[int]) -> dict[int, DecodedImage]:
-    """Return images of a document by index; images that cannot be read cause a warning.
+@contextlib.contextmanager
+def decoding_images(
+    document: Document, indices: Iterable[int]
+) -> Iterator[Callable[[], dict[int, DecodedImage]]]:
+    """Decode images of a document while the body of the ``with`` statement runs.
 
     Parameters
     ----------
@@ -49,6 +53,11 @@ def decoded_images(document: Document, indices: Iterable[int]) -> dict[int, Deco
         The opened file.
     indices : iterable of int
         Valid indices of images; may repeat.
+
+    Yields
+    ------
+    callable
+        Waits, and returns the images by index; images that cannot be read cause a warning.
     """
     found = {index: _encoded(document, index) for index in sorted(set(indices))}
     images = {index: image for index, image in found.items() if image is not None}
@@ -57,17 +66,29 @@ def decoded_images(document: Document, indices: Iterable[int]) -> dict[int, Deco
         (path if image.is_embedded else path.parent / image.name, image.data)
         for image in images.values()
     ]
-    decoded: dict[int, DecodedImage] = {}
-    for (index, image), pixels in zip(images.items(), decode_pictures(files), strict=True):
-        name = image.name or f"image{index}"
-        if isinstance(pixels, FormatError):
-            problem = pixels.diagnostic.message if image.is_embedded else str(pixels)
-            document.source.warn("F005.gltf-image", f"/images/{index}", problem=problem)
-            decoded[index] = DecodedImage(name)
-            continue
-        keeps = image.is_embedded and image.data.startswith(_KEPT)
-        decoded[index] = DecodedImage(name, pixels, image.data if keeps else None)
-    return {index: decoded.get(index, DecodedImage(f"image{index}")) for index in found}
+
+    def finish() -> dict[int, DecodedImage]:
+        decoded = {
+            index: _decoded(document, index, image, pixels)
+            for (index, image), pixels in zip(images.items(), pixels_of(), strict=True)
+        }
+        return {index: decoded.get(index, DecodedImage(f"image{index}")) for index in found}
+
+    with decoding_pictures(files) as pixels_of:
+        yield finish
+
+
+def _decoded(
+    document: Document, index: int, image: EncodedImage, pixels: Bytes | FormatError
+) -> DecodedImage:
+    """Return an image with its pixels; without them, and with a warning, if it is unreadable."""
+    name = image.name or f"image{index}"
+    if isinstance(pixels, FormatError):
+        problem = pixels.diagnostic.message if image.is_embedded else str(pixels)
+        document.source.warn("F005.gltf-image", f"/images/{index}", problem=problem)
+        return DecodedImage(name)
+    keeps = image.is_embedded and image.data.startswith(_KEPT)
+    return DecodedImage(name, pixels, image.data if keeps else None)
 
 
 def _encoded(document: Document, index: int) -> EncodedImage | None:

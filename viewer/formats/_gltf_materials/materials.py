@@ -9,7 +9,9 @@ a warning, because the shape can still be shown.
 
 from __future__ import annotations
 
+import contextlib
 from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -18,13 +20,13 @@ from viewer.data_classes import dataclass
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.glossiness import Glossiness, from_glossiness, read_glossiness
-from viewer.formats._gltf_materials.images import DecodedImage, decoded_images
+from viewer.formats._gltf_materials.images import DecodedImage, decoding_images
 from viewer.formats._gltf_materials.lenient import bounded, bounded_rows, chosen, lenient
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._gltf_materials.toon import MTOON, Toon, read_toon
 from viewer.rig.material import ALPHA_MODES, Material
 
-__all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "read_materials"]
+__all__ = ["DEFAULT_MATERIAL", "DRAWN_EXTENSIONS", "reading_materials"]
 
 _GLOSSINESS = "KHR_materials_pbrSpecularGlossiness"
 
@@ -72,18 +74,20 @@ class _Stated:
     glossiness: Glossiness | None
 
 
-def read_materials(document: Document) -> tuple[Material, ...]:
-    """Return all materials of a document, with their images.
+@contextlib.contextmanager
+def reading_materials(document: Document) -> Iterator[Callable[[], tuple[Material, ...]]]:
+    """Read all materials; their images are decoded while the body of the ``with`` statement runs.
 
     Parameters
     ----------
     document : Document
         The opened file, which records warnings about everything that is invalid or not drawn.
 
-    Returns
-    -------
-    tuple of Material
-        In file order. Textures that share an image share its pixels.
+    Yields
+    ------
+    callable
+        Waits for the images, and returns the materials in file order. Textures that share an image
+        share its pixels.
     """
     table = document.table("materials")
     neutral = Element(document.source, {})
@@ -95,8 +99,13 @@ def read_materials(document: Document) -> tuple[Material, ...]:
     stated = [_stated(document, each, toon.get(index)) for index, each in enumerate(elements)]
     _report(document, elements, stated)
     used = [slot for one in stated for slot in _slots(one)]
-    images = decoded_images(document, (slot.image for slot in used if slot.image >= 0))
-    return tuple(_material(one, images) for one in stated)
+
+    def finish() -> tuple[Material, ...]:
+        images = images_of()
+        return tuple(_material(one, images) for one in stated)
+
+    with decoding_images(document, (slot.image for slot in used if slot.image >= 0)) as images_of:
+        yield finish
 
 
 def _slots(stated: _Stated) -> list[Slot]:

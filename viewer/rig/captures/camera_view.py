@@ -141,21 +141,23 @@ def motion_times(view: CameraView, most: int) -> Floats:
 def placed_view(view: CameraView, placement: Floats) -> CameraView:
     """Return a camera that is moved together with its scene.
 
-    With the placement X' = P X + p: R' = R P^T and T' = T - R' p.
+    With the placement X' = s P X + p: R' = R P^T and T' = s T - R' p.
 
     Parameters
     ----------
     view : CameraView
         Fixed or moving camera.
     placement : (4, 4)
-        Rotation and translation.
+        Rotation, uniform scale and translation.
     """
-    turn, place = placement[:3, :3], placement[:3, 3]
+    scale, place = float(np.linalg.norm(placement[:3, 0])), placement[:3, 3]
+    turn = placement[:3, :3] / scale
     rotation = view.rotation @ turn.T
-    moved = replace(view, rotation=rotation, translation=view.translation - rotation @ place)
+    translation = scale * view.translation - rotation @ place
+    moved = replace(view, rotation=rotation, translation=translation)
     if view.motion is None:
         return moved
     rotations = view.motion.rotations @ turn.T
-    translations = view.motion.translations - rotations @ place
+    translations = scale * view.motion.translations - rotations @ place
     motion = replace(view.motion, rotations=rotations, translations=translations)
     return replace(moved, motion=motion)

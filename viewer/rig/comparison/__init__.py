@@ -21,6 +21,7 @@ from viewer.rig.pose import placement_matrix
 from viewer.rig.scene import Actor, actor_points
 from viewer.rig.shape import shaped_skeleton
 from viewer.rig.skinning import Skinning, deform
+from viewer.rig.units import METRES, UNIT_NAMES
 
 __all__ = ["Difference", "Measure", "compare", "rotation_distance"]
 
@@ -39,8 +40,9 @@ def compare(
     """Compare two actors, regardless of their placements in a scene.
 
     Joints are matched by name. Vertices are compared by index if the triangles are the same,
-    otherwise by the closest point on the other surface, in both directions. The actors are left in
-    the pose in which their meshes are farthest apart.
+    otherwise by the closest point on the other surface, in both directions. Lengths of the second
+    are converted to the unit of the first if both are known. The actors are left in the pose in
+    which their meshes are farthest apart.
 
     Parameters
     ----------
@@ -84,6 +86,16 @@ class _Comparison:
         if first.figure.up != second.figure.up:
             ups = {"first": first.figure.up, "second": second.figure.up}
             self.notes.append(Diagnostic("D002.up", values=ups))
+        self.factor = self._unit_factor()
+
+    def _unit_factor(self) -> float:
+        """Return the unit of the second over that of the first; 1 if either is unknown."""
+        units = [actor.figure.unit for actor in (self.first, self.second)]
+        if units[0] == units[1] or not all(unit in METRES for unit in units):
+            return 1.0
+        named = {"first": UNIT_NAMES[units[0]], "second": UNIT_NAMES[units[1]]}
+        self.notes.append(Diagnostic("D002.unit", values=named))
+        return METRES[units[1]] / METRES[units[0]]
 
     def _pair_skeletons(self) -> None:
         first, second = self.first.figure.skeleton, self.second.figure.skeleton
@@ -195,7 +207,7 @@ class _Comparison:
                 (self.second, self.joints.second),
             )
         ]
-        offsets = worlds[0][:, :3, 3] - worlds[1][:, :3, 3]
+        offsets = worlds[0][:, :3, 3] - self.factor * worlds[1][:, :3, 3]
         self.places.add(step, np.linalg.norm(offsets, axis=1))
         # Joints may scale or shear: only the rotations are compared.
         rotations = [nearest_rotations(world[:, :3, :3])[0] for world in worlds]
@@ -206,7 +218,7 @@ class _Comparison:
             return
         one = self.first.points[self.points.first]
         other = self.second.points[self.points.second]
-        distances = np.linalg.norm(one[:, :3] - other[:, :3], axis=1)
+        distances = np.linalg.norm(one[:, :3] - self.factor * other[:, :3], axis=1)
         seen = (one[:, 3] > 0.0) & (other[:, 3] > 0.0)
         self.captured.add(step, np.where(seen, distances, np.nan))
 
@@ -245,14 +257,15 @@ class _Comparison:
         if not pairs:
             return
         one, other = np.array(pairs).T
-        distances = np.linalg.norm(
-            first.direction_values()[one] - second.direction_values()[other], axis=-1
-        )
+        converted = self.factor * second.direction_values()[other]
+        distances = np.linalg.norm(first.direction_values()[one] - converted, axis=-1)
         tally = self._tally("blend shapes", "length", distances.shape[-1])
         tally.add("", distances.max(axis=0))
 
     def _posed(self, actor: Actor) -> Floats:
-        return deform(actor.figure, actor.pose, self.skinning)[0]
+        """Return the posed vertices in the unit of the first figure."""
+        factor = self.factor if actor is self.second else 1.0
+        return factor * deform(actor.figure, actor.pose, self.skinning)[0]
 
 
 def _closest(points: Floats, positions: Floats, actor: Actor) -> SurfacePoints:
