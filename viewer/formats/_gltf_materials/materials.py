@@ -109,6 +109,8 @@ def _slots(stated: _Stated) -> list[Slot]:
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
     """Return the properties of a material; ``toon`` contains VRM's properties, if any."""
     source = document.source
+    if toon is not None and toon.core is not None:
+        element = toon.core
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
     if surface is None:
