@@ -112,6 +112,22 @@ def test_old_materials_add_what_the_core_material_omits(tmp_path: Path) -> None:
     assert _old(tmp_path, {}, keywordMap={"_ALPHABLEND_ON": True}).alpha_mode == "blend"
 
 
+def test_old_colours_replace_those_of_the_core_material(tmp_path: Path) -> None:
+    """Some exporters write an emission of 1 to the core material of every toon material."""
+    core = {
+        "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]},
+        "emissiveFactor": [1.0, 1.0, 1.0],
+    }
+    colors = {"_Color": [1.0, 0.5, 0.0, 0.25], "_EmissionColor": [0.0, 0.0, 0.0, 1.0]}
+    found = _old(tmp_path, core, vectorProperties=colors)
+    # 0.5 in sRGB is 0.2140411, as above; the opacity is linear.
+    assert found.base_color == pytest.approx((1.0, 0.2140411, 0.0, 0.25), abs=1e-7)
+    assert found.emissive == (0.0, 0.0, 0.0)
+    bright = {"_EmissionColor": [4.0, 2.0, 0.5, 1.0]}
+    assert _old(tmp_path, core, vectorProperties=bright).emissive == (4.0, 2.0, 0.5)
+    assert _old(tmp_path, core, vectorProperties={"_Color": "red"}).emissive == (1.0, 1.0, 1.0)
+
+
 def test_invalid_toon_values_disable_the_shade(tmp_path: Path) -> None:
     toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])

@@ -2,10 +2,12 @@
 
 ::
 
-    textureProperties  _MainTex, _BumpMap, _EmissionMap   textures, if the core material has none
-    vectorProperties   _MainTex                           placement of all of these
-    keywordMap         _ALPHATEST_ON, _ALPHABLEND_ON      alphaMode, if the core material has none
-    floatProperties    _Cutoff, _CullMode, _BumpScale     alphaCutoff, doubleSided, normal scale
+    vectorProperties   _Color (sRGB), _EmissionColor (linear)   colours
+                       _MainTex                                 placement of all textures
+    textureProperties  _MainTex, _BumpMap, _EmissionMap         textures
+    keywordMap         _ALPHATEST_ON, _ALPHABLEND_ON            alphaMode, if the core has none
+    floatProperties    _Cutoff, _CullMode, _BumpScale           alphaCutoff, doubleSided, scale of
+                                                                normals, if the core has none
 """
 
 from __future__ import annotations
@@ -15,7 +17,9 @@ from typing import Any
 
 from viewer.formats._vrm.json_parts import part
 from viewer.formats._vrm.material_values import main_transform
-from viewer.formats._vrm.numbers import value_of
+from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.rig.arrays import Floats
+from viewer.rig.srgb import decode_srgb
 
 __all__ = ["TEXTURE_TRANSFORM", "overridden", "placement"]
 
@@ -27,6 +31,7 @@ _TEXTURES = {
     "_EmissionMap": ("emissiveTexture",),
 }
 _CULL_OFF = 0.0
+_BRIGHTEST = 1e6
 
 
 def placement(told: Any) -> dict[str, Any]:
@@ -41,7 +46,7 @@ def placement(told: Any) -> dict[str, Any]:
 
 
 def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
-    """Return the members of a core material with those that ``materialProperties`` adds.
+    """Return the members of a core material with those that ``materialProperties`` replaces.
 
     Parameters
     ----------
@@ -50,19 +55,44 @@ def overridden(core: Mapping[str, Any], told: Any) -> dict[str, Any]:
     told : Any
         The member of ``materialProperties`` with the same index.
     """
-    found = dict(core)
+    found = _opacity(told) | dict(core)
     surface = found.get(_SURFACE)
-    if surface is None or isinstance(surface, dict):
-        found[_SURFACE] = dict(surface or {})
+    if surface is not None and not isinstance(surface, dict):
+        return found
+    found[_SURFACE] = dict(surface or {})
+    color = _vector(told, "_Color")
+    if color is not None:
+        values = [*decode_srgb(color[:3].clip(0.0, 1.0)), color[3].clip(0.0, 1.0)]
+        found[_SURFACE]["baseColorFactor"] = [float(value) for value in values]
     placed = placement(told)
     for name, (*outer, member) in _TEXTURES.items():
         owner = found[_SURFACE] if outer else found
         index = part(told, "textureProperties", name)
-        if isinstance(owner, dict) and member not in owner and isinstance(index, int):
-            owner[member] = {"index": index} | _scale(told, name)
-        if isinstance(owner, dict) and isinstance(owner.get(member), dict):
+        if isinstance(index, int):
+            given = owner.get(member)
+            kept = given if isinstance(given, dict) else _scale(told, name)
+            owner[member] = {**kept, "index": index}
+        if isinstance(owner.get(member), dict):
             owner[member] = {**owner[member], **placed}
-    return found | {name: value for name, value in _opacity(told).items() if name not in core}
+    return found | _emission(told, found.get("extensions"))
+
+
+def _vector(told: Any, name: str) -> Floats | None:
+    """Return four numbers; None if they are missing or invalid."""
+    value = part(told, "vectorProperties", name)
+    return None if value is None else rows_of(value, (0.0,) * 4)
+
+
+def _emission(told: Any, extensions: Any) -> dict[str, Any]:
+    """Return the emitted light: factors up to 1, and the strength in an extension."""
+    color = _vector(told, "_EmissionColor")
+    if color is None:
+        return {}
+    light = color[:3].clip(0.0, _BRIGHTEST)
+    strength = max(1.0, float(light.max()))
+    given = extensions if isinstance(extensions, dict) else {}
+    strengths = {"KHR_materials_emissive_strength": {"emissiveStrength": strength}}
+    return {"emissiveFactor": (light / strength).tolist(), "extensions": {**given, **strengths}}
 
 
 def _scale(told: Any, name: str) -> dict[str, float]:
