@@ -264,6 +264,8 @@ class NodeExpression:
         Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
     materials : tuple of (int, str, (4,))
         Material, kind and target of each change of a material; see ``MaterialBinds``.
+    preset : str
+        Name in VRM 1.0; empty if there is none.
     """
 
     name: str
@@ -272,6 +274,7 @@ class NodeExpression:
     kind: str = ""
     overrides: Mapping[str, str] = field(default_factory=dict)
     materials: tuple[tuple[int, str, Floats], ...] = ()
+    preset: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
