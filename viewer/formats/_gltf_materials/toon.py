@@ -8,9 +8,10 @@
              vectorProperties._ShadeColor (sRGB), textureProperties._ShadeTexture,
              floatProperties._ShadeToony, ._ShadeShift, …, which are translated to version 1.0
 
-Exporters also write the lit side's base colour, texture and opacity to the core material; version
-0.x adds what is missing there, and the placement of the textures (``old_core.py``). With the cosine c of the angle of incidence, the fraction of the lit colour rises linearly from 0 to 1
-between c = toony - 1 - shift and c = 1 - toony - shift.
+Exporters also write the lit side's base colour, texture and opacity to the core material; those of
+version 0.x are replaced by ``old_core.py``. With the cosine c of the angle of incidence, the
+fraction of the lit colour rises linearly from 0 to 1 between c = toony - 1 - shift and
+c = 1 - toony - shift.
 """
 
 from __future__ import annotations
