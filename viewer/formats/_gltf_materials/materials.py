@@ -130,6 +130,7 @@ def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
         "unlit": toon is not None
         or lenient(source, lambda: element.extension("KHR_materials_unlit"), None) is not None,
         "is_physical": True,
+        "extras": element.values.get("extras"),
         **({} if toon is None else toon.values),
     }
     slots = {
