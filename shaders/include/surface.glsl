@@ -27,6 +27,7 @@ in vec4 v_tint;                 // vertex colour, linear, and opacity
 uniform vec4 u_base_factor;     // linear
 uniform bool u_has_base_factor; // if false, untextured surfaces use v_color
 uniform bool u_has_tint;        // v_tint multiplies the base colour and replaces v_color
+uniform bool u_toon;            // toon materials ignore vertex colours
 uniform int u_alpha_mode;       // 0: opaque, 1: mask, 2: blend
 uniform float u_alpha_cutoff;
 uniform mat3 u_places[7];       // transform of the texture coordinates of each image
@@ -44,7 +45,7 @@ vec4 base_color() {
     vec4 color = u_has_base_factor ? u_base_factor : vec4(u_has_tint ? vec3(1.0) : v_color, 1.0);
     if (u_textured)
         color = u_base_factor * texture(u_texture, place(BASE_MAP));
-    return u_has_tint ? v_tint * color : color;
+    return u_has_tint && !u_toon ? v_tint * color : color;
 }
 
 // Opacity of the surface; masked fragments are discarded.

@@ -18,7 +18,6 @@ uniform bool u_has_roughness_map;
 uniform bool u_has_emissive_map;
 uniform float u_occlusion_map_strength;  // 0: no map
 uniform vec3 u_emissive;        // linear
-uniform bool u_toon;
 uniform vec3 u_shade_color;     // colour of the side away from the key light, linear
 uniform vec2 u_shade_range;     // cosines at which the surface is fully in shade and fully lit
 uniform sampler2D u_shade_map;

@@ -98,5 +98,13 @@ def test_sign_in_a_format_is_not_a_condition() -> None:
     assert rendered("{change:+z.0f} %{more:+; {}}", {"change": 0.0, "more": "a"}) == "+0 %; a"
 
 
+def test_value_inside_its_condition_has_its_own_format() -> None:
+    template = "lit{names:+; not drawn: {:list}}"
+    assert rendered(template, {"names": ["scroll", "grade"]}) == "lit; not drawn: scroll, grade"
+    long = rendered(template, {"names": [*"abcdefgh"]})
+    assert long == "lit; not drawn: a, b, c, d, e, f and 2 more"
+    assert rendered(template, {"names": []}) == "lit"
+
+
 def test_empty_name_list_renders_as_none() -> None:
     assert rendered("{names:all}, {names:list}", {"names": []}) == "none, none"

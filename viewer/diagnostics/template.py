@@ -15,7 +15,7 @@
 ``{n:#frame/{all}}``   a count of a total: ``3 of 20 frames``; a verb may follow
 ``{n:?one|many}``      the first for 1, the second for other counts
 ``{near:+; {}}``       the rest of the specification unless the value is empty; ``{}`` is the value,
-                       and a list is joined by semicolons
+                       and a list is joined by semicolons; ``{:list}``: formatted as above
 =====================  ===========================================================================
 """
 
@@ -30,6 +30,7 @@ from viewer.phrases import counted, listed, one_of, printable, quoted
 
 _SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # specification of a signed number
 _PLACE = "\0"  # placeholder of a value inside its own specification
+_PLACED = re.compile("\0(?:([a-z0-9]+)\1)?")  # the placeholder, and the specification it may have
 _LONGEST = 1000  # maximum number of characters of a text value
 _LONGEST_NAME = 60
 _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
@@ -64,8 +65,9 @@ class _Formatter(Formatter):
             return one if value == 1 else many
         if kind == "+" and not _SIGNED.fullmatch(format_spec):
             # ``{}`` inside the specification has been replaced by the placeholder by now.
-            text = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
-            return rest.replace(_PLACE, printable(text, _LONGEST)) if value else ""
+            return _PLACED.sub(lambda place: _placed(value, place[1]), rest) if value else ""
+        if value == _PLACE and format_spec:
+            return f"{_PLACE}{format_spec}\1"
         if not format_spec and isinstance(value, str) and value != _PLACE:
             return printable(value, _LONGEST)
         if format_spec.startswith("list"):
@@ -76,6 +78,14 @@ class _Formatter(Formatter):
     def get_value(self, key: int | str, args: Any, kwargs: Mapping[str, Any]) -> Any:
         """Return a value by name; the empty name inside a specification is a placeholder."""
         return kwargs[key] if isinstance(key, str) and key else _PLACE
+
+
+def _placed(value: Any, format_spec: str | None) -> str:
+    """Return a value inside its own specification."""
+    if format_spec:
+        return _FORMATTER.format_field(value, format_spec)
+    text = "; ".join(map(str, value)) if isinstance(value, list | tuple) else value
+    return printable(text, _LONGEST)
 
 
 def _word(word: bytes | str | None) -> str:

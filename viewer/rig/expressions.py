@@ -7,7 +7,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
 
-__all__ = ["OVERRIDES", "PROCEDURAL", "ExpressionRules"]
+__all__ = ["OLD_PRESETS", "OVERRIDES", "PROCEDURAL", "ExpressionRules"]
 
 PROCEDURAL = {
     "mouth": ("aa", "ih", "ou", "ee", "oh"),
@@ -18,6 +18,14 @@ PROCEDURAL = {
 
 OVERRIDES = ("none", "block", "blend")
 """Effect on other expressions: none; off while this one is above 0; faded out by its weight."""
+
+OLD_PRESETS = {
+    **{"neutral": "neutral", "joy": "happy", "angry": "angry", "sorrow": "sad", "fun": "relaxed"},
+    **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},
+    **{"blink": "blink", "blink_l": "blinkLeft", "blink_r": "blinkRight"},
+    **{f"look{way.lower()}": f"look{way}" for way in ("Up", "Down", "Left", "Right")},
+}
+"""Names of expressions in VRM 0.x, in lower case, and their names in VRM 1.0."""
 
 _HALF = 0.5  # a binary expression is fully on above this weight, and off otherwise
 
@@ -36,12 +44,15 @@ class ExpressionRules:
         Index into ``PROCEDURAL``, -1 for other expressions.
     overrides : (E, 3) int32
         Effect on each kind of ``PROCEDURAL``: index into ``OVERRIDES``.
+    presets : tuple of str, (E,)
+        Name in VRM 1.0 of each expression whose own name may differ; otherwise empty.
     """
 
     rows: Ints
     is_binary: Bools
     kinds: Ints
     overrides: Ints
+    presets: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type) -> None:

@@ -97,6 +97,10 @@ class FileRecord:
         Blend shapes that are the morph targets of each part, in the order of its mesh.
     target_names : tuple of P tuple of str
         Names of these blend shapes in the file, which may repeat between parts or be empty.
+    scene : mapping
+        Name and application data of the scene, as parsed from JSON.
+    unkept : callable
+        Returns the members of the file that are not stored, such as ``images.extras``.
     vrm : VrmRecord or None
         Properties of a VRM character.
     """
@@ -109,4 +113,6 @@ class FileRecord:
     mesh_names: tuple[str, ...] = ()
     part_shapes: tuple[Ints, ...] = ()
     target_names: tuple[tuple[str, ...], ...] = ()
+    scene: Mapping[str, Any] = field(default_factory=dict)
+    unkept: Callable[[], tuple[str, ...]] = tuple
     vrm: VrmRecord | None = None

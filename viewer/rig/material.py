@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -68,6 +70,8 @@ class Material:
         Outline of toon shading.
     is_physical : bool
         Whether the file describes the surface by metalness and roughness, or as unlit.
+    extras : Any
+        Application data of a glTF file, as parsed from JSON; None if there is none.
     """
 
     name: str = ""
@@ -93,6 +97,7 @@ class Material:
     rim: Rim | None = None
     outline: Outline | None = None
     is_physical: bool = False
+    extras: Any = None
 
     def __post_init__(self) -> None:
         check_choice("alpha_mode", self.alpha_mode, ALPHA_MODES)

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import io
+import json
+import struct
 from dataclasses import fields, replace
 
 import numpy as np
 from export.seamed import UVS, seamed_mesh
+from formats.gltf.files import animated
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 import viewer
-from viewer.export import export
+from viewer.export import export, export_clips
 from viewer.formats._gltf.node_file import read_nodes
 from viewer.formats._source import Source
 from viewer.rig.figure import Figure
@@ -113,3 +116,29 @@ def test_vertex_colours_are_not_tinted_by_the_colour_of_the_figure(tmp_path):
     (material,) = viewer.load(tmp_path / "roof.glb").actors[0].figure.mesh.materials
     assert material.base_color == (1.0, 1.0, 1.0, 1.0)
     assert_array_equal(mesh.colors, 0.5)
+
+
+def test_application_data_of_a_file_is_kept_or_reported(tmp_path):
+    """Materials, scenes and animations keep theirs; members that are not read are listed."""
+    file = animated()
+    file.root["nodes"] = [{"mesh": file.mesh(TANGENT=file.accessor([[1, 0, 0, 1]] * 3))}]
+    file.primitive.update(material=0, extras={"layer": 3})
+    file.add("materials", {"name": "red", "extras": {"kind": "cloth"}})
+    file.root["animations"][0]["extras"] = {"loop": True}
+    file.root["animations"][0]["extensions"] = {"ACME_events": {}}
+    file.root["scenes"] = [{"nodes": []}, {"name": "stage", "extras": [1], "nodes": [0]}]
+    file.root["scene"] = 1
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    (actor,) = viewer.load(tmp_path / "a.glb").actors
+    path = tmp_path / "b.glb"
+    notes = export_clips(actor, path, clips=[each.clip() for each in actor.figure.animations])
+    data = path.read_bytes()
+    (size,) = struct.unpack_from("<I", data, 12)
+    root = json.loads(data[20 : 20 + size])
+    assert root["materials"][0]["extras"] == {"kind": "cloth"}
+    assert root["animations"][0]["extras"] == {"loop": True}
+    (scene,) = root["scenes"]
+    assert (scene["name"], scene["extras"]) == ("stage", [1])
+    (note,) = [note for note in notes if note.key == "X003.file-members"]
+    lost = ("animations.ACME_events", "attributes.TANGENT", "primitives.extras")
+    assert sorted(note.values["names"]) == sorted(lost)

@@ -80,6 +80,60 @@ def test_old_toon_materials_have_srgb_colours_and_different_thresholds(tmp_path:
     assert material.shade_range == pytest.approx((0.0, 0.5), abs=1e-12)
 
 
+def _old(tmp_path: Path, material: dict[str, Any], **told: Any) -> Any:
+    """Return a material that VRM 0.x overrides; both of its textures have the same image."""
+    told = {"shader": "VRM/MToon", **told}
+    return _read(
+        tmp_path,
+        materials=[material],
+        images=[{"uri": "missing.png"}],
+        textures=[{"source": 0}, {"source": 0}],
+        extensions={"VRM": {"materialProperties": [told]}},
+    )
+
+
+def test_old_textures_are_placed_like_the_main_texture(tmp_path: Path) -> None:
+    """Offset (0.25, 0.125) and scale (2, 3), v from the bottom, which is how images are stored."""
+    core = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
+    place = {"vectorProperties": {"_MainTex": [0.25, 0.125, 2.0, 3.0]}}
+    found = _old(tmp_path, core, **place)
+    wanted = [[2.0, 0.0, 0.25], [0.0, 3.0, 0.125]]
+    assert found.base_texture.matrix.tolist() == wanted
+    unlit = _old(tmp_path, core, **place, shader="VRM/UnlitTexture")
+    assert unlit.base_texture.matrix.tolist() == wanted and unlit.shade_color is None
+
+
+def test_old_materials_add_what_the_core_material_omits(tmp_path: Path) -> None:
+    told = {
+        "textureProperties": {"_MainTex": 0, "_BumpMap": 1},
+        "floatProperties": {"_BumpScale": 0.5, "_Cutoff": 0.25, "_CullMode": 0},
+        "keywordMap": {"_ALPHATEST_ON": True},
+    }
+    found = _old(tmp_path, {}, **told)
+    assert found.base_texture is not None and found.normal_texture is not None
+    assert (found.normal_scale, found.alpha_mode, found.alpha_cutoff) == (0.5, "mask", 0.25)
+    assert found.double_sided
+    found = _old(tmp_path, {"alphaMode": "OPAQUE", "doubleSided": False}, **told)
+    assert (found.alpha_mode, found.double_sided) == ("opaque", False)
+    assert _old(tmp_path, {}, keywordMap={"_ALPHABLEND_ON": True}).alpha_mode == "blend"
+
+
+def test_old_colours_replace_those_of_the_core_material(tmp_path: Path) -> None:
+    """Some exporters write an emission of 1 to the core material of every toon material."""
+    core = {
+        "pbrMetallicRoughness": {"baseColorFactor": [1.0, 1.0, 1.0, 1.0]},
+        "emissiveFactor": [1.0, 1.0, 1.0],
+    }
+    colors = {"_Color": [1.0, 0.5, 0.0, 0.25], "_EmissionColor": [0.0, 0.0, 0.0, 1.0]}
+    found = _old(tmp_path, core, vectorProperties=colors)
+    # 0.5 in sRGB is 0.2140411, as above; the opacity is linear.
+    assert found.base_color == pytest.approx((1.0, 0.2140411, 0.0, 0.25), abs=1e-7)
+    assert found.emissive == (0.0, 0.0, 0.0)
+    bright = {"_EmissionColor": [4.0, 2.0, 0.5, 1.0]}
+    assert _old(tmp_path, core, vectorProperties=bright).emissive == (4.0, 2.0, 0.5)
+    assert _old(tmp_path, core, vectorProperties={"_Color": "red"}).emissive == (1.0, 1.0, 1.0)
+
+
 def test_invalid_toon_values_disable_the_shade(tmp_path: Path) -> None:
     toon = {"shadeColorFactor": "red", "shadingToonyFactor": 7}
     material = _read(tmp_path, materials=[{"extensions": {"VRMC_materials_mtoon": toon}}])

@@ -14,6 +14,7 @@ import viewer
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.pose import rest_pose
+from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.shape import shaped
 
@@ -101,6 +102,27 @@ def test_binds_of_version_0_expressions_are_in_percent(tmp_path: Path) -> None:
     for weight, expected in ((0.4, 0.0), (0.6, 1.0)):
         found = shaped(figure, np.array([0.0, 0.0, weight])).require_mesh().positions - rest
         assert_allclose(found, np.tile([0.0, expected, 0.0], (3, 1)))
+
+
+def test_expressions_of_version_0_are_found_by_their_preset(tmp_path: Path) -> None:
+    """Programs name expressions freely, or not at all; motions have the names of VRM 1.0."""
+    binds = [{"mesh": 0, "index": 1, "weight": 100}]
+    groups = [
+        {"name": "A wide smile", "presetName": "Joy", "binds": binds},
+        {"name": None, "presetName": "blink_l", "binds": binds},
+        {"name": "sad", "presetName": "unknown", "binds": binds},
+        {"presetName": None, "binds": binds},
+    ]
+    _, figure = _loaded(_file(VRM={"blendShapeMaster": {"blendShapeGroups": groups}}), tmp_path)
+    assert figure.blend_shapes is not None
+    names = ("A wide smile", "blink_l", "sad", "unnamed")
+    assert figure.blend_shapes.names[2:] == names
+    motion = {"happy": [0.25], "blinkLeft": [0.5], "sad": [1.0], "aa": [0.75]}
+    rows = {name: np.array(row) for name, row in motion.items()}
+    weights, notes = expression_weights(rows, figure)
+    assert weights is not None
+    assert_allclose(weights, [[0.0, 0.0, 0.25, 0.5, 1.0, 0.0]])
+    assert [note.values["names"] for note in notes] == [["aa"]]
 
 
 @pytest.mark.parametrize("version", [0, 1])

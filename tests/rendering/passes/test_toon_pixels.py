@@ -17,6 +17,7 @@ from rendering.front_view import (
     encoded,
     front_view,
     grid_figure,
+    painted,
     pixel,
     texture,
 )
@@ -99,6 +100,18 @@ def test_matcap_is_relative_to_the_eye(offscreen):
     corners = {(-0.6, 0.6): (255, 0, 0), (0.6, 0.6): (0, 255, 0), (-0.6, -0.6): (0, 0, 255)}
     for (x, y), color in corners.items():
         assert_allclose(pixel(shown, x, y)[:3], color, atol=40)
+
+
+def test_toon_materials_ignore_vertex_colours(offscreen):
+    """As VRMC_materials_mtoon 1.0 requires; other materials are multiplied by them."""
+    lit = replace(SHADED, base_color=(1.0, 1.0, 0.0, 1.0), shade_range=(-3.0, -2.0))
+    plain = replace(lit, shade_color=None)
+    for material, wanted in ((lit, [255, 255, 0]), (plain, [255, 0, 0])):
+        figure = painted(material)
+        red = np.tile([1.0, 0.0, 0.0, 1.0], (4, 1))
+        figure = replace(figure, mesh=replace(figure.require_mesh(), colors=red))
+        shown = front_view(offscreen, alone(figure), lights=dark(), shadows=False)
+        assert_allclose(pixel(shown, 0, 0)[:3], wanted, atol=2)
 
 
 # Outlines

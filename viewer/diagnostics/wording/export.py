@@ -92,6 +92,7 @@ MESSAGES = {
     "X003.json-numbers": "{n:#infinite or undefined number} of the original file {n:?is|are} "
     "omitted, or 0 in lists: JSON cannot store {n:?it|them}",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
+    "X003.file-members": "{n:#member} of the original file {n:?is|are} not copied: {names:list}",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
     "only the keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "

@@ -16,7 +16,7 @@ from viewer.export._gltf.mesh import add_mesh
 from viewer.export._gltf.nodes import Locals, Tree, add_nodes
 from viewer.export._gltf.parts import parts_of
 from viewer.export._gltf.reading import Placed
-from viewer.export._gltf.records import add_record
+from viewer.export._gltf.records import add_record, scene_members
 from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import Influences, influences_of, inverse_bind_matrices
 from viewer.rig.arrays import Floats
@@ -105,7 +105,7 @@ def add_body(
     if figure.skeleton is not None:
         counts.append(Phrase("written-joints", n=figure.skeleton.n_joints))
     if "scenes" not in document.root:
-        document.root["scene"] = document.add("scenes", {"nodes": []})
+        document.root["scene"] = document.add("scenes", {**scene_members(record), "nodes": []})
     document.root["scenes"][0]["nodes"] += scene
     return Built(tree, meshes, counts, errors, scene, materials)
 

@@ -77,6 +77,7 @@ class Clips:
         known = self._known.setdefault(name, [])
         common = next((index for index in known if index not in taken), -1)
         item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}
+        item |= {} if clip.extras is None else {"extras": clip.extras}
         index = put_animation(self._document, item, keys.samplers, keys.channels, common)
         if common < 0:
             known.append(index)

@@ -216,7 +216,10 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
         lost.append(Phrase("part-constraints", n=len(skeleton.constraints)))
     if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))
-    return not_held_note("glTF", lost)
+    members = () if figure.record is None else figure.record.unkept()
+    values = {"names": members, "n": len(members)}
+    notes = not_held_note("glTF", lost)
+    return notes + ([Diagnostic("X003.file-members", values=values)] if members else [])
 
 
 def _lost_looks(figure: Figure) -> list[Phrase]:

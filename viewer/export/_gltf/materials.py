@@ -93,6 +93,7 @@ class Materials:
     def _rest(self, material: Material, shown: dict[str, Texture], name: str) -> dict[str, Any]:
         """Return the remaining properties: normals, occlusion, emission, opacity and culling."""
         rest: dict[str, Any] = {"doubleSided": material.double_sided}
+        rest |= {} if material.extras is None else {"extras": material.extras}
         extensions: dict[str, Any] = {}
         if "normal_texture" in shown:
             normal = self._reference(shown["normal_texture"], name)

@@ -36,6 +36,12 @@ def add_record(document: Document, record: FileRecord, joints: list[int], name: 
         document.root["nodes"][joints[joint]]["extras"] = extras
 
 
+def scene_members(record: FileRecord | None) -> dict[str, Any]:
+    """Return the name and application data of the scene of a figure's file."""
+    scene = {} if record is None else record.scene
+    return {name: text_of(value) if name == "name" else value for name, value in scene.items()}
+
+
 def merged_extras(given: list[tuple[str, Any]]) -> Any:
     """Return the application data of a file: that of all figures, or a list if these differ.
 

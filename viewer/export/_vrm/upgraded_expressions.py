@@ -12,18 +12,13 @@ from typing import Any
 
 from viewer.formats._vrm.json_parts import listed, part
 from viewer.formats._vrm.material_values import old_binds
+from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.materials.material_binds import TRANSFORM
 
 __all__ = ["upgraded_expressions"]
 
 _PERCENT = 100.0
-_PRESETS = {
-    **{"neutral": "neutral", "joy": "happy", "angry": "angry", "sorrow": "sad", "fun": "relaxed"},
-    **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},
-    **{"blink": "blink", "blink_l": "blinkLeft", "blink_r": "blinkRight"},
-    **{f"look{way.lower()}": f"look{way}" for way in ("Up", "Down", "Left", "Right")},
-}
 
 
 def upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict[str, Any]:
@@ -41,7 +36,7 @@ def upgraded_expressions(told: Any, record: VrmRecord, lost: list[str]) -> dict[
         binds = _binds(each, record)
         expression |= {"morphTargetBinds": binds} if binds else {}
         expression |= _material_binds(each, materials, lost)
-        preset = _PRESETS.get(str(each.get("presetName", "")).lower(), "")
+        preset = OLD_PRESETS.get(str(each.get("presetName", "")).lower(), "")
         if preset and preset not in found["preset"]:
             found["preset"][preset] = expression
         else:

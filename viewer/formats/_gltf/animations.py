@@ -76,7 +76,8 @@ def _animation(
     start, end = _range(document, animation, inputs)
     read = partial(_channels, document, targets, animation, (start, end))
     name, pointer = animation.text("name"), animation.pointer
-    return NodeAnimation(name, start, end, frozenset(nodes), read, pointer)
+    extras = animation.values.get("extras")
+    return NodeAnimation(name, start, end, frozenset(nodes), read, pointer, extras)
 
 
 def _channels(

@@ -8,7 +8,7 @@ from typing import Any
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf_materials.materials import DRAWN_EXTENSIONS
 
-__all__ = ["check_extensions"]
+__all__ = ["KEPT_EXTENSIONS", "check_extensions"]
 
 _GEOMETRY = (
     "KHR_animation_pointer",
@@ -30,7 +30,10 @@ _CHARACTERS = (
 _ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
 
-_KNOWN = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS, *_WITHOUT_EFFECT))
+KEPT_EXTENSIONS = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS))
+"""Extensions whose effect is written back, if not always in the same form."""
+
+_KNOWN = KEPT_EXTENSIONS | {*_WITHOUT_EFFECT}
 """Extensions that a file may require."""
 
 

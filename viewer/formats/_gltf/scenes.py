@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from viewer.formats._gltf.document import Document
@@ -9,7 +11,7 @@ from viewer.formats._gltf.elements import Element
 from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeTree
 
-__all__ = ["shown_roots"]
+__all__ = ["shown_roots", "shown_scene"]
 
 
 def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
@@ -33,6 +35,16 @@ def shown_roots(document: Document, tree: NodeTree) -> tuple[int, ...]:
     if not roots and every:
         scene.warn("F007.gltf-empty-scene")
     return roots or every
+
+
+def shown_scene(document: Document) -> dict[str, Any]:
+    """Return the name and the application data of the default scene or the first one."""
+    scenes = document.table("scenes")
+    if not len(scenes):
+        return {}
+    scene = scenes[max(document.root.index("scene", len(scenes), "scenes"), 0)]
+    name, extras = scene.text("name"), scene.values.get("extras")
+    return ({"name": name} if name else {}) | ({} if extras is None else {"extras": extras})
 
 
 def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:

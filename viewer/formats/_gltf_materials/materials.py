@@ -118,6 +118,8 @@ def _slots(stated: _Stated) -> list[Slot]:
 def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
     """Return the properties of a material; ``toon`` contains VRM's properties, if any."""
     source = document.source
+    if toon is not None and toon.core is not None:
+        element = toon.core
     surface = lenient(source, lambda: element.part("pbrMetallicRoughness"), None)
     glossiness = None
     if surface is None:
@@ -137,6 +139,7 @@ def _stated(document: Document, element: Element, toon: Toon | None) -> _Stated:
         "unlit": toon is not None
         or lenient(source, lambda: element.extension("KHR_materials_unlit"), None) is not None,
         "is_physical": True,
+        "extras": element.values.get("extras"),
         **({} if toon is None else toon.values),
     }
     slots = {

@@ -8,15 +8,16 @@
              vectorProperties._ShadeColor (sRGB), textureProperties._ShadeTexture,
              floatProperties._ShadeToony, ._ShadeShift, …, which are translated to version 1.0
 
-Exporters also write the lit side's base colour, texture and opacity to the core material. With the
-cosine c of the angle of incidence, the fraction of the lit colour rises linearly from 0 to 1
-between c = toony - 1 - shift and c = 1 - toony - shift.
+Exporters also write the lit side's base colour, texture and opacity to the core material; those of
+version 0.x are replaced by ``old_core.py``. With the cosine c of the angle of incidence, the
+fraction of the lit colour rises linearly from 0 to 1 between c = toony - 1 - shift and
+c = 1 - toony - shift.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any
 
 from viewer.data_classes import dataclass
@@ -25,6 +26,7 @@ from viewer.formats._gltf.elements import Element
 from viewer.formats._gltf_materials.textures import Slot, read_slot
 from viewer.formats._vrm.json_parts import part
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.old_core import overridden
 from viewer.formats._vrm.old_toon import modern_toon
 from viewer.rig.materials.toon import Outline, Rim
 
@@ -64,10 +66,13 @@ class Toon:
     slots : mapping of Slot
         Textures by field of ``Material``, or by fields of its rim light and outline:
         ``"rim.texture"``.
+    core : Element or None
+        The core material with the members that VRM 0.x adds; None if it adds none.
     """
 
     values: dict[str, Any] = field(default_factory=dict)
     slots: Mapping[str, Slot] = field(default_factory=dict)
+    core: Element | None = None
 
 
 def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
@@ -84,14 +89,16 @@ def read_toon(document: Document, elements: list[Element]) -> dict[int, Toon]:
     omitted: dict[str, None] = {}
     listed = part(document.root.values, "extensions", "VRM", "materialProperties")
     for index, each in enumerate(listed[: len(elements)] if isinstance(listed, list) else ()):
-        shader = part(each, "shader")
+        shader, pointer = part(each, "shader"), elements[index].pointer
+        if shader != _SHADER and not (isinstance(shader, str) and shader.startswith(_UNLIT)):
+            continue
+        found[index] = Toon()
         if shader == _SHADER:
             told, lost = modern_toon(each)
-            element = Element(document.source, told, elements[index].pointer)
-            found[index] = _toon(document, element)
+            found[index] = _toon(document, Element(document.source, told, pointer))
             omitted |= dict.fromkeys([*lost, *_omitted(told)])
-        elif isinstance(shader, str) and shader.startswith(_UNLIT):
-            found[index] = Toon()
+        core = overridden(elements[index].values, each)
+        found[index] = replace(found[index], core=Element(document.source, core, pointer))
     for index, element in enumerate(elements):
         modern = part(element.values, "extensions", MTOON)
         if isinstance(modern, dict):

@@ -214,6 +214,8 @@ class NodeAnimation:
         Returns the channels; called at most once, may raise a ``FormatError``.
     pointer : str
         JSON pointer to it; empty for files without JSON.
+    extras : Any
+        Application data, as parsed from JSON; None if there is none.
     """
 
     name: str
@@ -222,6 +224,7 @@ class NodeAnimation:
     nodes: frozenset[int]
     read: Callable[[], tuple[NodeChannel, ...]]
     pointer: str = ""
+    extras: Any = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -264,6 +267,8 @@ class NodeExpression:
         Entry of ``OVERRIDES`` for each key of ``PROCEDURAL``.
     materials : tuple of (int, str, (4,))
         Material, kind and target of each change of a material; see ``MaterialBinds``.
+    preset : str
+        Name in VRM 1.0; empty if there is none.
     """
 
     name: str
@@ -272,6 +277,7 @@ class NodeExpression:
     kind: str = ""
     overrides: Mapping[str, str] = field(default_factory=dict)
     materials: tuple[tuple[int, str, Floats], ...] = ()
+    preset: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -298,6 +304,10 @@ class NodeFile:
         Application data of the root, as parsed from JSON; None if there is none.
     asset : dict
         Generator, copyright and the like.
+    scene : dict
+        Name and application data of the scene that is shown, as parsed from JSON.
+    unkept : callable
+        Returns the members of the file that are not read, such as ``images.extras``.
     humanoid : dict of int
         Node of each human bone, by its name in VRM 1.0; empty if the file states none.
     expressions : tuple of NodeExpression
@@ -333,6 +343,8 @@ class NodeFile:
     extensions: Mapping[str, Any] = field(default_factory=dict)
     extras: Any = None
     asset: Mapping[str, Any] = field(default_factory=dict)
+    scene: Mapping[str, Any] = field(default_factory=dict)
+    unkept: Callable[[], tuple[str, ...]] = tuple
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
     constraints: tuple[Constraint, ...] = ()

@@ -96,7 +96,8 @@ def _bound(
 def _clip(
     animation: NodeAnimation, channels: Callable[[], tuple[TransformChannel, ...]]
 ) -> Callable[[], TransformClip]:
-    return lambda: TransformClip(animation.name, channels(), animation.start, animation.end)
+    start, end, extras = animation.start, animation.end, animation.extras
+    return lambda: TransformClip(animation.name, channels(), start, end, extras)
 
 
 def _channel(

@@ -55,6 +55,8 @@ def record_of(
         mesh_names=tuple(mesh.name for mesh in meshes),
         part_shapes=tuple(columns.get(node, none) for node in nodes),
         target_names=tuple(mesh.target_names for mesh in meshes),
+        scene=file.scene,
+        unkept=file.unkept,
         vrm=_vrm_record(file, joints, nodes, pieces),
     )
 

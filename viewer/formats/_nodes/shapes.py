@@ -204,6 +204,7 @@ def _rules(mixed: list[NodeExpression], first: int) -> ExpressionRules:
                 for each in mixed
             ]
         ),
+        presets=tuple(each.preset for each in mixed),
     )
 
 

@@ -11,14 +11,13 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._vrm.json_parts import part
-from viewer.formats._vrm.material_values import main_transform
 from viewer.formats._vrm.numbers import rows_of, value_of
+from viewer.formats._vrm.old_core import placement
 from viewer.formats._vrm.toon_ramp import modern_ramp
 from viewer.rig.srgb import decode_srgb
 
 __all__ = ["modern_toon"]
 
-_TRANSFORM = "KHR_texture_transform"
 _TEXTURES = {
     "_ShadeTexture": "shadeMultiplyTexture",
     "_SphereAdd": "matcapTexture",
@@ -88,12 +87,9 @@ def modern_toon(told: Any) -> tuple[dict[str, Any], list[str]]:
 
 def _textures(told: Any) -> dict[str, Any]:
     """Return the textures, placed like the main texture, except for the sphere map."""
-    found, values = dict[str, Any](), main_transform(told).tolist()
-    is_moved, place = values != [1.0, 1.0, 0.0, 0.0], {"scale": values[:2], "offset": values[2:]}
+    found, placed = dict[str, Any](), placement(told)
     for old, new in _TEXTURES.items():
         index = part(told, "textureProperties", old)
         if isinstance(index, int):
-            found[new] = {"index": index}
-            if is_moved and old != "_SphereAdd":
-                found[new]["extensions"] = {_TRANSFORM: place}
+            found[new] = {"index": index} | (placed if old != "_SphereAdd" else {})
     return found

@@ -22,7 +22,7 @@ from viewer.formats._vrm.material_values import modern_binds, old_binds
 from viewer.formats._vrm.numbers import value_of
 from viewer.formats._vrm.references import named_nodes
 from viewer.formats._vrm.springs import read_springs
-from viewer.rig.expressions import OVERRIDES, PROCEDURAL
+from viewer.rig.expressions import OLD_PRESETS, OVERRIDES, PROCEDURAL
 from viewer.rig.springs.springs import Springs
 
 __all__ = ["with_vrm"]
@@ -123,7 +123,7 @@ def _expressions(
     """Return the expressions that change shapes or materials; report changes without effect."""
     if version == 0:
         groups = listed(told, "blendShapeMaster", "blendShapeGroups")
-        named = [(each.get("name"), each) for each in groups if isinstance(each, dict)]
+        named = [(_old_name(each), each) for each in groups if isinstance(each, dict)]
         at = f"{pointer}/blendShapeMaster/blendShapeGroups"
     else:
         kinds = [part(told, "expressions", kind) for kind in ("preset", "custom")]
@@ -155,13 +155,20 @@ def _expression(
         effect = told.get(key, "none")
         overrides[kind] = effect if effect in OVERRIDES else "none"
     kinds = [kind for kind, names in PROCEDURAL.items() if name in names]
+    preset = str(told.get("presetName") or "").lower()
     return NodeExpression(
         name,
         binds,
         is_binary=told.get("isBinary") is True,
         kind=kinds[0] if kinds else "",
         overrides=overrides,
+        preset=OLD_PRESETS.get(preset, ""),
     )
+
+
+def _old_name(told: Mapping[str, Any]) -> str:
+    """Return the name of an expression of VRM 0.x, or that of its preset if it has none."""
+    return str(told.get("name") or told.get("presetName") or "unnamed")
 
 
 def _binds(

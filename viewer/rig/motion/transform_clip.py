@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 
@@ -108,12 +108,15 @@ class TransformClip:
         At most one per joint and path; properties without a channel have their values in the pose.
     start, end : float
         Playback range in seconds.
+    extras : Any
+        Application data of its file, as parsed from JSON; None if there is none.
     """
 
     name: str
     channels: tuple[TransformChannel, ...]
     start: float
     end: float
+    extras: Any = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", float(self.start))

@@ -8,17 +8,11 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.rig.arrays import Floats
+from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.figure import Figure
 from viewer.rig.scene import figure_pose
 
 __all__ = ["expression_weights"]
-
-# Names in VRM 0.x, in lower case, and their names in VRM 1.0.
-_OLD = {
-    **{"joy": "happy", "sorrow": "sad", "fun": "relaxed"},
-    **{"a": "aa", "i": "ih", "u": "ou", "e": "ee", "o": "oh"},
-    **{"blink_l": "blinkleft", "blink_r": "blinkright"},
-}
 
 
 def expression_weights(
@@ -44,6 +38,10 @@ def expression_weights(
     names = () if shapes is None else shapes.names
     # Expressions come after the morph targets, whose names they may share.
     columns = {_plain(name): column for column, name in enumerate(names)}
+    rules = None if shapes is None else shapes.rules
+    for row, preset in zip(rules.rows, rules.presets, strict=False) if rules is not None else ():
+        if preset:
+            columns[_plain(preset)] = int(row)
     found = {name: columns[_plain(name)] for name in expressions if _plain(name) in columns}
     missing = [name for name, rows in expressions.items() if name not in found and rows.any()]
     notes = [Diagnostic("F007.expressions-unmatched", values={"names": missing})] if missing else []
@@ -58,4 +56,4 @@ def expression_weights(
 
 def _plain(name: str) -> str:
     lower = name.lower()
-    return _OLD.get(lower, lower)
+    return OLD_PRESETS.get(lower, lower).lower()
