@@ -396,15 +396,3 @@ def test_file_of_the_first_stage_is_refused_as_a_motion(tmp_path):
 def test_archives_of_other_data_are_described_by_their_keys(tmp_path):
     path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
     assert refusal(path) == (("F002.motion", None, {"keys": ["pose_body"]}))
-
-
-@pytest.mark.parametrize("keys", ["poses", "root_orient pose_body"])
-def test_objects_that_cannot_be_read_are_ignored(tmp_path, keys):
-    widths = {"poses": 66, "root_orient": 3, "pose_body": 63}
-    arrays = {key: waves(4, widths[key]) for key in keys.split()}
-    labels = np.array([pickle.Pickler], dtype=object)
-    path = saved(tmp_path / "a.npz", trans=waves(4, 3), mocap_framerate=60.0, **arrays)
-    with np.load(path) as stored:
-        np.savez(path, labels_of_frames=labels, **dict(stored))
-    assert detect(Source.open(path)) == "amass"
-    assert motion_of(path)[0].vectors.shape == (4, 22, 3)
