@@ -62,7 +62,7 @@ def _ask_to_close(display, window):
 class Window:
     """A running viewer, its window, mouse and keyboard."""
 
-    def __init__(self, display, folder, arguments):
+    def __init__(self, display, folder, arguments, program=("-m", "viewer")):
         self.display, self.folder = display, folder
         self.environment = {
             **os.environ,
@@ -74,7 +74,7 @@ class Window:
         }
         self.environment.pop("WAYLAND_DISPLAY", None)
         self.process = subprocess.Popen(
-            listening("-m", "viewer", *arguments),
+            listening(*program, *arguments),
             cwd=folder, env=self.environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
         self.id = _wait_for(self._find, "the window")

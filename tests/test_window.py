@@ -77,8 +77,8 @@ def window(display, figure, tmp_path):
     """Return a function that starts the viewer; windows left open are closed."""
     started = []
 
-    def start(*options):
-        started.append(Window(display, tmp_path, [*(options or DRAFT), *figure]))
+    def start(*options, **changes):
+        started.append(Window(display, tmp_path, [*(options or DRAFT), *figure], **changes))
         return started[-1]
 
     yield start
@@ -95,6 +95,56 @@ def places(figure):
     rects, view = dict(driver.state.item_rects), driver.state.view_rect
     driver.close()
     return rects, view
+
+
+# A viewer whose files can be read as soon as a file called "go" exists.
+SLOW = """
+import sys, time
+from pathlib import Path
+import viewer.app.opening, viewer.commands.view as view
+from viewer.__main__ import main
+from viewer.progress import report
+viewer.app.opening._PATIENCE, start = 0.0, view._start
+def slow(*given):
+    while not Path("go").exists():
+        report(1, 4, "MB")
+        time.sleep(0.01)
+    return start(*given)
+view._start = slow
+sys.exit(main())
+"""
+
+
+def test_window_shows_progress_until_the_files_are_open(window, tmp_path):
+    usual = window()
+    wanted = usual.wait_until_quiet()
+    usual.key("ctrl+q")
+    usual.finish()
+    app = window(program=("-c", SLOW))
+    assert (app.wait_until_quiet() != wanted).any()
+    (tmp_path / "go").touch()
+    app.wait_until_shown(wanted, np.s_[:])
+    app.wait_until_quiet()
+    app.key("ctrl+q")
+    app.finish()
+
+
+@pytest.mark.parametrize("key", ["Escape", ""])
+def test_opening_is_cancelled_in_the_window(window, display, key):
+    app = window(program=("-c", SLOW))
+    if key:
+        app.key(key)
+    else:
+        _ask_to_close(display, int(app.id))
+    app.finish()
+
+
+def test_error_while_the_window_shows_progress_ends_the_program(window, tmp_path):
+    app = window("missing.bvh", program=("-c", SLOW))
+    (tmp_path / "go").touch()
+    out, err = app.process.communicate(timeout=PATIENCE)
+    assert (app.process.returncode, out) == (2, b"")
+    assert err.startswith(b"missing.bvh: ") and err.count(b"\n") == 1
 
 
 def test_window_responds_to_mouse_and_keyboard(window, places, figure):

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["Cancelled", "Receiver", "receiving", "report", "report_bytes", "silent"]
+__all__ = ["Cancelled", "Receiver", "receiver", "receiving", "report", "report_bytes", "silent"]
 
 Receiver = Callable[[int, int, str, str], None]
 """Called with the completed steps, their total (0 if unknown), their unit, and a description of the
@@ -29,6 +29,11 @@ def receiving(receive: Receiver) -> Iterator[None]:
         yield
     finally:
         _receiver.reset(token)
+
+
+def receiver() -> Receiver | None:
+    """Return the function that currently receives the progress."""
+    return _receiver.get()
 
 
 @contextmanager

@@ -132,3 +132,12 @@ def test_archive_with_unknown_keys_is_refused(tmp_path, arrays, key, found):
     np.savez(tmp_path / "a.npz", **arrays)
     other, line, values = refusal_of(lambda: detect(Source.open(tmp_path / "a.npz")))
     assert (other, line, values.get("found")) == (key, None, found)
+
+
+@pytest.mark.parametrize("keys", [["poses"], ["root_orient", "pose_body"]])
+def test_motions_are_recognised_in_spite_of_objects_that_cannot_be_read(tmp_path, keys):
+    widths = {"poses": 66, "root_orient": 3, "pose_body": 63}
+    arrays = {key: np.zeros((4, widths[key])) for key in keys}
+    objects = np.array([gzip.GzipFile], dtype=object)
+    np.savez(tmp_path / "a.npz", mocap_framerate=60.0, labels=objects, **arrays)
+    assert detect(Source.open(tmp_path / "a.npz")) == "amass"

@@ -64,8 +64,7 @@ __all__ = ["Frame"]
 
 _ADDED = {*FORMATS["pose"].suffixes, *PICTURES}
 """Suffixes of poses and textures, which are applied to the open figure."""
-_LAID_OUT = 2
-"""First frame in which the panels leave room for the view; ImGui counts from 1."""
+_LAID_OUT = 2  # first frame in which the panels leave room for the view, counted from 1
 
 
 class Frame:
@@ -97,8 +96,8 @@ class Frame:
         self._preview = Preview(programs)
         self.outlines = OutlineLayer(self.context)
         self._drawn: object = None
-        self._keys = PictureKeys()
-        self.pace = Pace()
+        self._n_frames = 0
+        self._keys, self.pace = PictureKeys(), Pace()
         self._is_software = is_software(self.context)
         state.stats.renderer = self.context.info["GL_RENDERER"]
         state.stats.version = self.context.info["GL_VERSION"]
@@ -123,6 +122,7 @@ class Frame:
     def run(self, scale: float) -> None:
         """Run a frame without painting the panels."""
         state = self.state
+        self._n_frames += 1
         drop_motion_before_press()
         follow_preferences(state)
         if not stops_time(state):
@@ -209,7 +209,7 @@ class Frame:
         state = self.state
         x, y, width, height = state.view_rect
         size = (round(width * scale), round(height * scale))
-        if min(size) < 1 or (state.panels_visible and imgui.get_frame_count() < _LAID_OUT):
+        if min(size) < 1 or (state.panels_visible and self._n_frames < _LAID_OUT):
             return
         renderer = self.renderer
         renderer.annotations = pinned_annotations(state, size)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import ctypes
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from viewer.app.display import find_display, import_glfw, window_error
+from viewer.app.display import find_display, import_glfw
 from viewer.app.files.state import Files
 from viewer.app.shown_panels import ShownPanels
 from viewer.app.weights.state import Weights
 
 glfw = import_glfw()
 
-import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
-from imgui_bundle import imgui, implot  # noqa: E402
+from imgui_bundle import imgui  # noqa: E402  after glfw, whose library imgui-bundle chooses
 
 from viewer.app.core.jobs import FrameJob  # noqa: E402
 from viewer.app.core.state import AppState  # noqa: E402
@@ -27,27 +25,22 @@ from viewer.app.files.recent import (  # noqa: E402
     remember,
     save_arranged,
     save_closed_panels,
-    state_folder,
 )
 from viewer.app.frame import Frame  # noqa: E402
 from viewer.app.layout import Layout  # noqa: E402
-from viewer.app.preferences.applying import scale_of, start_with  # noqa: E402
-from viewer.app.preferences.state import Appearance, Preferences  # noqa: E402
+from viewer.app.preferences.applying import start_with  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
-from viewer.app.preferences.system_theme import system_theme  # noqa: E402
-from viewer.app.theme import add_system_fonts, apply_theme  # noqa: E402
-from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before  # noqa: E402
+from viewer.app.shell import Shell, create_context, create_window  # noqa: E402
+from viewer.app.theme import add_system_fonts  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
-from viewer.errors import RenderError  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
 from viewer.loading.capturing import Builder  # noqa: E402
 from viewer.phrases import printable  # noqa: E402
 from viewer.rendering.camera import Camera, facing_camera  # noqa: E402
-from viewer.rendering.gpu.context import explain  # noqa: E402
 from viewer.rendering.gpu.program import Programs  # noqa: E402
 from viewer.rendering.options import DisplayOptions  # noqa: E402
 from viewer.rig.inspection.front import guess_front  # noqa: E402
@@ -56,7 +49,6 @@ from viewer.rig.scene import Scene, scene_points  # noqa: E402
 
 __all__ = ["Rest", "awaits_tooltip", "probe", "show"]
 
-_SIZE = (1280, 800)
 _SETTLE_FRAMES = 3  # frames drawn after an event: ImGui's layout needs two frames
 _FIRST_FRAMES = 3  # frames after which fonts for additional scripts are loaded
 _IDLE_SECONDS = 0.5  # interval between checks for messages that time out, seconds
@@ -73,6 +65,7 @@ def show(
     builders: Sequence[Builder] = (),
     plays: bool = False,
     motion: MotionSettings | None = None,
+    shell: Shell | None = None,
 ) -> None:
     """Open a window and return when it is closed.
 
@@ -96,6 +89,8 @@ def show(
         Whether motions play from the start.
     motion : MotionSettings, optional
         Settings with which the scene's motions were read.
+    shell : Shell, optional
+        Window that is already open; a new one if omitted. It is closed at the end.
 
     Raises
     ------
@@ -104,8 +99,9 @@ def show(
     RenderError
         If there is no usable OpenGL.
     """
-    find_display()
-    preferences = load_preferences()
+    if shell is None:
+        find_display()
+    preferences = load_preferences() if shell is None else shell.preferences
     options = options or DisplayOptions(samples=preferences.samples, quality=preferences.quality)
     points = scene_points(scene, options.show)
     camera = camera or facing_camera(guess_front(scene), scene.up)
@@ -125,7 +121,9 @@ def show(
     state.of(Layout).is_arranged = load_arranged()
     state.say(*filter(None, [remember(opened.recent, files)]))
     state.clock.playing = plays and state.clock.has_motion
-    window = _Window(state, scale)
+    shell = shell or Shell(_title(state), scale)
+    state.put(shell.appearance)
+    window = _Window(state, shell)
     try:
         window.frame.stream(builders)
         window.run()
@@ -136,10 +134,10 @@ def show(
 def probe() -> str:
     """Open a hidden window and return its renderer and OpenGL version; raises as ``show``."""
     find_display()
-    handle = _create_window("viewer", is_visible=False)
+    handle = create_window("viewer", is_visible=False)
     try:
         glfw.make_context_current(handle)
-        context = _context()
+        context = create_context()
         found = f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
         context.release()
         return found
@@ -149,84 +147,13 @@ def probe() -> str:
 
 
 class _Window:
-    """One GLFW window with its OpenGL and ImGui contexts, and its frame loop."""
+    """The frame loop of one window."""
 
-    def __init__(self, state: AppState, scale: float | None) -> None:
-        self.state = state
-        self.handle = _create_window(_title(state), scale=scale or state.of(Preferences).scale)
-        try:
-            glfw.make_context_current(self.handle)
-            glfw.swap_interval(1)
-            self.context = _context()
-        except BaseException:
-            glfw.destroy_window(self.handle)
-            stop_watching()
-            raise
-        self._dropped: list[Path] = []
-        self._is_dirty = True
+    def __init__(self, state: AppState, shell: Shell) -> None:
+        self.state, self.shell, self.handle = state, shell, shell.handle
         self._n_drawn = 0
-        self._title = ""
-        self._typed_keys = TypedKeys()
-        self._set_callbacks()
-        self._imgui: Any = imgui.create_context()
-        self._implot: Any = implot.create_context()
-        self._set_up_imgui(scale)
-        self.frame = Frame(state, Programs(self.context), glfw.post_empty_event, keeps_recent=True)
-
-    def _set_callbacks(self) -> None:
-        """Set callbacks that only record events for the loop, so that none of them can raise."""
-        glfw.set_drop_callback(self.handle, self._on_drop)
-        glfw.set_framebuffer_size_callback(self.handle, self._on_change)
-        glfw.set_window_refresh_callback(self.handle, self._on_change)
-
-    def _on_drop(self, _: Any, names: Sequence[str]) -> None:
-        self._dropped += map(Path, names)
-
-    def _on_key(self, _: Any, key: int, code: int, action: int, modifiers: int) -> None:
-        is_typing = imgui.get_io().want_text_input
-        if self._typed_keys.passes(key, action, modifiers, is_typing):
-            end_frame_before(self._imgui.input_events_queue, key, action)
-            imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
-
-    def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
-        end_frame(self._imgui.input_events_queue)
-        imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
-
-    def _on_change(self, *_: Any) -> None:
-        self._is_dirty = True
-
-    def _set_up_imgui(self, scale: float | None) -> None:
-        io = imgui.get_io()
-        io.config_flags |= imgui.ConfigFlags_.docking_enable
-        folder = state_folder()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            io.set_ini_filename(str(folder / "layout.ini"))
-        except OSError as problem:
-            io.set_ini_filename(None)
-            self.state.say(f"the layout cannot be saved: {problem.strerror}")
-        appearance, preferences = self.state.of(Appearance), self.state.of(Preferences)
-        appearance.given_scale, appearance.screen_scale = scale, self._screen_scale()
-        if preferences.theme == "system":
-            appearance.system_theme = system_theme()
-        appearance.scale = scale_of(self.state)
-        apply_theme(appearance.scale)
-        self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
-        imgui.backends.glfw_init_for_opengl(self._address, True)
-        # These replace callbacks of ImGui.
-        glfw.set_key_callback(self.handle, self._on_key)
-        glfw.set_mouse_button_callback(self.handle, self._on_button)
-        imgui.backends.opengl3_init("#version 330")
-
-    def _screen_scale(self) -> float:
-        """Return the scale of the interface for the screen, in window coordinates."""
-        content = glfw.get_window_content_scale(self.handle)[0] or 1.0
-        return max(content / self._pixels_per_point(), 0.5)
-
-    def _pixels_per_point(self) -> float:
-        width = glfw.get_window_size(self.handle)[0]
-        pixels = glfw.get_framebuffer_size(self.handle)[0]
-        return pixels / width if width and pixels else 1.0
+        state.say(*shell.problems)
+        self.frame = Frame(state, Programs(shell.context), glfw.post_empty_event, keeps_recent=True)
 
     def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
@@ -235,9 +162,9 @@ class _Window:
             poll()
             happened = self._wait(rest.left > 0)
             rest.count(happened, self._awaits())
-            if self._dropped:
-                self.frame.open(self._dropped)
-                self._dropped = []
+            if self.shell.dropped:
+                self.frame.open(self.shell.dropped)
+                self.shell.dropped = []
             if rest.left < 0 or not self._draw():
                 continue
             if "quit" in self.state.wants:
@@ -249,8 +176,8 @@ class _Window:
         Returns whether there was an event. ImGui spreads quick events over several frames, so
         events left in its queue also count.
         """
-        self._is_dirty = False
-        state = self.state
+        shell, state = self.shell, self.state
+        shell.is_dirty = False
         # Threads are polled at intervals only, because drawing frames would slow them down.
         steps = isinstance(state.job, FrameJob) or state.of(Flight).is_active
         # An unfinished image is refined in every frame.
@@ -261,9 +188,9 @@ class _Window:
             moves = self._awaits() or state.job is not None
             glfw.wait_events_timeout(_BUSY_SECONDS if moves else _IDLE_SECONDS)
             # Redraw for messages that time out, progress bars and blinking text cursors.
-            self._is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
-        self._is_dirty |= state.clock.playing or state.job is not None or steps or improves
-        return self._is_dirty or bool(self._dropped) or len(self._imgui.input_events_queue) > 0
+            shell.is_dirty |= moves or bool(state.messages.notes or imgui.get_io().want_text_input)
+        shell.is_dirty |= state.clock.playing or state.job is not None or steps or improves
+        return shell.is_dirty or bool(shell.dropped) or len(shell.imgui.input_events_queue) > 0
 
     def _awaits(self) -> bool:
         """Return whether a change is expected without an event: of files, extent or hover text."""
@@ -272,43 +199,30 @@ class _Window:
         is_read = files.loader is not None or files.stream is not None
         is_read |= not state.framing.is_settled
         is_waiting = state.of(Weights).is_waiting or state.of(Hovered).is_waiting
-        return is_read or is_waiting or awaits_tooltip(self._imgui)
+        return is_read or is_waiting or awaits_tooltip(self.shell.imgui)
 
     def _draw(self) -> bool:
         """Draw one frame; return False if the window currently has no pixels."""
         size = glfw.get_framebuffer_size(self.handle)
         if min(size) < 1:
             return False
-        self._set_title()
+        shell = self.shell
+        shell.set_title(_title(self.state))
         self._n_drawn += 1
         if self._n_drawn == _FIRST_FRAMES:
             add_system_fonts()
-        self.state.of(Appearance).screen_scale = self._screen_scale()
-        imgui.backends.opengl3_new_frame()
-        imgui.backends.glfw_new_frame()
-        imgui.new_frame()
-        self.frame.draw(self.context.screen, size, self._pixels_per_point())
+        shell.appearance.screen_scale = shell.screen_scale()
+        shell.begin_frame()
+        self.frame.draw(shell.context.screen, size, shell.pixels_per_point())
         glfw.swap_buffers(self.handle)
         return True
-
-    def _set_title(self) -> None:
-        title = _title(self.state)
-        if title != self._title:
-            glfw.set_window_title(self.handle, title)
-            self._title = title
 
     def release(self) -> None:
         """Save the layout, close the window, and release everything."""
         save_closed_panels(self.state.of(ShownPanels).closed)
         save_arranged(self.state.of(Layout).is_arranged)
-        imgui.backends.opengl3_shutdown()
-        imgui.backends.glfw_shutdown()
-        implot.destroy_context(self._implot)
-        imgui.destroy_context(self._imgui)
         self.frame.release()
-        self.context.release()
-        glfw.destroy_window(self.handle)
-        stop_watching()
+        self.shell.release()
 
 
 class Rest:
@@ -345,40 +259,3 @@ def awaits_tooltip(context: Any) -> bool:
 def _title(state: AppState) -> str:
     names = [opened_text(path) for path in state.paths] or [state.scene.title]
     return f"{printable(' + '.join(names), 100)} - viewer"
-
-
-def _create_window(title: str, is_visible: bool = True, scale: float = 0.0) -> Any:
-    """Create a window, larger for a larger scale of the interface; 0 for the monitor's scale."""
-    glfw.default_window_hints()
-    glfw.window_hint(glfw.VISIBLE, is_visible)
-    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
-    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
-    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
-    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
-    glfw.window_hint(glfw.SAMPLES, 0)  # the scene has its own multisampled framebuffer
-    glfw.window_hint(glfw.SCALE_TO_MONITOR, not scale)
-    glfw.window_hint_string(glfw.X11_CLASS_NAME, "viewer")
-    handle = glfw.create_window(*_window_size(scale or 1.0), title, None, None)
-    if not handle:
-        code, text = glfw.get_error()
-        message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
-        raise window_error(message)
-    glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
-    return handle
-
-
-def _window_size(scale: float) -> tuple[int, int]:
-    """Return the size of a new window, in window coordinates, limited to the monitor."""
-    width, height = (round(side * scale) for side in _SIZE)
-    monitor = glfw.get_primary_monitor()
-    if not monitor or scale == 1.0:
-        return width, height
-    _, _, widest, highest = glfw.get_monitor_workarea(monitor)
-    return min(width, max(widest, _SIZE[0])), min(height, max(highest, _SIZE[1]))
-
-
-def _context() -> moderngl.Context:
-    try:
-        return moderngl.create_context(require=330)
-    except Exception as problem:  # glcontext raises bare Exception
-        raise RenderError(explain(str(problem))) from None

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from viewer.phrases import printable
-from viewer.progress import receiving
+from viewer.progress import receiver, receiving
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
@@ -64,8 +64,15 @@ class Progress:
 
 @contextlib.contextmanager
 def shown_progress(title: str) -> Iterator[None]:
-    """Show the progress that the work in the block reports."""
-    with Progress(title, 0) as progress, receiving(progress.receive):
+    """Show the progress that the work in the block reports, and pass it on to the receiver."""
+    outer = receiver()
+
+    def receive(done: int, total: int, unit: str, what: str) -> None:
+        progress.receive(done, total, unit, what)
+        if outer is not None:
+            outer(done, total, unit, what)
+
+    with Progress(title, 0) as progress, receiving(receive):
         yield
 
 

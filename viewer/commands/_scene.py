@@ -21,6 +21,7 @@ from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning_settings import CleanUp
 from viewer.models import resolve
+from viewer.progress import report
 from viewer.rig.scene import Scene
 from viewer.rig.units import METRES
 from viewer.streams import summary_stream
@@ -302,6 +303,7 @@ def finish(builder: Builder, scene: Scene) -> None:
             scene.actors += new
             notes += said
             progress.show(builder.n_read)
+            report(builder.n_read, builder.capture.n_frames, "frames")
     scene.diagnostics = (*scene.diagnostics, *notes)  # the window shows them too
     print_warnings(notes)
 

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
 from viewer.commands._numbers import number
@@ -27,13 +29,17 @@ from viewer.commands._view import (
     hide_parts,
     warn_of_missing,
 )
-from viewer.formats import free_path
+from viewer.formats import free_path, opened_text
 from viewer.phrases import printable
+from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
 from viewer.rig.scene import Scene, scene_points
+
+if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
 
 __all__ = ["add_arguments", "run"]
 
@@ -70,8 +76,59 @@ def _scale(text: str) -> float:
 
 def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the image that it would show."""
+    from viewer.app.display import NoDisplay, find_display
+
     _fill_in(arguments)
     options = display_of(arguments)
+    try:
+        find_display()
+    except NoDisplay as problem:
+        start = _start(arguments, options)
+        for builder in start.builders:
+            finish(builder, start.scene)
+        box = bounding_box(start.points)
+        return _draw_instead(str(problem), start.scene, start.camera, options, box)
+    from viewer.app.opening import Opening, watch
+
+    opening = Opening(_title(arguments), partial(_start, arguments, options))
+    try:
+        shell = watch(opening, arguments.scale)
+    except Cancelled:
+        return 0  # the window was closed
+    try:
+        start = opening.result()
+    except BaseException:
+        if shell is not None:
+            shell.release()
+        raise
+    from viewer.app.window import show
+
+    show(
+        start.scene,
+        camera=start.camera,
+        options=options,
+        paths=scene_files(arguments),
+        scale=arguments.scale,
+        fit_distance=arguments.distance is None and arguments.view is None,
+        builders=start.builders,
+        plays=arguments.play,
+        motion=motion_settings(arguments),
+        shell=shell,
+    )
+    return 0
+
+
+class _Start(NamedTuple):
+    """A scene that is ready to be shown, its points, and captures that are not yet complete."""
+
+    scene: Scene
+    builders: list[Builder]
+    points: Floats
+    camera: Camera
+
+
+def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
+    """Open and pose the files, and print warnings."""
     scene, builders = begin_scene(arguments)
     changes = clean_up_of(arguments)
     if arguments.time is not None or arguments.frame is not None or not changes.is_empty:
@@ -82,29 +139,12 @@ def run(arguments: argparse.Namespace) -> int:
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))
     points = scene_points(scene, options.show)
-    camera = camera_of(arguments, scene, points, SIZE)
-    from viewer.app.display import NoDisplay, find_display
+    return _Start(scene, builders, points, camera_of(arguments, scene, points, SIZE))
 
-    try:
-        find_display()
-    except NoDisplay as problem:
-        for builder in builders:
-            finish(builder, scene)
-        return _draw_instead(str(problem), scene, camera, options, bounding_box(points))
-    from viewer.app.window import show
 
-    show(
-        scene,
-        camera=camera,
-        options=options,
-        paths=scene_files(arguments),
-        scale=arguments.scale,
-        fit_distance=arguments.distance is None and arguments.view is None,
-        builders=builders,
-        plays=arguments.play,
-        motion=motion_settings(arguments),
-    )
-    return 0
+def _title(arguments: argparse.Namespace) -> str:
+    names = [opened_text(Path(file)) for file in arguments.files]
+    return " + ".join(names) or "the bundled figure"
 
 
 def _fill_in(arguments: argparse.Namespace) -> None:

@@ -56,6 +56,20 @@ def test_camera_in_world_space_sees_the_people_as_in_camera_space(tmp_path: Path
     assert world.views[0].size == (1280, 720)
 
 
+@pytest.mark.parametrize("has_video", [True, False])
+def test_genmo_has_the_same_parameters_under_other_names(has_video: bool, tmp_path: Path) -> None:
+    given = {key.replace("smpl_params", "body_params"): part for key, part in gvhmr().items()}
+    if not has_video:
+        given |= {"body_params_incam": None, "K_fullimg": None}
+    path = tmp_path / "smpl_params.pt"
+    path.write_bytes(torch_zip(given))
+    scene = scene_of(path, "smplx")
+    assert len(scene.views) == has_video
+    assert_drawn(scene, 0, 2, wanted("world", 2))
+    spaces = "world and camera" if has_video else "world"
+    assert scene.facts[0] == ("capture", f"GENMO: 1 person, in {spaces} space")
+
+
 def test_people_in_camera_space_are_upright_and_the_camera_is_fixed(tmp_path: Path) -> None:
     scene = scene_of(gvhmr_file(tmp_path), "smplx", "camera")
     actor, view = scene.actors[0], scene.views[0]

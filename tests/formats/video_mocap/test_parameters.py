@@ -40,6 +40,10 @@ def bodies(given: Any) -> dict[int, Any]:
         {"pred_pose": SIX.reshape(4, -1), "cam_t": PLACES},
         {"pose": SIX.reshape(4, 24, 6), "cam_trans": PLACES},
         {"thetas": VECTORS, "translation": PLACES},
+        {"pred_thetas": TURNED.reshape(4, -1), "transl": PLACES},
+        {"pose": TURNED, "global_t": PLACES},
+        {"pose": VECTORS + 1.0, "trans": PLACES + 1.0, "pose_world": VECTORS.reshape(4, 72),
+         "trans_world": PLACES},
         {"global_orient": TURNED[:, :1], "body_pose": TURNED[:, 1:], "trans": PLACES},
         {"global_orient": TURNED[:, 0], "body_pose": TURNED[:, 1:], "cam_t": PLACES},
         {"root_orient": VECTORS[:, 0], "pose_body": VECTORS[:, 1:].reshape(4, 69),
@@ -116,6 +120,25 @@ def test_single_frames_of_two_people_are_read(key: str) -> None:
         opened = source(frames)
         open_results(opened)
         assert "F007.video-repeated" in [note.key for note in opened.diagnostics.warnings]
+
+
+@pytest.mark.parametrize("key", ["", "track_ids"])
+@pytest.mark.parametrize("form", ["frame_ids", "detection_all"])
+def test_rows_of_the_same_frame_are_different_people(form: str, key: str) -> None:
+    # Person 4 is in frames 5 and 6, person 9 in frames 5 and 7.
+    frames, persons = np.array([5, 5, 6, 7]), np.array([4, 9, 4, 9])
+    numbers = frames if form == "frame_ids" else np.stack([frames, frames + 0.5], axis=1)
+    given = {"pose": TURNED, "trans": PLACES, "betas": waves(4, 10), form: numbers}
+    opened = source(given | ({key: persons} if key else {}))
+    found = next(iter(open_results(opened).parts())).bodies
+    rows = {4: [0, 1, -1], 9: [0, -1, 1]} if key else {0: [0, 1, 2], 1: [0, -1, -1]}
+    assert {person: body.timing.rows.tolist() for person, body in found.items()} == rows
+    chosen = {4: [0, 2], 9: [1, 3]} if key else {0: [0, 2, 3], 1: [1]}
+    for person, body in found.items():
+        assert_allclose(body.translations, PLACES[chosen[person]], atol=1e-12)
+        assert_allclose(body.shape, waves(4, 10)[chosen[person]], atol=1e-12)
+    repeated = [note.key for note in opened.diagnostics.warnings].count("F007.video-repeated")
+    assert repeated == (0 if key else 1)
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from viewer.app.preferences.state import Appearance, Preferences
 from viewer.app.preferences.storage import save_preferences
 from viewer.app.theme import change_scale, set_theme
 
-__all__ = ["change", "follow_preferences", "scale_of", "start_with"]
+__all__ = ["change", "chosen_scale", "chosen_theme", "follow_preferences", "scale_of", "start_with"]
 
 
 def start_with(state: AppState, preferences: Preferences) -> None:
@@ -47,17 +47,26 @@ def change(state: AppState, preferences: Preferences) -> None:
 
 
 def scale_of(state: AppState) -> float:
+    """Return the scale of the interface in the current window."""
+    return chosen_scale(state.of(Preferences), state.of(Appearance))
+
+
+def chosen_scale(preferences: Preferences, appearance: Appearance) -> float:
     """Return the scale of the interface: the given, the preferred, or the monitor's scale."""
-    appearance = state.of(Appearance)
-    return appearance.given_scale or state.of(Preferences).scale or appearance.screen_scale
+    return appearance.given_scale or preferences.scale or appearance.screen_scale
+
+
+def chosen_theme(preferences: Preferences, appearance: Appearance) -> str:
+    """Return the theme of the interface: the preferred one, or the system's."""
+    if preferences.theme == "system":
+        return appearance.system_theme or "dark"
+    return preferences.theme
 
 
 def follow_preferences(state: AppState) -> None:
     """Apply the preferences that differ from the applied ones; called in every frame."""
     preferences, applied = state.of(Preferences), state.of(Appearance)
-    theme = preferences.theme
-    if theme == "system":
-        theme = applied.system_theme or "dark"
+    theme = chosen_theme(preferences, applied)
     if theme != applied.theme:
         set_theme(theme)
         applied.theme = theme

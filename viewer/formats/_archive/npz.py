@@ -1,4 +1,4 @@
-r"""Reader of ``.npz`` and ``.npy`` files: arrays only, never pickled objects.
+r"""Reader of ``.npz`` and ``.npy`` files: arrays, and by the pickle reader also dicts in objects.
 
 ::
 
@@ -51,6 +51,7 @@ _ITEM = re.compile(
     rb"'(?P<key>descr|fortran_order|shape)'\s*:\s*"
     rb"(?:'(?P<descr>[^'\\]{1,20})'|(?P<order>True|False)|\((?P<shape>[0-9L,\s]*)\))"
 )
+_OBJECTS = Opaque(Phrase("unread-objects"))
 _FIELDS = {b"descr": "descr", b"fortran_order": "order", b"shape": "shape"}
 
 
@@ -73,12 +74,29 @@ class _Header:
         )
 
 
-def open_npz(directory: ZipDirectory) -> Archive:
-    """Open an ``.npz`` file; errors as of ``open_archive``."""
+def open_npz(
+    directory: ZipDirectory, opened: Callable[[str, bytes], Archive | None] | None = None
+) -> Archive:
+    """Open an ``.npz`` file; errors as of ``open_archive``.
+
+    Parameters
+    ----------
+    directory : ZipDirectory
+        Its zip archive.
+    opened : callable, optional
+        Opens an array of objects, given its key and its pickle, as a nested archive; None if the
+        objects have no names. It is called only for arrays whose contents are requested.
+    """
     directory.check(_key)
-    members = directory.members
-    values = {_key(member): _open_member(directory, member) for member in members}
-    return Archive(directory.source, "npz", tuple(values), values.__getitem__)
+    members, storage = {_key(member): member for member in directory.members}, directory.storage
+    values = {key: _open_member(directory, member) for key, member in members.items()}
+
+    def branch(key: str) -> Archive | None:
+        if opened is None or values[key] != _OBJECTS:
+            return None
+        return opened(key, _load_objects(storage, members[key]))
+
+    return Archive(directory.source, "npz", tuple(values), values.__getitem__, branch)
 
 
 def open_npy(
@@ -100,7 +118,7 @@ def open_npy(
         header = _read_header(storage, key, stream, storage.size)
         offset = stream.tell()
     if isinstance(header, Opaque):
-        is_object = header.what == Phrase("unread-objects")
+        is_object = header == _OBJECTS
         named = opened(source, offset) if opened is not None and is_object else None
         if named is not None:
             return named
@@ -220,6 +238,21 @@ def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[Any]:
     try:
         with storage.open() as stream:
             return _load(storage, key, header, stream)
+    except DAMAGE as problem:
+        raise _damaged(storage, key, problem) from None
+
+
+def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
+    """Return the pickle of a member that is an array of objects."""
+    key = _key(member)
+    try:
+        with (
+            storage.open() as file,
+            zipfile.ZipFile(file) as archive,
+            archive.open(member) as stream,
+        ):
+            _read_header(storage, key, stream, member.file_size)
+            return b"".join(iter(partial(stream.read, _CHUNK), b""))
     except DAMAGE as problem:
         raise _damaged(storage, key, problem) from None
 

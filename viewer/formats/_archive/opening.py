@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 
 from viewer.formats._archive.file_window import Data, FileWindow
 from viewer.formats._archive.values import Archive
@@ -54,7 +55,9 @@ def open_archive(source: Source) -> Archive:
     head = source.peek(4096)
     if head.startswith(_ZIP):
         with open_directory(source) as directory:
-            return open_torch(directory) if is_torch(directory) else open_npz(directory)
+            if is_torch(directory):
+                return open_torch(directory)
+            return open_npz(directory, partial(_open_member, source))
     if head.startswith(_NPY):
         return open_npy(source, _open_objects)
     if head.startswith(_LFS):
@@ -90,6 +93,18 @@ def _open_pickle(source: Source, data: Data) -> Archive:
     whole = read_stream(machine) if data[: len(MAGIC)] == MAGIC else run(machine)
     warn_of_rest(machine)
     return named_archive(source, "pickle", len(data), whole)
+
+
+def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
+    """Open the dict, or list of dicts, in an array of objects of an ``.npz``; None for others."""
+    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.reading import nested_archive
+    from viewer.formats._pickle.steps import run
+    from viewer.formats._torch.legacy import read_bytes
+
+    machine = Machine(source, data)
+    machine.load_bytes = read_bytes
+    return nested_archive(source, "npz", len(data), run(machine), f"{key}.")
 
 
 def _open_objects(source: Source, offset: int) -> Archive | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
+from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._format import Format
@@ -27,7 +28,7 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
         if set(keys).intersection(form.keys):
             if kind not in ("amass", "pose"):
                 return kind
-            if not _is_video_mocap(archive):
+            if not _has_tool(archive):
                 return _pose_or_motion(archive, formats["pose"].keys)
             return "video_mocap"
     if _is_video_mocap(archive):
@@ -48,6 +49,14 @@ def _is_video_mocap(archive: Archive) -> bool:
     from viewer.formats._video_mocap.tools import tool_of
 
     return tool_of(archive) is not None
+
+
+def _has_tool(archive: Archive) -> bool:
+    """Return the same for an archive that can be opened even if a nested pickle cannot be read."""
+    try:
+        return _is_video_mocap(archive)
+    except FormatError:
+        return False
 
 
 def _pose_or_motion(archive: Archive, keys: Collection[str]) -> str:

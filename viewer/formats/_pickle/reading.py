@@ -26,7 +26,7 @@ from viewer.formats._pickle.values import Array, noun
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-__all__ = ["has_names", "named_archive", "warn_of_rest"]
+__all__ = ["has_names", "named_archive", "nested_archive", "warn_of_rest"]
 
 
 def warn_of_rest(machine: Machine) -> None:
@@ -56,6 +56,18 @@ def named_archive(source: Source, kind: str, size: int, whole: object) -> Archiv
         If it is neither a dict with string keys, nor a list or dict of dicts.
     """
     return _archive(source, kind, size, _named(source, _objects(whole)), "")
+
+
+def nested_archive(
+    source: Source, kind: str, size: int, whole: object, label: str
+) -> Archive | None:
+    """Return the values that a pickle inside an archive builds; None if they have no names.
+
+    ``label`` is the path of the pickle in the archive, for messages: ``"results."``; for the
+    others, see ``named_archive``.
+    """
+    found = _items(_objects(whole))
+    return None if found is None else _archive(source, kind, size, _strings(source, found), label)
 
 
 def has_names(whole: object) -> bool:

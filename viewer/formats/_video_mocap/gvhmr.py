@@ -6,7 +6,9 @@
         body_pose (L, 63)  global_orient (L, 3)  betas (L, 10)  transl (L, 3)
     K_fullimg (L, 3, 3)
 
-SMPL-X without hands, whose fingers have the mean pose; 30 frames per second. The world has y up.
+GENMO (NVlabs/GENMO), which is based on it, calls them ``body_params_global`` and
+``body_params_incam``; without a video, the latter and ``K_fullimg`` are None. SMPL-X
+without hands, whose fingers have the mean pose; 30 frames per second. The world has y up.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ import numpy as np
 
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import Frames, has, places, rows
+from viewer.formats._video_mocap.numbers import Frames, has, places, rows, shape_of
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import RestRoots
@@ -26,28 +28,26 @@ from viewer.rig.smpl_family import members_by_numbers
 
 __all__ = ["read", "recognises"]
 
-_KEYS = {"world": "smpl_params_global", "camera": "smpl_params_incam"}
+_NAMES = {
+    "GVHMR": {"world": "smpl_params_global", "camera": "smpl_params_incam"},
+    "GENMO": {"world": "body_params_global", "camera": "body_params_incam"},
+}
 _RATE = 30.0
 _PERSON = 0
 
 
 def recognises(archive: Archive) -> bool:
     """Return whether an archive contains results of this tool."""
-    parts = [archive.inside(key) for key in _KEYS.values()]
-    return any(has(part, "body_pose", "global_orient", "transl") for part in parts)
+    return _tool(archive) is not None
 
 
 def read(source: Source, archive: Archive) -> Results:
     """Read both spaces."""
-    parts = {space: archive.inside(key) for space, key in _KEYS.items()}
-    people = {
-        space: {_PERSON: _track(part)}
-        for space, part in parts.items()
-        if part is not None and has(part, "body_pose", "global_orient", "transl")
-    }
+    tool = _tool(archive) or "GVHMR"
+    people = {space: {_PERSON: _track(part)} for space, part in _parts(archive, tool).items()}
     cameras, frames = {}, np.arange(len(next(iter(people.values()))[_PERSON].frames))
     intrinsics = None
-    if archive.has("K_fullimg"):
+    if shape_of(archive, "K_fullimg"):  # None if there was no video
         intrinsics = rows(archive, "K_fullimg", (len(frames), 3, 3))
         cameras["camera"] = Cameras(
             frames, intrinsics, np.eye(3)[None], np.zeros((1, 3)), _size(intrinsics)
@@ -56,9 +56,19 @@ def read(source: Source, archive: Archive) -> Results:
     if intrinsics is not None and len(people) == 2:
         tracks = people["world"][_PERSON], people["camera"][_PERSON]
         in_world = partial(_camera, *tracks, frames, intrinsics)
-    return Results(
-        "GVHMR", "SMPL-X", people, {"world": "y", "camera": "-y"}, cameras, in_world, _RATE
-    )
+    return Results(tool, "SMPL-X", people, {"world": "y", "camera": "-y"}, cameras, in_world, _RATE)
+
+
+def _tool(archive: Archive) -> str | None:
+    """Return the tool that wrote an archive, or None."""
+    return next((tool for tool in _NAMES if _parts(archive, tool)), None)
+
+
+def _parts(archive: Archive, tool: str) -> dict[str, Archive]:
+    """Return the parameters in each space in which the file has them."""
+    found = {space: archive.inside(key) for space, key in _NAMES[tool].items()}
+    keys = "body_pose", "global_orient", "transl"
+    return {space: part for space, part in found.items() if part is not None and has(part, *keys)}
 
 
 def _track(part: Archive) -> Track:

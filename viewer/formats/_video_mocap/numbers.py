@@ -112,8 +112,11 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
 
 
 def frames_of(archive: Archive, key: str, count: int) -> Frames:
-    """Return frame numbers, integers in any order: (N,)."""
-    found = rows(archive, key, (count,))
+    """Return frame numbers, integers in any order: (N,); of a table, those in its first column."""
+    if len(archive.array(key).shape) == 2:
+        found = rows(archive, key, (count, None))[:, 0]
+    else:
+        found = rows(archive, key, (count,))
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
         raise archive.fault("F002.video-frame-numbers", item=key)
     return found.astype(np.int64)

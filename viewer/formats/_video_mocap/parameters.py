@@ -5,11 +5,12 @@
     poses      poses, pose, rotmat … of all joints; or global_orient … and body_pose …
     places     trans, transl … ; cam_t … in the space of a camera, where y points down
     shape      betas, shape …
-    frames     frame_ids, frames …
-    person     person_id, track_id, id …, in dicts of single frames
+    frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
+    person     person_id, track_id, id …, one number, or one for each frame
 
-Dicts may be nested: people by number, frames in a list, or parameters within another dict. AMASS
-files and single poses have other spellings and are read by ``amass.py`` and ``pose.py``.
+Several rows with the same frame are several people. Dicts may be nested: people by number, frames
+in a list, or parameters within another dict. AMASS files and single poses have other spellings and
+are read by ``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
+    Frames,
     RowBudget,
     frames_of,
     person_number,
@@ -45,24 +47,40 @@ _AMASS = {
     *("root_orient", "global_orient", "pose_body", "body_pose"),
 }
 _WHOLE = (
-    *("poses", "pose", "fullpose", "full_pose", "smpl_poses", "smpl_pose", "thetas", "theta"),
-    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "smpl_thetas", "body_rotmat"),
+    *("pose_world", "poses_world", "poses", "pose", "fullpose", "full_pose", "smpl_poses"),
+    *("smpl_pose", "thetas", "theta", "pred_thetas", "smpl_thetas"),
+    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "body_rotmat"),
 )
 _ROOTS = (
     *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
     *("smplx_root_pose", "global_rot"),
 )
 _BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose")
-_WORLD = ("trans", "transl", "translation", "smpl_trans", "root_trans", "smplx_transl", "Th")
+_WORLD = (
+    *(
+        "trans_world",
+        "trans",
+        "transl",
+        "translation",
+        "smpl_trans",
+        "root_trans",
+        "smplx_transl",
+        "Th",
+    ),
+)
 _CAMERA = (
     *("cam_t", "pred_cam_t", "cam_trans", "camera_translation", "pred_trans", "pred_cam_trans"),
-    *("trans_cam", "cam_transl", "transl_cam", "trans_full"),
+    *("trans_cam", "cam_transl", "transl_cam", "trans_full", "global_t"),
 )
 _SHAPES = (
     *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
-_PEOPLE = ("person_id", "track_id", "tracklet_id", "person", "pid", "id")
+_DETECTIONS = "detection_all"
+_PEOPLE = (
+    *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
+    *("person_ids", "track_ids", "pids", "ids"),
+)
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _LARGEST = 1 << 30  # maximum number of a frame or person
 _DEEPEST = 3  # maximum depth of dicts inside dicts
@@ -142,6 +160,10 @@ def _layout(archive: Archive) -> _Layout | None:
     if count == 1:
         frames = frames or _first_number(archive, _FRAMES)
         person = _first_number(archive, _PEOPLE)
+    elif not frames and shape_of(archive, _DETECTIONS)[:1] == (count,):
+        frames = _DETECTIONS
+    if frames and count > 1:
+        person = _first(archive, _PEOPLE, lambda shape: shape == (count,))
     return _Layout(poses, place, shape, frames, person)
 
 
@@ -208,16 +230,65 @@ def _people(
     Single frames with different joints or numbers of coefficients are different people.
     """
     tracks = [_track(archive, layout) for _, archive, layout in found]
+    if any(len(track.frames) > 1 for track in tracks):
+        return _people_of_arrays(source, found, tracks)
     is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
-    if is_alike and len(tracks) > 1 and all(len(track.frames) == 1 for track in tracks):
+    if is_alike and len(tracks) > 1:
         kept = [(archive, layout) for _, archive, layout in found]
         return _people_of_frames(source, kept, tracks)
+    return _people_of_arrays(source, found, tracks)
+
+
+def _people_of_arrays(
+    source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]], tracks: list[Track]
+) -> dict[int, Track]:
+    """Return the people of dicts, each of which has all frames of one person, or of several."""
     people: dict[int, Track] = {}
-    for index, ((path, _, _), track) in enumerate(zip(found, tracks, strict=True)):
+    most = 1
+    for index, ((path, archive, layout), track) in enumerate(zip(found, tracks, strict=True)):
+        persons = _persons(archive, layout, track.frames)
+        numbers = np.unique(persons)
+        if len(numbers) > 1:
+            most = max(most, 0 if layout.person else len(numbers))
+            for number in numbers.tolist():
+                own = number if number not in people else _unused(people, index)
+                people[own] = _rows_of(track, np.flatnonzero(persons == number))
+            continue
         known = (person_number(part) for part in path)
         number = next((each for each in known if each is not None and each >= 0), index)
-        people[number if number not in people else _unused(people, index)] = track
+        people[number if number not in people else _unused(people, index)] = _rows_of(
+            track, np.arange(len(persons))
+        )
+    if most > 1:
+        source.warn("F007.video-repeated", n=most)
     return people
+
+
+def _persons(archive: Archive, layout: _Layout, frames: Frames) -> Frames:
+    """Return the person of each row; rows with the same frame are counted if they have no IDs."""
+    if len(frames) > 1 and layout.person:
+        return frames_of(archive, layout.person, len(frames))
+    order = np.argsort(frames, kind="stable")
+    firsts = np.searchsorted(frames[order], frames[order], side="left")
+    persons = np.zeros(len(frames), dtype=np.int64)
+    persons[order] = np.arange(len(frames)) - firsts
+    return persons
+
+
+def _rows_of(track: Track, chosen: Frames) -> Track:
+    """Return rows of a track, in the order of frames, of which only the first row is kept."""
+    frames, first = np.unique(track.frames[chosen], return_index=True)
+    kept = chosen[first]
+    shape, count = track.shape, len(track.frames)
+    if track.vectors is None or track.translations is None:
+        return track
+    return Track(
+        frames,
+        track.joint_names,
+        track.vectors[kept],
+        track.translations[kept],
+        shape[kept] if shape is not None and len(shape) == count else shape,
+    )
 
 
 def _people_of_frames(
@@ -258,16 +329,13 @@ def _track(archive: Archive, layout: _Layout) -> Track:
         single = rows(archive, layout.place, shape)[None] if shape == (3,) else None
         placed = places(archive, layout.place, count) if single is None else single
     frames = np.arange(count)
-    first = frames
     number = _number(archive, layout.frames) if count == 1 else None
     if number is not None:
         frames = np.array([number])
     elif layout.frames:
-        frames, first = np.unique(frames_of(archive, layout.frames, count), return_index=True)
+        frames = frames_of(archive, layout.frames, count)
     coefficients = _coefficients(archive, layout.shape)
-    if coefficients is not None and len(coefficients) == count:
-        coefficients = coefficients[first]
-    return Track(frames, _NAMES[vectors.shape[1]], vectors[first], placed[first], coefficients)
+    return Track(frames, _NAMES[vectors.shape[1]], vectors, placed, coefficients)
 
 
 def _coefficients(archive: Archive, key: str) -> Floats | None:

@@ -6,6 +6,7 @@ from importlib import import_module
 from types import ModuleType
 
 from viewer.data_classes import dataclass
+from viewer.errors import FormatError
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 
@@ -33,13 +34,14 @@ class Tool:
 
 
 TOOLS = {
-    "gvhmr": Tool("GVHMR", "hmr4d_results.pt"),
+    "gvhmr": Tool("GVHMR, GENMO", "hmr4d_results.pt, smpl_params.pt"),
     "wham": Tool("WHAM", "wham_output.pkl"),
     "phalp": Tool("4D-Humans, PHALP", "results/NAME.pkl"),
     "tram": Tool("TRAM", "folder of hps/ and camera.npy", has_folders=True),
     "prompthmr": Tool("PromptHMR", "results.pkl"),
     "slahmr": Tool("SLAHMR", "NAME_world_results.npz", has_folders=True),
     "sam3d_body": Tool("SAM 3D Body", "NAME.npz, folders of them, pickles", has_folders=True),
+    "romp": Tool("ROMP, BEV", "video_results.npz, NAME.npz"),
     "parameters": Tool("SMPL parameters of other tools", "dicts with the usual keys"),
 }
 """Modules in this folder; each has ``recognises(archive)`` and ``read(source, archive)``."""
@@ -51,8 +53,23 @@ def module_of(tool: str) -> ModuleType:
 
 
 def tool_of(archive: Archive) -> str | None:
-    """Return the key in ``TOOLS`` of an archive's tool, or None."""
-    return next((tool for tool in TOOLS if module_of(tool).recognises(archive)), None)
+    """Return the key in ``TOOLS`` of an archive's tool, or None.
+
+    Raises
+    ------
+    FormatError
+        If no tool is recognised, and a nested pickle that was examined cannot be read.
+    """
+    problem: FormatError | None = None
+    for tool in TOOLS:
+        try:
+            if module_of(tool).recognises(archive):
+                return tool
+        except FormatError as found:  # of an array of objects that another tool may not need
+            problem = problem or found
+    if problem is not None:
+        raise problem
+    return None
 
 
 def folder_tool(source: Source, names: set[str]) -> str | None:

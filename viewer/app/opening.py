@@ -1,0 +1,174 @@
+"""Opening of the first files in a thread; after a moment, a window shows the progress."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextvars import copy_context
+from typing import TYPE_CHECKING, Generic, TypeVar
+
+from viewer.phrases import printable
+from viewer.progress import Cancelled, receiving
+
+if TYPE_CHECKING:
+    from viewer.app.shell import Shell
+
+__all__ = ["Opening", "watch"]
+
+_PATIENCE = 0.6  # seconds before the window opens; most files are read in less
+_EVERY = 0.05  # seconds between frames
+_BAR_WIDTH = 26.0  # width of the progress bar, in font sizes
+
+Found = TypeVar("Found")
+
+
+class Opening(Generic[Found]):
+    """Thread that opens files, reports its progress, and can be cancelled.
+
+    Parameters
+    ----------
+    title : str
+        Description of the files.
+    act : callable
+        Opens the files and returns the result; errors are raised by ``result``.
+
+    Attributes
+    ----------
+    title : str
+        Description of the files.
+    progress : (int, int, str)
+        Completed steps, their total, 0 if it is unknown, and their unit.
+    """
+
+    def __init__(self, title: str, act: Callable[[], Found]) -> None:
+        self.title = title
+        self.progress = (0, 0, "")
+        self._act, self._is_cancelled = act, False
+        self._found: list[Found] = []
+        self._problem: BaseException | None = None
+        self._started = time.monotonic()
+        # The thread records diagnostics where its caller does.
+        self._thread = threading.Thread(target=copy_context().run, args=(self._run,), daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        try:
+            with receiving(self._receive):
+                self._found.append(self._act())
+        except BaseException as problem:  # raised again by ``result``, in the caller's thread
+            self._problem = problem
+
+    def _receive(self, done: int, total: int, unit: str, _: str) -> None:
+        if self._is_cancelled:
+            raise Cancelled
+        self.progress = (done, total, unit)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until the files are open, at most for some time; return whether they are."""
+        self._thread.join(seconds)
+        return not self._thread.is_alive()
+
+    def cancel(self) -> None:
+        """Stop at the next report of progress."""
+        self._is_cancelled = True
+
+    def result(self) -> Found:
+        """Wait for the end; return the result, or raise the error."""
+        while not self.wait(0.1):  # so that signals are handled
+            pass
+        if self._problem is not None:
+            raise self._problem
+        return self._found[0]
+
+    @property
+    def seconds(self) -> float:
+        """Seconds since the start."""
+        return time.monotonic() - self._started
+
+
+def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
+    """Wait for the files; if it takes longer than a moment, open a window with the progress.
+
+    Parameters
+    ----------
+    opening : Opening
+        The files that are being opened.
+    scale : float, optional
+        Scale of the interface; the scale of the screen if omitted.
+
+    Returns
+    -------
+    Shell or None
+        The window, if one was opened.
+
+    Raises
+    ------
+    Cancelled
+        If the user closed the window or pressed Cancel.
+    RenderError
+        If there is no usable OpenGL.
+    """
+    if opening.wait(_PATIENCE):
+        return None
+    from viewer.app.shell import Shell
+    from viewer.interrupts import hold
+
+    hold()  # exceptions raised in GLFW's callbacks, such as interrupts, would be lost
+    shell = Shell(f"{printable(opening.title, 100)} - viewer", scale)
+    try:
+        _show_progress(opening, shell)
+    except BaseException:
+        opening.cancel()
+        shell.release()
+        opening.wait(1.0)
+        raise
+    return shell
+
+
+def _show_progress(opening: Opening[Found], shell: Shell) -> None:
+    from viewer.app.display import import_glfw
+    from viewer.app.preferences.applying import chosen_theme
+    from viewer.app.theme import set_theme
+    from viewer.interrupts import poll
+
+    glfw = import_glfw()
+    set_theme(chosen_theme(shell.preferences, shell.appearance))
+    while not opening.wait(0.0):
+        poll()
+        glfw.wait_events_timeout(_EVERY)
+        if glfw.window_should_close(shell.handle) or _draw(opening, shell):
+            raise Cancelled
+
+
+def _draw(opening: Opening[Found], shell: Shell) -> bool:
+    """Draw one frame, and return whether Cancel was pressed."""
+    from imgui_bundle import imgui
+
+    from viewer.app.display import import_glfw
+
+    glfw = import_glfw()
+    size = glfw.get_framebuffer_size(shell.handle)
+    if min(size) < 1:
+        return False
+    shell.begin_frame()
+    center, half = imgui.get_main_viewport().get_center(), imgui.ImVec2(0.5, 0.5)
+    imgui.set_next_window_pos(center, imgui.Cond_.always, half)
+    flags = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.always_auto_resize
+    flags |= imgui.WindowFlags_.no_docking | imgui.WindowFlags_.no_saved_settings
+    is_pressed = False
+    if imgui.begin("##opening", None, flags)[0]:
+        done, total, unit = opening.progress
+        text = f"{done:,} of {total:,} {unit}" if total else f"{opening.seconds:.0f} s"
+        bar = min(_BAR_WIDTH * imgui.get_font_size(), 0.8 * imgui.get_main_viewport().size.x)
+        imgui.text_unformatted(f"Opening {printable(opening.title, 60)}")
+        imgui.progress_bar(done / total if total else -opening.seconds, (bar, 0.0), text)
+        is_pressed = imgui.button("Cancel opening") or imgui.is_key_pressed(imgui.Key.escape)
+    imgui.end()
+    imgui.render()
+    shell.context.screen.use()
+    shell.context.viewport = (0, 0, *size)
+    shell.context.screen.clear(*imgui.get_style_color_vec4(imgui.Col_.title_bg))
+    imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
+    glfw.swap_buffers(shell.handle)
+    return is_pressed

@@ -1,0 +1,197 @@
+"""The window of the operating system: GLFW, its OpenGL context, ImGui, and recorded events."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from viewer.app.display import import_glfw, window_error
+
+glfw = import_glfw()
+
+import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
+from imgui_bundle import imgui, implot  # noqa: E402
+
+from viewer.app.display_loss import stop_watching  # noqa: E402
+from viewer.app.files.recent import state_folder  # noqa: E402
+from viewer.app.preferences.applying import chosen_scale  # noqa: E402
+from viewer.app.preferences.state import Appearance  # noqa: E402
+from viewer.app.preferences.storage import load_preferences  # noqa: E402
+from viewer.app.preferences.system_theme import system_theme  # noqa: E402
+from viewer.app.theme import apply_theme  # noqa: E402
+from viewer.app.typed_keys import TypedKeys, end_frame, end_frame_before  # noqa: E402
+from viewer.errors import RenderError  # noqa: E402
+from viewer.rendering.gpu.context import explain  # noqa: E402
+
+__all__ = ["Shell", "create_context", "create_window"]
+
+_SIZE = (1280, 800)
+
+
+class Shell:
+    """A window, in which the files are opened and then shown.
+
+    Parameters
+    ----------
+    title : str
+        Title of the window.
+    scale : float or None
+        Scale of the interface; that of the preferences or of the screen if omitted.
+
+    Attributes
+    ----------
+    handle, context, imgui, implot : any
+        The window, and its contexts of OpenGL, ImGui and ImPlot.
+    preferences, appearance : Preferences, Appearance
+        The stored preferences, and how they are applied to this window.
+    dropped : list of Path
+        Files that were dropped onto the window since the list was last cleared.
+    is_dirty : bool
+        Whether the window's contents were damaged or resized.
+    problems : list of str
+        Messages about problems that do not prevent the window from opening.
+
+    Raises
+    ------
+    RenderError
+        If there is no usable OpenGL.
+    """
+
+    def __init__(self, title: str, scale: float | None = None) -> None:
+        self.preferences, self.appearance = load_preferences(), Appearance()
+        self.handle = create_window(title, scale=scale or self.preferences.scale)
+        try:
+            glfw.make_context_current(self.handle)
+            glfw.swap_interval(1)
+            self.context = create_context()
+        except BaseException:
+            glfw.destroy_window(self.handle)
+            stop_watching()
+            raise
+        self.dropped: list[Path] = []
+        self.is_dirty = True
+        self.problems: list[str] = []
+        self._title = title
+        self._typed_keys = TypedKeys()
+        self._set_callbacks()
+        self.imgui: Any = imgui.create_context()
+        self.implot: Any = implot.create_context()
+        self._set_up_imgui(scale)
+
+    def _set_callbacks(self) -> None:
+        """Set callbacks that only record events for the loop, so that none of them can raise."""
+        glfw.set_drop_callback(self.handle, self._on_drop)
+        glfw.set_framebuffer_size_callback(self.handle, self._on_change)
+        glfw.set_window_refresh_callback(self.handle, self._on_change)
+
+    def _on_drop(self, _: Any, names: Sequence[str]) -> None:
+        self.dropped += map(Path, names)
+
+    def _on_key(self, _: Any, key: int, code: int, action: int, modifiers: int) -> None:
+        is_typing = imgui.get_io().want_text_input
+        if self._typed_keys.passes(key, action, modifiers, is_typing):
+            end_frame_before(self.imgui.input_events_queue, key, action)
+            imgui.backends.glfw_key_callback(self._address, key, code, action, modifiers)
+
+    def _on_button(self, _: Any, button: int, action: int, modifiers: int) -> None:
+        end_frame(self.imgui.input_events_queue)
+        imgui.backends.glfw_mouse_button_callback(self._address, button, action, modifiers)
+
+    def _on_change(self, *_: Any) -> None:
+        self.is_dirty = True
+
+    def _set_up_imgui(self, scale: float | None) -> None:
+        io = imgui.get_io()
+        io.config_flags |= imgui.ConfigFlags_.docking_enable
+        folder = state_folder()
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            io.set_ini_filename(str(folder / "layout.ini"))
+        except OSError as problem:
+            io.set_ini_filename(None)
+            self.problems.append(f"the layout cannot be saved: {problem.strerror}")
+        appearance, preferences = self.appearance, self.preferences
+        appearance.given_scale, appearance.screen_scale = scale, self.screen_scale()
+        if preferences.theme == "system":
+            appearance.system_theme = system_theme()
+        appearance.scale = chosen_scale(preferences, appearance)
+        apply_theme(appearance.scale)
+        self._address = ctypes.cast(self.handle, ctypes.c_void_p).value or 0
+        imgui.backends.glfw_init_for_opengl(self._address, True)
+        # These replace callbacks of ImGui.
+        glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_mouse_button_callback(self.handle, self._on_button)
+        imgui.backends.opengl3_init("#version 330")
+
+    def screen_scale(self) -> float:
+        """Return the scale of the interface for the screen, in window coordinates."""
+        content = glfw.get_window_content_scale(self.handle)[0] or 1.0
+        return max(content / self.pixels_per_point(), 0.5)
+
+    def pixels_per_point(self) -> float:
+        """Return the number of pixels per window coordinate."""
+        width = glfw.get_window_size(self.handle)[0]
+        pixels = glfw.get_framebuffer_size(self.handle)[0]
+        return pixels / width if width and pixels else 1.0
+
+    def begin_frame(self) -> None:
+        """Begin a frame of ImGui."""
+        imgui.backends.opengl3_new_frame()
+        imgui.backends.glfw_new_frame()
+        imgui.new_frame()
+
+    def set_title(self, title: str) -> None:
+        """Set the title of the window if it has changed."""
+        if title != self._title:
+            glfw.set_window_title(self.handle, title)
+            self._title = title
+
+    def release(self) -> None:
+        """Close the window, and release everything."""
+        imgui.backends.opengl3_shutdown()
+        imgui.backends.glfw_shutdown()
+        implot.destroy_context(self.implot)
+        imgui.destroy_context(self.imgui)
+        self.context.release()
+        glfw.destroy_window(self.handle)
+        stop_watching()
+
+
+def create_window(title: str, is_visible: bool = True, scale: float = 0.0) -> Any:
+    """Create a window, larger for a larger scale of the interface; 0 for the monitor's scale."""
+    glfw.default_window_hints()
+    glfw.window_hint(glfw.VISIBLE, is_visible)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MAJOR, 3)
+    glfw.window_hint(glfw.CONTEXT_VERSION_MINOR, 3)
+    glfw.window_hint(glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE)
+    glfw.window_hint(glfw.OPENGL_FORWARD_COMPAT, True)
+    glfw.window_hint(glfw.SAMPLES, 0)  # the scene has its own multisampled framebuffer
+    glfw.window_hint(glfw.SCALE_TO_MONITOR, not scale)
+    glfw.window_hint_string(glfw.X11_CLASS_NAME, "viewer")
+    handle = glfw.create_window(*_window_size(scale or 1.0), title, None, None)
+    if not handle:
+        code, text = glfw.get_error()
+        message = text.decode() if isinstance(text, bytes) else text or f"GLFW error {code}"
+        raise window_error(message)
+    glfw.set_window_size_limits(handle, 320, 240, glfw.DONT_CARE, glfw.DONT_CARE)
+    return handle
+
+
+def _window_size(scale: float) -> tuple[int, int]:
+    """Return the size of a new window, in window coordinates, limited to the monitor."""
+    width, height = (round(side * scale) for side in _SIZE)
+    monitor = glfw.get_primary_monitor()
+    if not monitor or scale == 1.0:
+        return width, height
+    _, _, widest, highest = glfw.get_monitor_workarea(monitor)
+    return min(width, max(widest, _SIZE[0])), min(height, max(highest, _SIZE[1]))
+
+
+def create_context() -> moderngl.Context:
+    """Return an OpenGL context for the current window; raises RenderError."""
+    try:
+        return moderngl.create_context(require=330)
+    except Exception as problem:  # glcontext raises bare Exception
+        raise RenderError(explain(str(problem))) from None
