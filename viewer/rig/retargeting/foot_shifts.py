@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.leg_solving import falling
+from viewer.rig.cleanup.easing import falling
 from viewer.rig.cleanup.smooth_curves import smooth_curves
 from viewer.rig.retargeting.foot_plan import FootPlan
 
