@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.testing import assert_allclose
+from numpy.testing import assert_allclose, assert_array_equal
 from rig.retargeting.rest_twins import NAMES, PERSON, Y, along_x, t_pose, written
 from rig.retargeting.two_people import figure_of, places
 from rig.retargeting.walking import N_WALK, RATE, stands, walk
@@ -18,6 +18,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.planted_feet import plant_feet
 from viewer.rig.retargeting.retarget import retargeted
+from viewer.rig.retargeting.source_contacts import FootPath, foot_contacts
 from viewer.rig.shape import rest_joints
 
 SIDES = ("Left", "Right")
@@ -269,3 +270,20 @@ def test_feet_of_a_lying_person_are_not_planted() -> None:
     found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
     clip, changes = plant_feet(found, OTHER)
     assert clip is found.clip and changes.n_contacts == 0
+
+
+def test_contacts_can_begin_and_end_gradually() -> None:
+    # The foot moves quickly, rests at 20 for 40 frames, and moves on.
+    place = np.concatenate([np.arange(20.0), np.full(40, 20.0), np.arange(21.0, 41.0)])
+    path = place[:, None] * [0.0, 0.0, 10.0]
+    foot = FootPath(path, path, path + 100.0 * Y)
+    how = ([foot], [(0, 80)], 60.0, 200.0, Y)
+    ((sudden,),), ((eased,),) = foot_contacts(*how), foot_contacts(*how, ease=0.05)
+    assert (eased.start, eased.stop) == (sudden.start, sudden.stop)
+    # A smooth step over 4 rows, x^2 (3 - 2 x), at both ends: 3 / 60 s and the first firm row.
+    step = np.array([0.15625, 0.5, 0.84375])
+    assert_allclose(eased.hold[:3], sudden.hold[:3] * step)
+    assert_allclose(eased.hold[-3:], sudden.hold[-3:] * step[::-1])
+    assert_array_equal(eased.hold[3:-3], sudden.hold[3:-3])
+    ((always,),) = foot_contacts([foot], [(25, 55)], *how[2:], ease=0.05)
+    assert (always.hold == 1.0).all()  # it neither begins nor ends within the motion

@@ -18,6 +18,7 @@ from rig.retargeting.rest_twins import (
     t_pose,
     truth,
     twin,
+    written,
 )
 
 from viewer.diagnostics.phrase import Phrase
@@ -102,6 +103,20 @@ def test_rest_pose_of_files_without_a_t_pose_is_estimated_from_anatomy(body, con
     assert limb_error(body, found) < 0.5
     assert degrees(found, expected).max() < 5.0
     assert np.abs(found[..., :3, 3] - expected[..., :3, 3]).max() < 0.001  # m
+
+
+def test_bend_of_the_hands_that_never_changes_is_found_in_files_with_bones_along_x(body):
+    # The hands are bent by 1 radian, as in crawling.
+    rotations, path = truth(starts_in_t_pose=False)
+    axes = along_x()
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        hand, forearm = NAMES.index(f"{side}Hand"), NAMES.index(f"{side}ForeArm")
+        rotations[:, hand] = rotations[:, forearm] @ matrices(np.array([[0.0, 0.0, sign]]))[0]
+        axes[hand] = axes[forearm]
+    expected, _ = posed(body, written(t_pose(), rotations, path), "zero")
+    found, _ = posed(body, written(axes, rotations, path))
+    wrists = [body.skeleton.names.index(f"{side}_wrist") for side in ("left", "right")]
+    assert degrees(found[:, wrists], expected[:, wrists]).max() < 5.0
 
 
 def test_zero_pose_of_scrambled_axes_results_in_a_different_motion(body, expected):

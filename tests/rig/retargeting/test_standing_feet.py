@@ -45,15 +45,30 @@ def knee_angles(where: dict[str, Floats], side: str, tail: str) -> Floats:
     return np.arccos(np.einsum("fa,fa->f", first, second) / products)
 
 
+def jerky_walk() -> tuple[Floats, Floats]:
+    """Return a walk whose root jumps by up to 2 cm in single frames: while both feet stand, while
+    one stands, and when a foot leaves the ground.
+    """
+    rotations, path = walk()
+    for frame, offset in ((30, (0.8, -0.6, 0.0)), (55, (0.0, 0.9, 0.0)), (60, (0.5, 1.5, -1.2))):
+        path[frame] += offset
+    return rotations, path
+
+
+MOTIONS = {"jump": lambda: jump()[:2], "kneel": kneel, "walk": walk, "jerky walk": jerky_walk}
+
+
 @pytest.mark.parametrize("figure", [OTHER, SHORT], ids=["long", "short"])
-@pytest.mark.parametrize("motion", ["jump", "kneel", "walk"])
+@pytest.mark.parametrize("motion", ["jump", "kneel", "walk", "jerky walk"])
 def test_no_joint_rotates_much_faster_and_no_knee_moves_suddenly(
     figure: Figure, motion: str
 ) -> None:
-    rotations, path = {"jump": lambda: jump()[:2], "kneel": kneel, "walk": walk}[motion]()
+    rotations, path = MOTIONS[motion]()
     source = written(t_pose(), rotations, path, rate=RATE)
     clip, changes = plant_feet(retargeted(source, figure), figure)
-    assert changes.is_better and changes.gap_after < EXACT
+    assert changes.is_better and changes.gap_after < (0.1 if "jerky" in motion else EXACT)
+    # In the jump, the source's feet do not slide at all; half a millimetre is allowed.
+    assert changes.after <= max(changes.source, 0.05)
     own, old = axes_of(figure, clip), axes_of(source.figure, source.clip)
     for side in ("Left", "Right"):
         mine = largest_angles(own[:, [figure.skeleton.names.index(f"{side}{p}_") for p in JOINTS]])

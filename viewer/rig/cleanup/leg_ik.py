@@ -6,11 +6,14 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
+from viewer.rig.cleanup.easing import falling
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 
 __all__ = ["Leg", "bend", "reach"]
 
-_STRAIGHT = 0.05  # sine of the knee's angle below which the plane of the leg is undefined
+# Sines of the knee's bend below which a leg bends about the axis of its knee, and above which it
+# stays in its own plane. The plane of a nearly straight leg is noise.
+_PLANE = (np.sin(np.radians(5.0)), np.sin(np.radians(25.0)))
 _REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 
 
@@ -45,7 +48,8 @@ def bend(
 
     The shin rotates about the normal of the leg's plane until the distance from hip to ankle equals
     the target's (law of cosines). Then the whole leg rotates about the hip by the smallest angle
-    that points it at the target, so the knee keeps its direction.
+    that points it at the target, so the knee keeps its direction. Legs that are nearly straight, or
+    bent the wrong way, bend about the axis of their knee instead.
 
     Parameters
     ----------
@@ -54,7 +58,7 @@ def bend(
     targets : (F, 3)
         Targets of the ankle; those out of reach are approached as closely as possible.
     axis : (F, 3)
-        Normals of the leg's plane for frames in which the leg is straight, thigh x shin.
+        Unit vectors along the axis of the knee: the normal of a bent leg's plane, thigh x shin.
 
     Returns
     -------
@@ -63,22 +67,33 @@ def bend(
     """
     upper, lower = hips - knees, ankles - knees
     a, b = np.linalg.norm(upper, axis=1), np.linalg.norm(lower, axis=1)
-    normal = np.cross(upper, lower)
-    sine = np.linalg.norm(normal, axis=1) / np.maximum(a * b, 1e-30)
-    given = -axis / np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)
-    found = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
-    normal = np.where(sine[:, None] < _STRAIGHT, given, found)
-    wanted = targets - hips
-    distance = np.linalg.norm(wanted, axis=1)
+    normal = _normals(upper, lower, -axis, np.maximum(a * b, 1e-30))
+    distance = np.linalg.norm(targets - hips, axis=1)
     distance = np.clip(distance, np.abs(a - b) * (2.0 - _REACH), _REACH * (a + b))
-    new = _angle((a * a + b * b - distance * distance) / np.maximum(2.0 * a * b, 1e-30))
-    old = np.arctan2(
-        np.einsum("fa,fa->f", np.cross(upper, lower), normal), np.einsum("fa,fa->f", upper, lower)
-    )
+    # u . R(n, x) v = c + m cos(x + x0), where c is the product of the components along the axis n.
+    along = _dot(upper, normal) * _dot(lower, normal)
+    across, sine = _dot(upper, lower) - along, _dot(np.cross(upper, lower), normal)
+    wanted = 0.5 * (a * a + b * b - distance * distance) - along
+    new = _angle(wanted / np.maximum(np.hypot(across, sine), 1e-30))
+    old = np.arctan2(sine, across)
     knee = rotation_vector_to_quaternion((new - old)[:, None] * normal)
     bent = _rotated(knee, lower) - upper  # from the hip to the ankle
-    turn = _between(bent, wanted)
+    turn = _between(bent, targets - hips)
     return turn, multiply(turn, knee)
+
+
+def _normals(upper: Floats, lower: Floats, hinge: Floats, product: Floats) -> Floats:
+    """Return the axes about which legs bend: (F, 3)."""
+    normal = np.cross(upper, lower)
+    found = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-30)
+    sine = _dot(normal, hinge) / product
+    own = 1.0 - falling((sine - _PLANE[0]) / (_PLANE[1] - _PLANE[0]))
+    mixed = hinge + own[:, None] * (found - hinge)
+    return mixed / np.linalg.norm(mixed, axis=1, keepdims=True)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("fa,fa->f", a, b)
 
 
 def _angle(cosine: Floats) -> Floats:

@@ -6,16 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.cleanup.frame_rows import runs_of
+from viewer.rig.arrays import Floats, Ints
+from viewer.rig.cleanup.easing import EASE
 from viewer.rig.cleanup.leg_ik import Leg, bend, reach
 from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
 
-__all__ = ["EASE", "faded", "falling", "leg_rotations", "lowering"]
+__all__ = ["hinges", "leg_rotations", "lowering"]
 
-EASE = 0.2
-"""Seconds over which a correction begins and ends outside contacts."""
+_FLEXED = np.sin(np.radians(5.0))  # sine of the bend below which a straight knee hides its axis
 
 
 def leg_rotations(
@@ -46,7 +45,6 @@ def leg_rotations(
         Translation of each leg's ankle, instead of ``drop``.
     """
     result = rotations.copy()
-    # Knees bend about the axis from right to left.
     across = world[:, legs[0].hip, :3, 3] - world[:, legs[-1].hip, :3, 3]
     old = matrix_to_quaternion(_unscaled(world[..., :3, :3]))
     for leg, shift in zip(legs, shifts, strict=True):
@@ -69,7 +67,8 @@ def _reach_for(
     moves = (shift - drop).any(axis=1)
     if not moves.any():
         return
-    thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, across)
+    axis = hinges(_unscaled(world[:, leg.hip, :3, :3]), (hips, knees, ankles), across)
+    thigh, shin = bend(hips, knees, ankles, ankles - drop + shift, axis)
     above = int(parents[leg.hip])
     parent = old[:, above] if above >= 0 else np.array([0.0, 0.0, 0.0, 1.0])
     new_hip = multiply(thigh, old[:, leg.hip])
@@ -82,6 +81,31 @@ def _reach_for(
     ):
         local = multiply(conjugate(np.broadcast_to(outer, inner.shape)), inner)
         rotations[moves, joint] = local[moves]
+
+
+def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:
+    """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
+
+    This is the mean normal of the leg's plane, thigh x shin; strongly bent knees count most.
+
+    Parameters
+    ----------
+    thighs : (N, 3, 3)
+        World rotations of the thigh.
+    points : ((N, 3), (N, 3), (N, 3))
+        World positions of hip, knee and ankle.
+    across : (N, 3)
+        Directions from right to left: the axis of a knee that never bends.
+    """
+    hips, knees, ankles = points
+    upper, lower = knees - hips, ankles - knees
+    bones = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
+    normals = np.cross(upper, lower) / np.maximum(bones, 1e-30)[:, None]
+    sines = np.linalg.norm(normals, axis=1, keepdims=True)
+    found = np.einsum("nba,nb->a", thighs, sines * normals)
+    if float(np.linalg.norm(found)) < _FLEXED**2 * len(thighs):
+        found = np.einsum("nba,nb->a", thighs, across)
+    return thighs @ (found / max(float(np.linalg.norm(found)), 1e-30))
 
 
 def _unscaled(linear: Floats) -> Floats:
@@ -137,39 +161,3 @@ def lowering(
     highest = np.lib.stride_tricks.sliding_window_view(padded, width).max(axis=1)
     # The moving average of moving maxima is never below the values themselves.
     return np.lib.stride_tricks.sliding_window_view(highest, width).mean(axis=1)
-
-
-def faded(values: Floats, is_held: Bools, present: Bools, ease: int) -> Floats:
-    """Return values that fade in and out around held frames; gaps separate runs.
-
-    Parameters
-    ----------
-    values : (F, C)
-        Corrections in held frames.
-    is_held, present : (F,)
-        Masks of held frames and of existing frames.
-    ease : int
-        Number of frames over which a correction fades.
-    """
-    result = values.copy()
-    for start, stop in runs_of(present):
-        held = np.flatnonzero(is_held[start:stop]) + start
-        if len(held) == 0:
-            continue
-        frames = np.arange(start, stop)
-        place = np.searchsorted(held, frames, side="right")
-        before, after = held[np.maximum(place - 1, 0)], held[np.minimum(place, len(held) - 1)]
-        left = np.where(place > 0, frames - before, ease + 1)
-        right = np.where(place < len(held), after - frames, ease + 1)
-        first, second = falling(left / (ease + 1)), falling(right / (ease + 1))
-        # Between two close contacts, the value blends from one to the other.
-        total = np.maximum(first + second, 1.0)[:, None]
-        mixed = first[:, None] * values[before] + second[:, None] * values[after]
-        result[start:stop] = np.where(is_held[start:stop, None], values[start:stop], mixed / total)
-    return result
-
-
-def falling(x: Floats) -> Floats:
-    """Return a smooth step from 1 at 0 to 0 at 1 and beyond, with slope 0 at both ends."""
-    x = np.clip(x, 0.0, 1.0)
-    return 1.0 - x * x * (3.0 - 2.0 * x)

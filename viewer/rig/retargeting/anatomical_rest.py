@@ -2,8 +2,9 @@
 
 The trunk stands upright in its mean posture, the legs hang straight down with the knees' axes
 sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
-level. All other joints keep their mean rotation. A bend of the spine or a twist of the forearms
-that never changes cannot be detected and becomes part of the rest pose.
+level. Hands are straight if the file lays the bones of an arm along one line. All other joints keep
+their mean rotation. A bend of the spine or a twist of the forearms that never changes cannot be
+detected and becomes part of the rest pose.
 """
 
 from __future__ import annotations
@@ -11,9 +12,10 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.geometry.rotation import nearest_rotations, quaternion_to_matrix
 from viewer.rig.retargeting.limb_axes import LimbAxes, limb_axes
 from viewer.rig.retargeting.postures import SIDES, Postures, unit
+from viewer.rig.retargeting.rest_poses import shortest_arc
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["anatomical_rest", "upright_frames"]
@@ -22,6 +24,9 @@ _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
 _UPRIGHT = np.cos(np.radians(30.0))
 _STOOPED = np.cos(np.radians(60.0))
 _ENOUGH = 0.05  # minimum fraction of upright frames
+_COLLINEAR = np.cos(np.radians(10.0))  # between the bones of an arm that is straight
+_ALONG = np.cos(np.radians(30.0))  # between a forearm and the fingers of a straight hand
+_BENT = np.cos(np.radians(85.0))  # mean bend of a wrist beyond which its zero pose is not straight
 _SLOPE = np.radians(30.0)  # slope from the ankle down to the ball of a standing foot
 _STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sole level
 
@@ -66,6 +71,7 @@ def anatomical_rest(
     for side, limb in zip(SIDES, limbs, strict=False):
         foot = _foot(postures, side, stands) if has_stances else _toes(postures, limb, stands)
         fixed |= foot
+    hands = _hands(skeleton, postures.joints)
     result = np.empty((len(parents), 3, 3))
     for joint, parent in enumerate(parents):
         if joint in fixed:
@@ -73,8 +79,10 @@ def anatomical_rest(
         elif parent < 0:
             result[joint] = stands @ _mean(body, postures.rotations[:, joint])
         else:
-            above = postures.rotations[:, parent]
-            result[joint] = result[parent] @ _mean(above, postures.rotations[:, joint])
+            mean = _mean(postures.rotations[:, parent], postures.rotations[:, joint])
+            result[joint] = result[parent] @ (
+                _straight(mean, *hands[joint]) if joint in hands else mean
+            )
     return result, limbs
 
 
@@ -175,6 +183,33 @@ def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Float
     wanted = np.cos(_SLOPE) * forward - np.sin(_SLOPE) * up
     across = np.einsum("fba,fb->a", axes, bends)
     return {ankle: _axes_along(wanted, left) @ _axes_along(front, across).T}
+
+
+def _hands(skeleton: Skeleton, joints: dict[str, int]) -> dict[int, tuple[Floats, Floats]]:
+    """Return the directions of hands whose arms are straight in the zero pose.
+
+    These are two directions for each wrist: in the axes of the forearm and of the hand.
+    """
+    parents, found = skeleton.parents, {}
+    turns, offsets = quaternion_to_matrix(skeleton.rest_rotations), skeleton.rest_translations
+    for side in SIDES:
+        shoulder, elbow, wrist = (
+            joints[f"{side}_{part}"] for part in ("shoulder", "elbow", "wrist")
+        )
+        if parents[wrist] != elbow or parents[elbow] != shoulder:
+            continue
+        forearm = unit(offsets[wrist])
+        fingers = unit(turns[wrist] @ offsets[parents == wrist].sum(axis=0))
+        is_straight = unit(offsets[elbow]) @ turns[elbow] @ forearm > _COLLINEAR
+        if is_straight and (not fingers.any() or fingers @ forearm > _ALONG):
+            found[wrist] = forearm, turns[wrist].T @ forearm
+    return found
+
+
+def _straight(mean: Floats, forearm: Floats, hand: Floats) -> Floats:
+    """Return the mean rotation of a hand without its bend, if that is plausible."""
+    bent = mean @ hand
+    return shortest_arc(bent, forearm) @ mean if bent @ forearm > _BENT else mean
 
 
 def _axes_along(main: Floats, side: Floats) -> Floats:

@@ -123,6 +123,7 @@ def foot_plan(
     rate: float,
     shape: tuple[float, float],
     up: Floats,
+    ease: float = 0.0,
 ) -> FootPlan:
     """Return the contacts of the source, and the heights of the ground under the figure.
 
@@ -132,9 +133,11 @@ def foot_plan(
         As in ``FootPlan``.
     shape : (float, float)
         Approximate height of the figure, and height of its balls above its soles at rest.
+    ease : float
+        Duration of the beginning and the end of a contact, as in ``foot_contacts``.
     """
     size, clearance = shape
-    contacts = foot_contacts(feet, spans, rate, size, up)
+    contacts = foot_contacts(feet, spans, rate, size, up, ease)
     if not any(contacts):
         return FootPlan(feet, contacts, [[] for _ in feet], spans, rate, size, up)
     level, is_usual = ground_level(contacts, size, clearance)

@@ -6,9 +6,10 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.cleanup.leg_solving import falling
+from viewer.rig.cleanup.easing import falling
 from viewer.rig.cleanup.smooth_curves import smooth_curves
 from viewer.rig.retargeting.foot_plan import FootPlan
+from viewer.rig.retargeting.source_contacts import Contact
 
 __all__ = ["foot_shifts"]
 
@@ -19,6 +20,7 @@ _GAP = 0.0007  # maximum distance of a standing foot from the ground in a jump, 
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 _LIFTS, _LIFTED = 4, 20.0  # number of passes that lift sinking feet, and their weight
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
+_SHAKE = 0.1  # seconds below which changes of the feet's translations are quick
 _FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
 _STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 
@@ -70,7 +72,9 @@ def foot_shifts(
     )
     usual = float(np.median(rises)) if len(rises) else 0.0
     still = np.tile(usual * plan.up, (len(heights), 1))
-    sway = _sway(plan, _shifts(plan, every, still), 1.0 - bent, still)
+    shifts = _shifts(plan, every, still)
+    sway = _sway(plan, shifts, 1.0 - bent, still) + _shake(plan, shifts)
+    sway += _shake(plan, [shift - sway for shift in _shifts(plan, every, sway)])
     return _shifts(plan, every, sway), sway
 
 
@@ -89,10 +93,22 @@ def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: F
         steps = np.cumsum(plan.steps(points, contact) - wanted, axis=0)
         flat[rows], is_flat[rows] = steps.mean(axis=0) - steps, True
         holds[rows] = contact.hold
-        rise[rows] = ground + loose * (low[rows] - contact.height) - heights[rows]
+        away = low[rows] - _level(low[rows], contact)
+        rise[rows] = ground + loose * away - heights[rows]
     if not is_flat.any():
         return _Wanted(flat, is_flat, rise, holds, np.full_like(rise, np.inf))
     return _Wanted(flat, is_flat, rise, holds, heights - plan.floor(foot))
+
+
+def _level(low: Floats, contact: Contact) -> Floats:
+    """Return the heights from which the source's foot rises in the rows of a contact: (N,).
+
+    A standing foot may drift; when it lifts, its correction continues without a jump.
+    """
+    held = np.flatnonzero(contact.hold >= 1.0)
+    if len(held) == 0:
+        return np.full_like(low, contact.height)
+    return np.interp(np.arange(len(low)), held, low[held])
 
 
 def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
@@ -177,3 +193,22 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
             sums = np.cumsum(np.pad(padded, ((1, 0), (0, 0))), axis=0)
             mean[start:stop] = (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
     return mean
+
+
+def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
+    """Return the quick translation on which all planted feet agree: (N, 3).
+
+    Noise of the source's root moves body and feet alike. If the feet stay in place and the body
+    does not follow them, this noise moves the knees. Noise of one leg must not move the others.
+    """
+    own = np.stack(shifts)
+    ones = np.ones(own.shape[:2])
+    quick = own - _smoothed(plan, own, ones, _SHAKE)
+    holds = _smoothed(plan, plan.holds().T[..., None], ones, _SHAKE)
+    holds = np.clip(holds, 0.0, 1.0) ** 4
+    total = holds.sum(axis=0)
+    mean = np.einsum("lnc,lna->na", holds, quick) / np.maximum(total, 1.0)
+    squares = np.einsum("lnc,lna->nc", holds, quick**2) / np.maximum(total, 1.0)
+    # 1 if all feet have the same translation, less if they differ.
+    agreement = (mean**2).sum(axis=1, keepdims=True) / np.maximum(squares, 1e-30)
+    return np.minimum(agreement, 1.0) ** 2 * mean

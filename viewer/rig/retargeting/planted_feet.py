@@ -3,7 +3,8 @@
 Retargeting preserves the directions of limbs, so feet slide and sink if proportions differ.
 During a contact of the source, the ball or the heel of the figure's foot stays in place and its
 sole on the ground; before and after, the correction fades in and out. Hips and knees rotate so that
-the ankles reach their targets, and the body is lowered if a leg is too short.
+the ankles reach their targets, and the body is lowered if a leg is too short. If a knee then moves
+more suddenly than the source's, feet are held and released more gradually.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from viewer.rig.retargeting.driven_legs import (
 )
 from viewer.rig.retargeting.foot_plan import FootPlan, foot_plan
 from viewer.rig.retargeting.foot_shifts import foot_shifts
+from viewer.rig.retargeting.knee_accelerations import acceleration_ratio, knee_accelerations
 from viewer.rig.retargeting.level_feet import levelled
 from viewer.rig.retargeting.moving_ground import ground_velocity, on_moving_ground
 from viewer.rig.retargeting.retarget import Retargeted
@@ -37,6 +39,8 @@ from viewer.rig.retargeting.retarget import Retargeted
 __all__ = ["PlantedFeet", "plant_feet"]
 
 _EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
+_EASES = (0.1, 0.2)  # longer beginnings and ends of contacts, seconds
+_CALM = 1.15  # ratio of the knees' accelerations to those of the source that needs no longer one
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
 _STEPS = 5  # number of steps reported as progress, from retargeting to the comparison
 
@@ -78,6 +82,15 @@ class PlantedFeet:
         slack = _ROUNDING * self.size
         slides, gap = self.after - self.before, self.gap_after - self.gap_before
         return max(slides, gap) <= slack and min(slides, gap) < -slack
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Attempt:
+    """A motion with planted feet."""
+
+    clip: SampledClip
+    changes: PlantedFeet
+    knees: float  # the knees' largest accelerations relative to those before
 
 
 def plant_feet(
@@ -122,28 +135,45 @@ def plant_feet(
         travel = -seconds[:, None] * moves
         body = replace(body, travel=travel)
         worlds, feet = body.worlds(clip), on_moving_ground(feet, travel)
+    speed = 0.0 if moves is None else float(np.linalg.norm(moves))
     plan = foot_plan(feet, *how, (body.size, body.clearance), up)
     if not any(plan.contacts):
         return found.clip, PlantedFeet()
+    best = _attempt(clip, body, worlds, plan, speed)
+    for ease in _EASES:
+        if best.knees <= _CALM:
+            break
+        plan = foot_plan(feet, *how, (body.size, body.clearance), up, ease)
+        tried = _attempt(clip, body, worlds, plan, speed)
+        if tried.knees < best.knees and tried.changes.after <= tried.changes.source:
+            best = tried
+    return (best.clip if best.changes.is_better else found.clip), best.changes
+
+
+def _attempt(
+    clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan, ground_speed: float
+) -> _Attempt:
+    """Return the motion with its feet planted according to a plan."""
     report(2, _STEPS, "steps")
     level = levelled(clip, body, worlds, plan)
     report(3, _STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
     report(4, _STEPS, "steps")
     after = body.worlds(planted)
-    gaps = [plan.gap(body.heights(each, up)) for each in (worlds, after)]
+    gaps = [plan.gap(body.heights(each, plan.up)) for each in (worlds, after)]
     changes = PlantedFeet(
         sum(map(len, plan.contacts)),
-        plan.slide([(foot.toe, foot.heel) for foot in feet]),
+        plan.slide([(foot.toe, foot.heel) for foot in plan.feet]),
         plan.slide(body.feet(worlds)),
         plan.slide(body.feet(after)),
         gaps[0],
         gaps[1],
         lowered,
         body.size,
-        0.0 if moves is None else float(np.linalg.norm(moves)),
+        ground_speed,
     )
-    return (planted if changes.is_better else found.clip), changes
+    knees = (knee_accelerations(each, body.legs, plan.spans, plan.rate) for each in (worlds, after))
+    return _Attempt(planted, changes, acceleration_ratio(*knees))
 
 
 def _planted(

@@ -17,7 +17,7 @@ from viewer.rig.pose import rest_pose
 from viewer.rig.retargeting.joint_matches import Matches
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["RestPose", "alignment", "is_same_rest", "rest_of", "up_rotation"]
+__all__ = ["RestPose", "alignment", "is_same_rest", "rest_of", "shortest_arc", "up_rotation"]
 
 # Cosine of the maximum angle between the bones of equal rest poses.
 _SAME = np.cos(np.radians(20.0))
@@ -171,7 +171,7 @@ def _at_joint(
     # Fingers start from the hand's rotation, limbs from the body's, so that twist does not
     # accumulate.
     start = reference if part.startswith(_FINGERS) else stands
-    return _arc(start @ mine[0], theirs[0]) @ start
+    return shortest_arc(start @ mine[0], theirs[0]) @ start
 
 
 def _bones(
@@ -257,8 +257,8 @@ def _frame(side: Floats, main: Floats) -> Floats | None:
     return np.stack([np.cross(second, third), second, third], axis=1)
 
 
-def _arc(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotation from one direction to another."""
+def shortest_arc(start: Floats, end: Floats) -> Floats:
+    """Return the smallest rotation from one direction to another: (3, 3) for unit vectors."""
     axis = np.cross(start, end)
     sine, cosine = float(np.linalg.norm(axis)), float(start @ end)
     if sine > 1e-12:

@@ -15,9 +15,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.cleanup.easing import falling
 from viewer.rig.cleanup.foot_contacts import mean_speeds
 from viewer.rig.cleanup.frame_rows import runs_of
-from viewer.rig.cleanup.leg_solving import falling
 
 __all__ = ["Contact", "FootPath", "foot_contacts", "ground_level", "step_height"]
 
@@ -27,6 +27,7 @@ _SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
 _LOW, _HIGH = 0.015, 0.025
 _LOWEST = 0.02  # maximum height above the other foot of a foot that may be the lowest
 _UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
+_LOOSE = 0.05  # hold up to which a foot is not in contact at the beginning and end of a contact
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
 _LEVEL = 0.015  # maximum difference between heights of one level
 _GROUND = (-0.015, 0.06)  # range of heights of feet on a ground at height 0
@@ -86,7 +87,12 @@ class Contact:
 
 
 def foot_contacts(
-    feet: Sequence[FootPath], spans: Sequence[tuple[int, int]], rate: float, size: float, up: Floats
+    feet: Sequence[FootPath],
+    spans: Sequence[tuple[int, int]],
+    rate: float,
+    size: float,
+    up: Floats,
+    ease: float = 0.0,
 ) -> list[list[Contact]]:
     """Return the contacts of every foot, in time order.
 
@@ -102,6 +108,8 @@ def foot_contacts(
         Approximate height of the body.
     up : (3,)
         The up axis.
+    ease : float
+        Seconds over which a foot is held more at the beginning of a contact, and less at its end.
     """
     lows = np.array([foot.lowest(up) for foot in feet])
     result = []
@@ -117,16 +125,41 @@ def foot_contacts(
                 rows = slice(first + a, first + b)
                 if b - a < _shortest(rate) or not is_lowest[rows].any():
                     continue
-                slow = hold[a:b] >= 1.0
-                legs = (foot.hip[rows] - foot.heel[rows])[slow]
-                if np.median(legs @ up - _UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
-                    continue
-                height = float(np.median(lows[number, rows][slow]))
-                tilt = float(np.median(((foot.heel[rows] - foot.toe[rows]) @ up)[slow]))
-                points = toe[a:b], toe[a:b] & heel[a:b]
-                found.append(Contact(rows.start, rows.stop, *points, hold[a:b], height, tilt))
+                held = hold[a:b] * _eased(b - a, (a > 0, first + b < last), ease * rate)
+                one = _contact(foot, rows.start, (toe[a:b], heel[a:b]), hold[a:b], held, up)
+                found += [one] if one is not None else []
         result.append(found)
     return result
+
+
+def _contact(
+    foot: FootPath,
+    start: int,
+    stands: tuple[Bools, Bools],
+    hold: Floats,
+    eased: Floats,
+    up: Floats,
+) -> Contact | None:
+    """Return a contact without the loose rows at its ends; None if the person lies."""
+    toe, heel = stands
+    slow = np.flatnonzero(hold >= 1.0) + start
+    legs = foot.hip[slow] - foot.heel[slow]
+    if np.median(legs @ up - _UPRIGHT * np.linalg.norm(legs, axis=1)) < 0.0:
+        return None
+    height = float(np.median(foot.lowest(up)[slow]))
+    tilt = float(np.median((foot.heel[slow] - foot.toe[slow]) @ up))
+    firm = np.flatnonzero(hold > _LOOSE)
+    a, b = int(firm[0]), int(firm[-1]) + 1
+    on_toe, is_flat = toe[a:b], (toe & heel)[a:b]
+    return Contact(start + a, start + b, on_toe, is_flat, eased[a:b], height, tilt)
+
+
+def _eased(count: int, is_open: tuple[bool, bool], ease: float) -> Floats:
+    """Return factors that rise from the open start of a contact and fall to its open end: (N,)."""
+    span = min(round(ease), (count - 1) // 3) + 1.0
+    rows = np.minimum(np.arange(1.0, count + 1.0), span)
+    begin, end = (rows if is_one else np.full(count, span) for is_one in is_open)
+    return 1.0 - falling(np.minimum(begin, end[::-1]) / span)
 
 
 def _shortest(rate: float) -> int:
