@@ -12,6 +12,7 @@ from typing import Any
 
 from viewer.batching.engines import Job
 from viewer.batching.engines._process_limits import limit_memory
+from viewer.batching.engines._task_size import LONGEST
 from viewer.batching.items import Item, Result
 from viewer.batching.worker import name_worker
 from viewer.data_classes import dataclass
@@ -24,7 +25,6 @@ ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
 
 _SETTLE = 0.5  # seconds in which a worker that ends itself can send its last event
-_LONGEST = 0.3  # seconds after which a task starts no further item, for another worker may be idle
 _FAILED = 70  # exit code of a worker that ends itself
 
 # A worker runs one item at a time even if it has several threads: output is captured, and
@@ -107,7 +107,7 @@ def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVer
         for number, item in enumerate(items):
             with _ended_after(asked.timeout, worker, key, number):
                 results.append(_job(asked.job)(item))
-            if time.monotonic() > start + _LONGEST:
+            if time.monotonic() > start + LONGEST:
                 break
         return Reply(results, time.monotonic() - start)
 

@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections import deque
 from statistics import median
 
-__all__ = ["TaskSize"]
+__all__ = ["LONGEST", "TaskSize"]
 
-_SECONDS = 0.2  # duration of a task at which scheduling takes a few percent of its time
-_MOST = 32  # maximum number of items per task
+_SECONDS = 0.5  # duration of a task at which scheduling takes about a percent of its time
+_MOST = 64  # maximum number of items per task
 _GROWTH = 8  # items that finish before tasks grow by one item
 _RECENT = 32  # number of items whose times are used
+
+LONGEST = 1.5 * _SECONDS
+"""Seconds after which a task starts no further item, because another worker may be idle."""
 
 
 class TaskSize:
     """The number of items that a task has, from the times of the latest items.
 
-    The first tasks have one item each, as do all tasks whose items take more than 0.1 s.
+    The first tasks have one item each, as do all tasks whose items take more than 0.25 s. The last
+    ones become shorter, so that all workers finish at about the same time.
     """
 
     def __init__(self) -> None:
@@ -32,9 +36,14 @@ class TaskSize:
         """Begin again with one item per task, because all items of a task were lost."""
         self._n_finished = 0
 
-    def now(self) -> int:
-        """Return the number of items for the next task, from 1 to 32."""
+    def now(self, n_left: int, n_workers: int) -> int:
+        """Return the number of items for the next task, from 1 to 64.
+
+        ``n_left``: number of items that no task has yet; 0 if it is unknown.
+        """
         # Not the mean, because a worker's first item also loads modules.
         each = median(self._seconds) if self._seconds else _SECONDS
         fitting = int(_SECONDS / max(each, _SECONDS / _MOST))
-        return max(1, min(fitting, 1 + self._n_finished // _GROWTH))
+        # Each worker then gets at least two more tasks.
+        evenly = n_left // (2 * max(n_workers, 1)) if n_left else fitting
+        return max(1, min(fitting, evenly, 1 + self._n_finished // _GROWTH))

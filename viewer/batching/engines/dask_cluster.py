@@ -8,6 +8,7 @@ reported.
 from __future__ import annotations
 
 import itertools
+import operator
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
@@ -182,7 +183,8 @@ class _Flight:
     def _next_task(self) -> _Task:
         if self._again and self._again[0].is_alone:
             return (self._again.popleft(),)
-        size, task = self._size.now(), list[_Attempt]()
+        n_left = operator.length_hint(self._items) + len(self._again)
+        size, task = self._size.now(n_left, self._n_workers), list[_Attempt]()
         while len(task) < size and self._again and not self._again[0].is_alone:
             task.append(self._again.popleft())
         task += map(_Attempt, itertools.islice(self._items, size - len(task)))
