@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats._obj.faces import FEWEST, CornerFault, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
-from viewer.formats._obj.growing import GrowingTable
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
 from viewer.formats._source import Source
+from viewer.formats._text.growing_table import GrowingTable
 from viewer.rig.arrays import Floats
 from viewer.rig.srgb import decode_srgb
 
