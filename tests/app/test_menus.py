@@ -222,7 +222,7 @@ def test_export_menu_writes_a_figure_without_a_skeleton(drive, rig, tmp_path):
     hand.menu("menu File", "Export…")
     hand.step(3)
     hand.click("Save###Save")
-    hand.step(2)
+    hand.finish_job()
     assert not hand.state.error and (tmp_path / "tiny.obj").is_file()
 
 

@@ -253,7 +253,7 @@ ACTIONS = (
     Action("Open the bundled figure", _WANT, ("open bundled",)),
     Action("Open the bundled body", _WANT, ("open body",)),
     Action("Save pose…", "menus.ask_for_pose", why="core.reasons.no_pose"),
-    Action("Export…", "menus.ask_for_export"),
+    Action("Export…", "menus.ask_for_export", why=_ROOM),
     Action(
         "Export motion…",
         "files.motion_dialog.ask_for_motion",

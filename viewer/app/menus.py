@@ -107,7 +107,7 @@ def _draw_file_menu(state: AppState) -> list[Path]:
     imgui.separator()
     if menu_item(state, "Save pose…", why=no_pose(state)):
         ask_for_pose(state)
-    if menu_item(state, "Export…"):
+    if menu_item(state, "Export…", why=no_job_room(state)):
         ask_for_export(state)
     if menu_item(state, "Export motion…", why=nothing_to_export(state) or no_job_room(state)):
         ask_for_motion(state)

@@ -53,12 +53,13 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         _rows("vn", normals),
         _faces(mesh, bool(beside)),
     )
+    n_uvs = 0 if mesh.uvs is None else len(mesh.uvs)
     # Files that are not missing already have the same content.
     missing = [file for file in beside if not os.path.lexists(file)]
     with all_or_none(missing):
         for file in missing:
             save_bytes(file, beside[file])
-        save_parts(path, parts)
+        save_parts(path, parts, 2 * mesh.n_vertices + n_uvs + mesh.n_triangles)
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
     lost = library_losses(mesh)

@@ -11,7 +11,16 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.near_names import did_you_mean
 
-__all__ = ["FOLDER", "MAX_SIZE", "kind_of", "no_file", "read_bytes", "read_head", "unreadable"]
+__all__ = [
+    "FOLDER",
+    "MAX_SIZE",
+    "kind_of",
+    "no_file",
+    "read_bytes",
+    "read_head",
+    "read_part",
+    "unreadable",
+]
 
 MAX_SIZE = 2 << 30
 """Default size limit for files, bytes."""
@@ -67,8 +76,14 @@ def kind_of(path: Path, max_size: int) -> str | None:
 
 
 def read_head(path: Path, size: int = -1) -> bytes:
+    return read_part(path, 0, size)
+
+
+def read_part(path: Path, start: int, size: int) -> bytes:
+    """Return the bytes from an offset; a size of -1 means all."""
     try:
         with path.open("rb") as stream:
+            stream.seek(start)
             return stream.read(size)
     except (OSError, ValueError) as problem:
         raise _unreadable(path, problem) from None

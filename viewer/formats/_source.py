@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
+from viewer.formats._long_text import LongText, count_line_ends, line_parts, without_marks
 from viewer.formats._text.numbers import word_begins
 from viewer.progress import report_bytes
 from viewer.rig.arrays import Ints
@@ -22,10 +23,6 @@ __all__ = ["MAX_SIZE", "Source", "read_bytes"]
 
 Content = TypeVar("Content")
 
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
-# Files with these first bytes are binary and may end with any byte.
-_ANY_END = (b"ply\n", b"ply\r", b"glTF", b"\x80", b"x", b"\x1f\x8b", b"BZh", b"\xfd", b"\x5d\x00")
 _WORD = re.compile(rb"[{}]|[^{} \t\n\r\v\f]+")
 _MAGIC = (
     (b"\x1f\x8b", "gzip data"),
@@ -80,7 +77,7 @@ class Source:
         self.options: dict[str, str] = {}
         self.used_options: set[str] = set()
         self._opened: dict[Callable[[Source], Any], Any] = {}
-        self._data = None if data is None else _without_marks(data)
+        self._data = None if data is None else without_marks(data)
         self._is_stored = data is None  # whether the data can be read again
         self._counted = (0, 1)  # an offset and its line number, where counting of lines continues
         self._offsets: dict[str, tuple[Source, Callable[[int], int]]] = {}
@@ -104,9 +101,35 @@ class Source:
         if self._data is None:
             name = f"reading {self.path.name}"
             report_bytes(0, 0, name)
-            self._data = _without_marks(read_bytes(self.path, self.max_size))
+            self._data = without_marks(read_bytes(self.path, self.max_size))
             report_bytes(0, len(self._data), name)
         return self._data
+
+    def line_parts(self, length: int) -> Iterator[bytes]:
+        """Yield the data in parts of whole lines, and report progress.
+
+        A long file is read part by part, unless it is in memory already.
+
+        Parameters
+        ----------
+        length : int
+            Size of a part in bytes, unless one of its lines is longer.
+        """
+        text = self._text()
+        total, done = len(text), 0
+        report_bytes(done, total, f"reading {self.path.name}")
+        for part in line_parts(text, length):
+            yield part
+            done += len(part)
+            report_bytes(done, total)
+
+    def _text(self) -> bytes | LongText:
+        """Return the data, which stays on disk if it is long and not in memory yet."""
+        if self._data is None:
+            found = LongText.open(self.path, self.max_size)
+            if found is not None:
+                return found
+        return self.data
 
     def release(self) -> None:
         """Release the memory of the data, which is read again when an error needs its line."""
@@ -171,21 +194,9 @@ class Source:
         start, line = self._counted
         if offset < start:
             start, line = 0, 1
-        line += self.data.count(b"\n", start, offset)
-        lone = self.data.count(b"\r", start, offset) - self.data.count(b"\r\n", start, offset)
-        if lone:
-            line += self._lone_returns(start, offset)
+        line += count_line_ends(self._text(), start, offset)
         self._counted = offset, line
         return line
-
-    def _lone_returns(self, start: int, end: int) -> int:
-        """Return the number of carriage returns in runs that no line feed follows."""
-        letters = np.frombuffer(self.data, dtype=np.uint8, count=end - start, offset=start)
-        is_return = np.concatenate([[False], letters == ord("\r"), [False]])
-        begins, ends = np.flatnonzero(is_return[1:] != is_return[:-1]).reshape(-1, 2).T
-        # A run that ends the part counts as not followed by a line feed.
-        after = np.append(letters, 0)[ends]
-        return int((ends - begins)[after != ord("\n")].sum())
 
     @property
     def end(self) -> int:
@@ -331,6 +342,12 @@ class Source:
 
     def head(self, size: int) -> bytes:
         """Return up to ``size`` bytes, starting at the first word."""
+        text = self._text()
+        if isinstance(text, LongText):
+            start = text.part(0, 2 * size)
+            first = _WORD.search(start)
+            if first is not None and first.start() <= size:
+                return start[first.start() : first.start() + size]
         first = self.next_word(0)
         return b"" if first is None else self.data[first.start() : first.start() + size]
 
@@ -354,9 +371,3 @@ class Source:
 def _indices(places: ArrayLike) -> Ints:
     """Return unique indices in ascending order: (N,) int32."""
     return np.unique(np.asarray(places, dtype=np.int32))
-
-
-def _without_marks(data: bytes) -> bytes:
-    if data.startswith(_ANY_END):
-        return data
-    return data.removeprefix(_BYTE_ORDER_MARK).rstrip(_CONTROL_Z)

@@ -149,7 +149,8 @@ def _normals(source: Source, parts: ObjParts) -> Floats | None:
     chosen = np.full(n_vertices, -1, dtype=indices.dtype)
     chosen[vertices] = indices
     others = np.flatnonzero(chosen[vertices] != indices)
-    result = np.where((chosen >= 0)[:, None], listed[chosen], np.nan)
+    result = listed[chosen]
+    result[chosen < 0] = np.nan
     differs = (result[vertices[others]] != listed[indices[others]]).any(axis=1)
     several = np.bincount(vertices[others], differs, minlength=n_vertices) > 0
     if several.any():

@@ -207,7 +207,8 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
         parts.append([_bindings_text(skin)])
     for material in mesh.materials:
         _save_texture(material, Path(path).parent)
-    save_parts(path, chain.from_iterable(parts))
+    n_tables = 2 + (mesh.uvs is not None) + (skin is not None)
+    save_parts(path, chain.from_iterable(parts), n_tables * mesh.n_vertices + mesh.n_triangles)
     notes = []
     if len(sources) != figure.mesh.n_vertices:
         counts = {"before": figure.mesh.n_vertices, "after": mesh.n_vertices}

@@ -20,7 +20,7 @@ from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
 from viewer.media.unfinished import note_unfinished, temporary_prefix
 from viewer.phrases import printable
-from viewer.progress import report_bytes
+from viewer.progress import report, report_bytes
 from viewer.streams import is_stdout, write_stdout
 
 __all__ = [
@@ -134,14 +134,27 @@ def save_bytes(path: str | Path, data: bytes) -> None:
     save_parts(path, [data])
 
 
-def save_parts(path: str | Path, parts: Iterable[bytes]) -> None:
+def save_parts(
+    path: str | Path, parts: Iterable[bytes], n_lines: int = 0, reports: bool = True
+) -> None:
     """Write a file in parts, so that its content need not fit into memory; see ``save_bytes``.
 
-    Errors of the iterable leave the file unchanged.
+    Parameters
+    ----------
+    path : str or Path
+        The file.
+    parts : iterable of bytes
+        Its content; errors of the iterable leave the file unchanged.
+    n_lines : int
+        Expected number of lines, to which reported progress refers; 0 if unknown.
+    reports : bool
+        Whether to report progress; False if the iterable does.
     """
     hold()  # a signal that arrives after the rename must not turn success into failure
     poll()
     path = Path(path)
+    if reports:
+        parts = _reported(parts, path.name, n_lines)
     kept = _written.get()
     if kept is not None or is_stdout(path):
         parts = [b"".join(parts)]
@@ -329,7 +342,7 @@ def _write_through(target: Path, parts: Iterable[bytes]) -> None:
     # Closing may fail too: /dev/full reports its error only then. A pipe without a reader blocks
     # forever, so signals must be able to interrupt it.
     with raising(), target.open("wb") as stream:
-        _write_parts(stream, parts, target.name)
+        _write_parts(stream, parts)
 
 
 def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
@@ -340,7 +353,7 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:
-            _write_parts(stream, parts, target.name)
+            _write_parts(stream, parts)
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(permissions)
@@ -352,13 +365,23 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
         raise
 
 
-def _write_parts(stream: BinaryIO, parts: Iterable[bytes], name: str) -> None:
-    written = 0
+def _write_parts(stream: BinaryIO, parts: Iterable[bytes]) -> None:
     for part in parts:
         poll()
         stream.write(part)
-        written += len(part)
-        report_bytes(written, 0, f"writing {name}")
+
+
+def _reported(parts: Iterable[bytes], name: str, n_lines: int) -> Iterator[bytes]:
+    """Yield parts, and report each when it has been written."""
+    n_bytes, done, what = 0, 0, f"writing {name}"
+    for part in parts:
+        yield part
+        n_bytes += len(part)
+        if n_lines:
+            done += part.count(b"\n")
+            report(min(done, n_lines), n_lines, "lines", what)
+        else:
+            report_bytes(n_bytes, 0, what)
 
 
 def _require_folder(target: Path) -> None:

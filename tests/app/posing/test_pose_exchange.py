@@ -242,7 +242,7 @@ def _save_as(hand, entry, name):
     _name(hand, name)
     label = next(label for label in hand.state.item_rects if label.endswith("###Save"))
     hand.click(label)
-    hand.step(2)
+    hand.finish_job()
     return label
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from viewer.cli import run
+from viewer.commands._progress import Progress
 from viewer.commands._writing import streamed_bvh
 from viewer.formats import Source
 from viewer.formats._bvh import streaming
@@ -242,3 +243,14 @@ def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, c
     # A frame has 17 numbers and 5 joints: its rotations need 160 bytes. Only the numbers of lines
     # and rows are kept, at most 16 bytes per frame.
     assert (peaks[2] - peaks[1]) / 4500 < 40
+
+
+def test_progress_is_reported_in_frames_only(tmp_path, monkeypatch):
+    """The bar in the terminal would flicker between two units."""
+    monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
+    monkeypatch.setattr(streaming, "_PART", 2000)
+    (tmp_path / "a.bvh").write_text(motion(frames=100))
+    found = []
+    monkeypatch.setattr(Progress, "receive", lambda self, *step: found.append(step))
+    assert run(["convert", str(tmp_path / "a.bvh"), "-o", str(tmp_path / "b.bvh")]) == 0
+    assert len(found) > 5 and {(total, unit) for _, total, unit, _ in found} == {(100, "frames")}

@@ -3,7 +3,7 @@
 import numpy as np
 
 from viewer.formats import Source, obj
-from viewer.formats._obj.growing import GrowingTable
+from viewer.formats._text.growing_table import GrowingTable
 
 
 def test_rows_are_those_that_were_added():

@@ -3,11 +3,13 @@
 import numpy as np
 import pytest
 
-from viewer.formats import Source, obj, ply
+from viewer.export import export
+from viewer.formats import Source, obj, ply, write
 from viewer.formats._text.decimals import integers
 from viewer.formats._text.number_text import row_texts
 from viewer.media.saving import save_parts
 from viewer.progress import Cancelled, receiving, report
+from viewer.rig.scene import Actor
 
 HEAD = "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
 HEAD += "property float z\nend_header\n"
@@ -57,6 +59,26 @@ def test_cancelled_writing_keeps_the_old_file(tmp_path):
     with receiving(receive), pytest.raises(Cancelled):
         save_parts(tmp_path / "a.txt", row_texts(np.zeros((9, 9), np.int32), integers))
     assert [(file.name, file.read_text()) for file in tmp_path.iterdir()] == [("a.txt", "old")]
+
+
+def write_mesh(figure, path):
+    if path.suffix == ".skin":
+        write(figure, path)
+    else:
+        export(Actor(figure), path)
+
+
+@pytest.mark.parametrize("suffix", ["obj", "skin"])
+def test_writing_a_mesh_reports_lines_up_to_the_total(tmp_path, suffix):
+    text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\nf 1 3 4\n"
+    figure = obj.read(Source("a.obj", text.encode()))
+    found = []
+    with receiving(lambda *step: found.append(step)):
+        write_mesh(figure, tmp_path / f"a.{suffix}")
+    # Four positions, four normals and two triangles.
+    assert {step[1:] for step in found} == {(10, "lines", f"writing a.{suffix}")}
+    done = [step[0] for step in found]
+    assert done == sorted(done) and done[-1] == 10
 
 
 def test_reports_are_sent_only_to_the_innermost_receiver():

@@ -9,7 +9,7 @@ from typing import Protocol
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 
-__all__ = ["CountedJob", "FrameJob", "Job", "Report", "ThreadJob", "unexpected"]
+__all__ = ["CountedJob", "FrameJob", "Job", "Report", "unexpected"]
 
 Report = Callable[[int, int, str], None]
 """Called with the completed steps, their total and the next step's name; raises to cancel."""
@@ -48,62 +48,6 @@ class Job(Protocol):
 
     def cancel(self) -> None:
         """Cancel the job; no partial file remains."""
-
-
-class ThreadJob:
-    """Job in its own thread that does not use OpenGL.
-
-    Parameters
-    ----------
-    title : str
-        Description of the job.
-    act : callable
-        Returns messages about the result; may raise ViewerError.
-    wake : callable
-        Called from the thread when it ends.
-    """
-
-    def __init__(
-        self, title: str, act: Callable[[], list[str]], wake: Callable[[], None] = lambda: None
-    ) -> None:
-        self.title, self.error, self.can_cancel = title, "", False
-        self.lines: list[str] = []
-        self._act, self._wake = act, wake
-        self._thread = threading.Thread(target=self._run)  # a daemon could leave partial files
-        self._thread.start()
-
-    def _run(self) -> None:
-        try:
-            self.lines = self._act()
-        except ViewerError as problem:
-            self.error = str(problem)
-        except MemoryError:
-            self.error = f"{self.title}: not enough memory"
-        except BaseException as problem:  # a programming error: the traceback is printed
-            self.error = unexpected(self.title, problem)
-            raise
-        finally:
-            self._wake()
-
-    @property
-    def is_done(self) -> bool:
-        """Whether it has ended."""
-        return not self._thread.is_alive()
-
-    @property
-    def progress(self) -> tuple[int, int]:
-        """Always unknown: (0, 0)."""
-        return 0, 0
-
-    def step(self) -> None:
-        """Do nothing: the thread does the work."""
-
-    def cancel(self) -> None:
-        """Do nothing: a single file is written too quickly to be worth cancelling."""
-
-    def wait(self) -> None:
-        """Wait until it has ended."""
-        self._thread.join()
 
 
 def unexpected(title: str, problem: BaseException) -> str:

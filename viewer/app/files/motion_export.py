@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
 from viewer.data_classes import dataclass
@@ -151,6 +152,9 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         several figures, contain all of them, including those that do not move; other formats get
         one file per actor.
     """
+    if why := no_job_room(state):
+        state.error = why
+        return
     try:
         parts, left_out = _parts(state, path, everyone)
         key = suited_exporter(path, parts[0].actor.figure)

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
+from viewer.app.core.jobs import CountedJob, Report
+from viewer.app.core.reasons import no_job_room
 from viewer.app.core.state import AppState
 from viewer.errors import ViewerError
-from viewer.formats import check_targets
+from viewer.formats import all_or_none, check_targets
 from viewer.phrases import printable
+from viewer.progress import receiving
 
-__all__ = ["save_files"]
+__all__ = ["save_files", "save_in_background"]
 
 
 def save_files(state: AppState, act: Callable[[], object], files: list[Path]) -> None:
@@ -19,6 +22,48 @@ def save_files(state: AppState, act: Callable[[], object], files: list[Path]) ->
         # The dialog has already asked whether to replace existing files.
         check_targets(files, state.inputs, force=True)
         act()
-        state.say(f"Saved {', '.join(printable(file, 200) for file in files)}")
+        state.say(_saved(files))
     except ViewerError as problem:
         state.error = str(problem)
+
+
+def save_in_background(
+    state: AppState,
+    act: Callable[[], Iterable[object]],
+    files: Sequence[Path],
+    inputs: Sequence[Path] = (),
+) -> None:
+    """Write files in a job that reports its progress; cancelling it leaves no file changed.
+
+    Parameters
+    ----------
+    state : AppState
+        Receives the job, or an error if another job is running or the scene was read from a file
+        that would be replaced.
+    act : callable
+        Writes the files in another thread; returns notes.
+    files : sequence of Path
+        The files; the job is named after the first.
+    inputs : sequence of Path
+        Further files that must not be replaced.
+    """
+    if why := no_job_room(state):
+        state.error = why
+        return
+    try:
+        # The dialog has already asked whether to replace existing files.
+        check_targets(files, [*state.inputs, *inputs], force=True)
+    except ViewerError as problem:
+        state.error = str(problem)
+        return
+
+    def write(report: Report) -> list[str]:
+        with receiving(lambda done, total, *_: report(done, total, "")), all_or_none(files):
+            notes = act()
+        return [*map(str, notes), _saved(files)]
+
+    state.job = CountedJob(f"Writing {printable(files[0].name, 60)}", write)
+
+
+def _saved(files: Sequence[Path]) -> str:
+    return f"Saved {', '.join(printable(file, 200) for file in files)}"

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.state import AppState
-from viewer.app.files.saving import save_files
+from viewer.app.files.saving import save_files, save_in_background
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.state import Posing
 from viewer.errors import ViewerError
@@ -102,14 +103,16 @@ def save_pose(state: AppState, path: Path) -> None:
 
 
 def save_export(state: AppState, path: Path) -> None:
-    """Write the chosen actor in its current pose, for other programs."""
+    """Write the chosen actor in its current pose for other programs, in the background."""
     try:
         files = files_written(path)
     except ViewerError as problem:
         state.error = str(problem)
         return
-    actor = upright_actor(state.scene, state.actor)
-    save_files(state, lambda: state.say(*export(actor, path, state.options.skinning)), files)
+    # Edits made during the export must not change the written pose.
+    actor = upright_actor(state.scene, state.actor).copy()
+    skinning = replace(state.options.skinning)
+    save_in_background(state, lambda: export(actor, path, skinning), files)
 
 
 def mirror(state: AppState) -> None:

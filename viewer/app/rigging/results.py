@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from viewer.app.core.jobs import ThreadJob
 from viewer.app.core.state import AppState
+from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
 from viewer.app.rigging.state import Comparison, Result, Rigging
 from viewer.app.rigging.trial_motion import TRIAL, trial_clip
 from viewer.autorig.rigged import clip_for
 from viewer.errors import RigError, ViewerError
 from viewer.export._rigged_files import files_of, write_rigged
-from viewer.formats import check_targets
 from viewer.phrases import printable
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Floats, Ints
@@ -287,13 +286,8 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
     """Write a result in the background: all of its files or none."""
     try:
         files = files_of(path)
-        # The dialog has already asked whether to replace existing files.
-        check_targets(files, [*state.inputs, *result.template.paths], force=True)
     except ViewerError as problem:
         state.error = str(problem)
         return
-    saved = f"Saved {', '.join(printable(file, 200) for file in files)}"
-    state.job = ThreadJob(
-        f"Writing {printable(path.name, 60)}",
-        lambda: [*map(str, write_rigged(result.rigged, path)), saved],
-    )
+    inputs = result.template.paths
+    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs)

@@ -89,7 +89,7 @@ def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[D
     """
     check_options(options)
     stream = _Stream(animation, options)
-    save_parts(path, stream.texts())
+    save_parts(path, stream.texts(), reports=False)
     first, writer = stream.first, stream.writer
     lost = stream.losses.notes(path, first.figure, first.first_frame)
     notes = [writer.summary(path, 0, animation.n_frames), *lost]

@@ -14,6 +14,7 @@ Picks = NDArray[np.integer]
 # Maximum for ear clipping, which would take seconds for larger polygons; they become fans.
 _MOST_CORNERS = 400
 _CHUNK = 4_000_000  # (corner, corner) pairs per batch
+_PART = 1 << 15  # polygons per batch, which limits the memory of temporary arrays
 
 
 def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks, Picks]:
@@ -39,24 +40,21 @@ def triangulate(positions: Floats, corners: Picks, counts: Picks) -> tuple[Picks
     faces : (T,)
         Polygon of each triangle, in ascending order.
     """
-    starts = np.cumsum(counts) - counts
+    owners = np.repeat(np.arange(len(counts), dtype=np.int32), counts - 2)
     if (counts == 3).all():
-        every = np.arange(3 * len(counts), dtype=np.int32)
-        return every.reshape(-1, 3), np.arange(len(counts))
-    picks: list[Picks] = []
-    faces: list[Picks] = []
-    for size in np.unique(counts).tolist():
-        rows = np.flatnonzero(counts == size)
-        places = starts[rows, None] + np.arange(size)
-        if size == 3:
-            local: Picks = np.broadcast_to(np.arange(3), (len(rows), 1, 3))
-        else:
-            local = _cut(positions[corners[places]])
-        picks.append(np.take_along_axis(places[:, None], local, axis=2).reshape(-1, 3))
-        faces.append(np.repeat(rows, size - 2))
-    owners = np.concatenate(faces)
-    order = np.argsort(owners, kind="stable")
-    return np.concatenate(picks)[order], owners[order]
+        return np.arange(3 * len(counts), dtype=np.int32).reshape(-1, 3), owners
+    picks = np.empty((len(owners), 3), dtype=np.int32)
+    starts = np.cumsum(counts) - counts
+    for first in range(0, len(counts), _PART):
+        part = counts[first : first + _PART]
+        for size in np.unique(part).tolist():
+            rows = first + np.flatnonzero(part == size)
+            places = starts[rows, None] + np.arange(size)
+            local = _fan(3)[None] if size == 3 else _cut(positions[corners[places]])
+            # Each earlier polygon has two triangles fewer than corners.
+            targets = (starts[rows] - 2 * rows)[:, None] + np.arange(size - 2)
+            picks[targets] = np.take_along_axis(places[:, None], local, axis=2)
+    return picks, owners
 
 
 def picked(corners: Picks, picks: Picks) -> Picks:

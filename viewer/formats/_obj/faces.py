@@ -60,7 +60,7 @@ class FaceRows:
         Errors to record when the triangles of the faces are known.
     """
 
-    counts: Places
+    counts: NDArray[np.integer]
     corners: Corners
     offsets: Places
     faults: tuple[CornerFault, ...] = ()

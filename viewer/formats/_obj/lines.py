@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, word_begins
-from viewer.progress import report_bytes
 from viewer.rig.arrays import Bools, Floats
 
 __all__ = ["KEYWORDS", "Lines", "NumberRows", "Places", "Rows", "number_rows", "pieces", "rows_of"]
@@ -28,7 +27,7 @@ KEYWORDS = ("v", "vt", "vn", "f")
 
 _PIECE = 1 << 18  # bytes per piece
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
-_LINE_END = re.compile(rb"[\r\n]")
+_CONTINUES = re.compile(rb"\\(?:\r*\n|\r+)\Z")
 _PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
 
 
@@ -94,16 +93,24 @@ class Rows:
 
 def pieces(source: Source) -> Iterator[Lines]:
     """Yield the whole file, piece by piece, with offsets relative to the file."""
-    data = source.data
-    if b"\\\n" in data or b"\\\r" in data:
-        data = _CONTINUED.sub(lambda found: b" " * len(found.group()), data)
     start = 0
-    while start < len(data):
-        found = _LINE_END.search(data, min(start + _PIECE, len(data)))
-        end = found.end() if found else len(data)
-        yield _split(data[start:end] + _PAD, start)
-        start = end
-        report_bytes(end, len(data))
+    for data in _joined(source.line_parts(_PIECE)):
+        if b"\\" in data:
+            data = _CONTINUED.sub(lambda found: b" " * len(found.group()), data)
+        yield _split(data + _PAD, start)
+        start += len(data)
+
+
+def _joined(parts: Iterator[bytes]) -> Iterator[bytes]:
+    """Join a part that ends within a continued line with the next one."""
+    held: list[bytes] = []
+    for part in parts:
+        held.append(part)
+        if not _CONTINUES.search(part):
+            yield b"".join(held)
+            held = []
+    if held:
+        yield b"".join(held)
 
 
 def _split(data: bytes, base: int) -> Lines:

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats._obj.faces import FEWEST, CornerFault, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
-from viewer.formats._obj.growing import GrowingTable
 from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
 from viewer.formats._source import Source
+from viewer.formats._text.growing_table import GrowingTable
 from viewer.rig.arrays import Floats
 from viewer.rig.srgb import decode_srgb
 
@@ -55,7 +55,7 @@ class ObjParts:
     normals: Floats
     uvs: Floats
     colors: Floats | None
-    counts: Places
+    counts: NDArray[np.integer]
     corners: NDArray[np.integer]
     offsets: Places
     runs: dict[bytes, list[tuple[int, str]]]
@@ -69,7 +69,7 @@ class _Gathered:
     tables: dict[str, GrowingTable] = field(
         default_factory=lambda: {k: GrowingTable((n,), np.float64) for k, n in _WIDTHS.items()}
     )
-    counts: GrowingTable = field(default_factory=GrowingTable)
+    counts: GrowingTable = field(default_factory=lambda: GrowingTable((), np.int32))
     corners: GrowingTable = field(default_factory=lambda: GrowingTable((3,), np.int32))
     offsets: GrowingTable = field(default_factory=GrowingTable)
     faults: list[CornerFault] = field(default_factory=list)
@@ -175,7 +175,7 @@ def _add_faces(gathered: _Gathered, faces: FaceRows) -> None:
     first = gathered.n_faces
     gathered.n_faces += len(faces.counts)
     gathered.faults += [replace(fault, faces=fault.faces + first) for fault in faces.faults]
-    gathered.counts.add(faces.counts)
+    gathered.counts.add(faces.counts.astype(np.int32))
     gathered.corners.add(faces.corners)
     gathered.offsets.add(faces.offsets)
 

@@ -14,7 +14,7 @@ from viewer.formats._ply.header import Element
 
 _WHOLE = 2.0**31
 
-__all__ = ["Columns", "even_binary", "even_text"]
+__all__ = ["Columns", "compact", "even_binary", "even_text"]
 
 Numbers = NDArray[Any]
 Columns = tuple[dict[str, Numbers], dict[str, tuple[NDArray[np.int64], Numbers]]]
@@ -22,7 +22,7 @@ Columns = tuple[dict[str, Numbers], dict[str, tuple[NDArray[np.int64], Numbers]]
 all values."""
 
 
-def even_text(element: Element, block: NDArray[np.float64]) -> Columns | None:
+def even_text(element: Element, block: Numbers) -> Columns | None:
     """Split rows of numbers into the columns of an element, (N, C).
 
     Returns None if the rows do not fit, or have lists of different lengths.
@@ -38,7 +38,7 @@ def even_text(element: Element, block: NDArray[np.float64]) -> Columns | None:
         if prop.count_kind:
             if (block[:, at] != width).any():
                 return None
-            values = _compact(block[:, at + 1 : at + 1 + width])
+            values = compact(block[:, at + 1 : at + 1 + width])
             found[prop.name] = _equal_counts(len(block), width), values.reshape(-1)
             at += width
         else:
@@ -84,9 +84,10 @@ def even_binary(
     return (columns, found), kind.itemsize
 
 
-def _compact(values: NDArray[np.float64]) -> Numbers:
+def compact(values: Numbers) -> Numbers:
     """Return whole numbers as int32, of half the size, and others unchanged."""
-    if not (values.size and values.min() > -_WHOLE and values.max() < _WHOLE):
+    fits = values.size and values.min() > -_WHOLE and values.max() < _WHOLE
+    if values.dtype == np.int32 or not fits:
         return values
     whole = values.astype(np.int32)
     return whole if (whole == values).all() else values

@@ -12,18 +12,21 @@ from viewer.diagnostics import Part, Phrase
 from viewer.errors import FormatError
 from viewer.formats._mesh.polygons import triangles_of
 from viewer.formats._ply.binary_rows import BinaryRows
-from viewer.formats._ply.even import even_text
+from viewer.formats._ply.even import compact, even_text
 from viewer.formats._ply.header import CORNERS, Element, Header, Property
 from viewer.formats._ply.table import Numbers, Places, Table, list_places
 from viewer.formats._source import Source
+from viewer.formats._text.growing_table import GrowingTable
 from viewer.formats._text.line_sizes import line_sizes
 from viewer.formats._text.numbers import parse_numbers, parse_words, word_begins
 from viewer.formats._text.words import number_key
+from viewer.progress import report_bytes
 
 __all__ = ["Table", "read_tables"]
 
 Indices = NDArray[np.integer]
 
+_PART = 1 << 17  # rows that are parsed together, to limit the memory of their values
 _WORD = re.compile(rb"[^ \t\n\r\v\f]+")
 
 
@@ -102,18 +105,32 @@ class _Text:
         width = int(counts[0])
         if (counts != width).any():
             return False
-        start, end = (self._lines.offset(line) for line in (self.line, last))
-        values, bad = parse_numbers(self.data, start, end)
-        if bad >= 0:
-            return False
-        first = int(self.counts[: self.line].sum(dtype=np.int64))
-        found = even_text(element, values.reshape(-1, width))
+        rows = self._even_rows(element, width)
+        found = None if rows is None else even_text(element, rows)
         if found is None:
             return False
+        first = int(self.counts[: self.line].sum(dtype=np.int64))
         table.columns, table.lists = found
         table.offset_of = lambda row: self._offset(first + width * row)
         self.line = last
         return True
+
+    def _even_rows(self, element: Element, width: int) -> Numbers | None:
+        """Return the numbers of an element, (N, width), as integers if all are; None if invalid."""
+        has_lists = any(prop.count_kind for prop in element.properties)
+        table = GrowingTable((width,), np.int32 if has_lists else np.float64)
+        last = self.line + element.count
+        for line in range(self.line, last, _PART):
+            start, end = (self._lines.offset(at) for at in (line, min(line + _PART, last)))
+            values, bad = parse_numbers(self.data, start, end, is_kept=element.count <= _PART)
+            if bad >= 0:
+                return None
+            # Corners are indices, which take half the memory as int32.
+            table.add(
+                compact(values.reshape(-1, width)) if has_lists else values.reshape(-1, width)
+            )
+            report_bytes(end, len(self.data))
+        return table.rows()
 
     def begin(self, element: Element) -> Places:
         """Return the first word of each row."""

@@ -1,0 +1,76 @@
+"""Export of the chosen actor in the background: progress, cancellation, edits meanwhile."""
+
+import threading
+
+import pytest
+
+from viewer.app.posing.pose_actions import save_export
+from viewer.export import obj
+from viewer.progress import report
+
+
+@pytest.fixture
+def paused(monkeypatch):
+    """Pause the export of ``.obj`` files before anything is written."""
+    reached, may_go_on = threading.Event(), threading.Event()
+    save = obj.save_parts
+
+    def pause(path, parts, *arguments):
+        report(1, 4, "lines", "writing")
+        reached.set()
+        assert may_go_on.wait(30.0)
+        report(2, 4, "lines", "writing")
+        save(path, parts, *arguments)
+
+    monkeypatch.setattr(obj, "save_parts", pause)
+    yield reached, may_go_on
+    may_go_on.set()
+
+
+def test_export_reports_its_progress_and_keeps_the_pose_of_its_start(hand, paused, tmp_path):
+    save_export(hand.state, tmp_path / "before.obj")
+    reached, may_go_on = paused
+    may_go_on.set()
+    hand.finish_job()
+    may_go_on.clear()
+    reached.clear()
+    save_export(hand.state, tmp_path / "after.obj")
+    assert reached.wait(30.0)
+    hand.step(2)
+    assert (hand.state.job.title, hand.state.job.progress) == ("Writing after.obj", (1, 4))
+    assert "Cancel" in hand.state.item_rects
+    hand.state.actor.pose.dofs[:] += 0.3
+    may_go_on.set()
+    hand.finish_job()
+    assert hand.says(f"Saved {tmp_path / 'after.obj'}") and not hand.state.error
+    # The first line contains the name of the figure only.
+    assert (tmp_path / "after.obj").read_text() == (tmp_path / "before.obj").read_text()
+
+
+def test_cancelled_export_keeps_the_old_file(hand, paused, tmp_path):
+    (tmp_path / "a.obj").write_text("old")
+    files = sorted(tmp_path.iterdir())
+    save_export(hand.state, tmp_path / "a.obj")
+    reached, may_go_on = paused
+    assert reached.wait(30.0)
+    hand.step(2)
+    job = hand.state.job
+    hand.key("escape")
+    may_go_on.set()
+    job.wait()
+    hand.step(3)
+    assert hand.state.job is None and not hand.state.error
+    assert (tmp_path / "a.obj").read_text() == "old" and sorted(tmp_path.iterdir()) == files
+
+
+def test_second_export_waits_for_the_first(hand, paused, tmp_path):
+    save_export(hand.state, tmp_path / "a.obj")
+    reached, may_go_on = paused
+    assert reached.wait(30.0)
+    job = hand.state.job
+    save_export(hand.state, tmp_path / "b.obj")
+    assert hand.state.error == "wait for: Writing a.obj" and hand.state.job is job
+    may_go_on.set()
+    hand.state.error = ""
+    hand.finish_job()
+    assert (tmp_path / "a.obj").exists() and not (tmp_path / "b.obj").exists()
