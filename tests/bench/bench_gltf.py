@@ -206,22 +206,26 @@ def compare(path: Path, title: str, rounds: int) -> None:
     base, opened = "bytes, json.loads and images", load(path)
     options = DisplayOptions(quality="draft")
 
-    def picture(scene: Scene) -> None:
-        render(scene, SIZE, None, options)
+    def picture(scene: Scene, count: int = 1) -> None:
+        for _ in range(count):
+            render(scene, SIZE, None, options)
 
     work: dict[str, Callable[[], object]] = {
         "viewer": lambda: read_nodes(Source.open(path)),
         "scene": lambda: load(path),
         "first picture": lambda: picture(load(path)),
         "picture of an empty scene": lambda: picture(Scene([])),
-        "next picture of the same scene": lambda: picture(opened),
+        "one picture of an open scene": lambda: picture(opened),
+        "two pictures of an open scene": lambda: picture(opened, 2),
         base: lambda: parsed(path),
     }
     times = interleaved(work, rounds)
-    first = "first picture"
-    for other in ("picture of an empty scene", "next picture of the same scene"):
-        pairs = zip(times[first], times[other], strict=True)
-        times[f"{first} - {other}"] = [one - two for one, two in pairs]
+    first, one, two = (times[name] for name in ("first picture", *[*work][4:6]))
+    # Pictures of other scenes are drawn in between, so that each scene is uploaded again.
+    times["drawing again"] = [late - early for early, late in zip(one, two, strict=True)]
+    for other in ("picture of an empty scene", "drawing again"):
+        pairs = zip(first, times[other], strict=True)
+        times[f"first picture - {other}"] = [whole - part for whole, part in pairs]
     report(title, times, ("viewer", base), 1.5)
     for name in ("scene", *(name for name in times if " - " in name)):
         print(f"  {name} / {base}: {median_ratio(times, name, base):.2f} (goal: at most 1.5)")

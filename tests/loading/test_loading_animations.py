@@ -10,6 +10,8 @@ from viewer.commands._info.clips import animation_lines, describe_animations
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading import Contents, MotionSettings, begin
+from viewer.rig.figure import Figure
+from viewer.rig.figure_group import FigureGroup
 from viewer.rig.motion.animation import Animation
 
 
@@ -46,6 +48,17 @@ def test_characters_without_common_animations_play_their_first_ones():
     assert [actor.clip.name for actor in scene.actors] == ["wave", "trot"]
     # On request, only characters with that animation move.
     assert [actor.animation for actor in opened(hero, horse, animation="trot").actors] == [-1, 0]
+
+
+def test_skeleton_without_a_mesh_moves_only_figures_of_other_files():
+    rig = Figure("rig", skeleton=leg().skeleton, unit="m", animations=(animation(bow()),))
+    contents = Contents(figures=[(Path("a.glb"), rig), (Path("a.glb"), leg())])
+    contents.groups = [FigureGroup("a", (rig, contents.figures[1][1]))]
+    assert [actor.figure.name for actor in begin(contents)[0].actors] == ["rig", "leg"]
+    contents.groups = [FigureGroup(name, (figure,)) for name, (_, figure) in
+                       zip("ab", contents.figures, strict=True)]  # fmt: skip
+    (moved,) = begin(contents)[0].actors
+    assert moved.figure.name == "leg" and moved.clip is not None
 
 
 @pytest.mark.parametrize(

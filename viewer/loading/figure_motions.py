@@ -17,6 +17,7 @@ from viewer.rig.motion.animation_choice import chosen_animation
 from viewer.rig.motion.baking import baked
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
+from viewer.rig.scene import Actor
 
 if TYPE_CHECKING:
     from viewer.formats import Content
@@ -64,7 +65,8 @@ def _motion_of(figure: Figure, wanted: str) -> SkeletonMotion:
 def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
     """Let skeletons with animations, but without a mesh, move figures that have no motion.
 
-    A skeleton that moves another figure is not shown itself. Returns whether any skeleton does so.
+    A skeleton that moves another figure is not shown itself. It does not move figures of its own
+    file, which is a scene and not a motion. Returns whether any skeleton moves a figure.
 
     Parameters
     ----------
@@ -85,14 +87,27 @@ def drive_by_figures(cast: Cast, wanted: str, settings: MotionSettings) -> bool:
         figure = actor.figure
         if figure.mesh is not None or actor.clip is not None or not figure.animations:
             continue
-        if not any(other.figure.is_attached and other.clip is None for other in cast.actors):
-            break
+        others = _of_other_files(cast, actor)
+        if not any(other.figure.is_attached and other.clip is None for other in others):
+            continue
         try:
             motion = _motion_of(figure, wanted)
         except RigError:
             continue  # reported when the animations are started
         drive = Drive(motion, joint_map=settings.joint_map, plants_feet=settings.feet)
-        if drive_somebody(actor.origin or Path(figure.name), drive, cast, np.eye(4))[0]:
+        path = actor.origin or Path(figure.name)
+        if drive_somebody(path, drive, cast, np.eye(4), others)[0]:
             cast.take(next(n for n, other in enumerate(cast.actors) if other is actor))
             found = True
     return found
+
+
+def _of_other_files(cast: Cast, actor: Actor) -> list[Actor]:
+    """Return the other actors, except those of figures from the same file."""
+    place = next(index for index, other in enumerate(cast.actors) if other is actor)
+    group = cast.groups[place]
+    return [
+        other
+        for other, of_other in zip(cast.actors, cast.groups, strict=True)
+        if other is not actor and (group is None or of_other is not group)
+    ]

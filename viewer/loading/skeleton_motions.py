@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -138,7 +139,11 @@ def _in_metres(motion: SkeletonMotion, unit: str, fact: str) -> SkeletonMotion:
 
 
 def drive_somebody(
-    path: Path, drive: Drive, cast: Cast, placement: Floats
+    path: Path,
+    drive: Drive,
+    cast: Cast,
+    placement: Floats,
+    among: Sequence[Actor] | None = None,
 ) -> tuple[bool, str | Diagnostic]:
     """Assign a motion to the first matching figure with a mesh and no clip, if any.
 
@@ -152,6 +157,8 @@ def drive_somebody(
         Its actor gets the clip.
     placement : (4, 4)
         Applied to that actor.
+    among : sequence of Actor, optional
+        Actors of the cast that may be moved; all if omitted.
 
     Returns
     -------
@@ -166,7 +173,7 @@ def drive_somebody(
         If no figure matches, although a joint map is given.
     """
     refusal: RigError | None = None
-    for actor in cast.actors:
+    for actor in cast.actors if among is None else among:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:

@@ -219,6 +219,15 @@ def test_times_below_zero_delay_the_animation(tmp_path):
     assert file.array(sampler["input"])[:, 0].tolist() == [0.0, 1.0]
 
 
+def test_animation_without_channels_of_the_figure_is_reported(tmp_path):
+    # An animation of a file may move only other figures, or a mesh that is not drawn.
+    notes = export_clips(
+        Actor(two_parts()), tmp_path / "a.glb", None, [TransformClip("x", (), 0, 1)]
+    )
+    assert "animations" not in Plain(tmp_path / "a.glb").root
+    assert [note.key for note in notes if note.code == "X003"] == ["X003.idle-animations"]
+
+
 def test_mesh_without_skin_is_a_child_of_the_figure_node(tmp_path):
     export_clips(Actor(replace(two_parts(), skin=None)), tmp_path / "loose.glb")
     nodes = Plain(tmp_path / "loose.glb").root["nodes"]

@@ -14,6 +14,7 @@ from tests.formats.nodes.node_files import (
     triangle,
     vertices,
 )
+from viewer.formats._nodes import surfaces
 from viewer.formats._nodes.content import NodeAnimation, NodeChannel, NodeSkin, Primitive
 from viewer.formats._nodes.figures import figure_group
 from viewer.formats._nodes.morph_targets import MorphTargets
@@ -43,6 +44,17 @@ def test_missing_normals_are_flat_and_coplanar_triangles_share_vertices():
     assert_allclose(figure.mesh.normals[figure.mesh.triangles], np.repeat(faces[:, None], 3, 1))
     (note,) = notes.diagnostics.warnings
     assert (note.key, note.values["vertices"]) == ("F007.flat-normals", 16)
+
+
+def test_nodes_that_share_a_mesh_without_normals_shade_it_once(monkeypatch):
+    calls, shade = [], surfaces.flat_shaded
+    monkeypatch.setattr(surfaces, "flat_shaded", lambda *given: calls.append(1) or shade(*given))
+    many = tree_of(*({"mesh": 0, "translation": [index, 0, 0]} for index in range(5)))
+    figure = figure_of(file_of(many, meshes=(mesh(Primitive(CUBE, FACES)),)))
+    assert len(calls) == 1
+    assert figure.mesh.n_vertices == 5 * 24
+    low = figure.mesh.positions.reshape(5, 24, 3).min(axis=1)
+    assert_allclose(low, [[index, 0, 0] for index in range(5)])
 
 
 def test_normals_are_perpendicular_under_a_second_skin_that_shears():

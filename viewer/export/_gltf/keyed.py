@@ -86,7 +86,7 @@ class Clips:
 
 def first_time(clip: TransformClip) -> float:
     """Return the time of the earliest key if it is below 0, else 0."""
-    return min(0.0, *(float(channel.times[0]) for channel in clip.channels))
+    return min((0.0, *(float(channel.times[0]) for channel in clip.channels)))
 
 
 class _Keys:

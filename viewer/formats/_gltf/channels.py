@@ -86,5 +86,5 @@ def _times(reading: _Reading, sampler: Element) -> Floats:
     if accessor not in reading.times:
         times = read_times(reading.document, sampler)
         reading.times[accessor] = times
-        reading.n_equal += int((np.diff(times) == 0.0).sum())
+        reading.n_equal += int(np.count_nonzero(times[1:] == times[:-1]))
     return reading.times[accessor]

@@ -48,7 +48,7 @@ def read_times(document: Document, sampler: Element) -> Floats:
     if not np.isfinite(times).all():
         key = int((~np.isfinite(times)).argmax())
         raise sampler.fault("F003.gltf-keys", "input", index=key, found=float(times[key]))
-    is_earlier = np.diff(times) < 0.0
+    is_earlier = times[1:] < times[:-1]
     if is_earlier.any():
         key = int(is_earlier.argmax()) + 1
         found, before = float(times[key]), float(times[key - 1])
@@ -100,9 +100,10 @@ def read_keys(
 
 def _without_equal(keys: Keys) -> Keys:
     """Return the last of several keys at one time, because exporters repeat the final key."""
-    is_kept = np.append(np.diff(keys.times) > 0.0, True)
-    if is_kept.all():
+    is_last = keys.times[1:] > keys.times[:-1]
+    if is_last.all():
         return keys
+    is_kept = np.append(is_last, True)
     tangents = None if keys.tangents is None else keys.tangents[is_kept]
     return Keys(keys.times[is_kept], keys.values[is_kept], keys.interpolation, tangents)
 

@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import triangle_areas, vertex_normals
 
-__all__ = ["flat_shaded"]
+__all__ = ["Shading", "flat_shaded"]
+
+Shading: TypeAlias = tuple[Ints, Ints, Floats, bool]
+"""Result of ``flat_shaded``."""
 
 _MOST_TRIANGLES = 200_000
 # Grid cells per unit of normal components: faces within half a degree share a normal.
 _CELLS = 128
 
 
-def flat_shaded(positions: Floats, triangles: Ints) -> tuple[Ints, Ints, Floats, bool]:
+def flat_shaded(positions: Floats, triangles: Ints) -> Shading:
     """Split vertices between faces with different normals.
 
     Coplanar faces keep a common vertex, so a cube has 24 vertices. Large primitives are shaded

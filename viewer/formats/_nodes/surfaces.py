@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.formats._nodes.bindings import Bindings
 from viewer.formats._nodes.content import NodeFile, Primitive
-from viewer.formats._nodes.flat_normals import flat_shaded
+from viewer.formats._nodes.flat_normals import Shading, flat_shaded
 from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import Mesh, PartView
@@ -70,7 +70,8 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
     bindings : Bindings
         Bindings of all their skins, and of nodes whose mesh no skin moves.
     """
-    pieces = []
+    pieces: list[Piece] = []
+    shadings: dict[int, Shading] = {}  # by identity of the primitive, which many nodes may share
     for part, node in enumerate(nodes):
         skin = int(file.tree.skins[node])
         for primitive in file.meshes[int(file.tree.meshes[node])].primitives:
@@ -82,25 +83,37 @@ def pieces_of(file: NodeFile, nodes: list[int], bindings: Bindings) -> list[Piec
             else:
                 joint, baked = bindings.rigid[node]
                 influences = on_joint(len(primitive.positions), joint)
-            pieces.append(_piece(node, part, primitive, baked, influences))
+            if id(primitive) not in shadings:
+                shadings[id(primitive)] = _shading(primitive)
+            shading = shadings[id(primitive)]
+            pieces.append(_piece(node, part, primitive, baked, influences, shading))
     return pieces
 
 
+def _shading(primitive: Primitive) -> Shading:
+    """Return the normals of a primitive, split between its faces if the file has none."""
+    if primitive.normals is None:
+        return flat_shaded(primitive.positions, primitive.triangles)
+    sources = np.arange(len(primitive.positions), dtype=np.int32)
+    return sources, primitive.triangles, primitive.normals, False
+
+
 def _piece(
-    node: int, part: int, primitive: Primitive, baked: Floats, influences: Influences
+    node: int,
+    part: int,
+    primitive: Primitive,
+    baked: Floats,
+    influences: Influences,
+    shading: Shading,
 ) -> Piece:
     """Return one piece; triangles that a reflection reverses are flipped back."""
-    sources = np.arange(len(primitive.positions), dtype=np.int32)
-    triangles, normals, shading = primitive.triangles, primitive.normals, "file"
-    if normals is None:
-        sources, triangles, normals, is_flat = flat_shaded(primitive.positions, triangles)
-        shading = "flat" if is_flat else "smooth"
-        if is_flat:
-            split = of_rows(influences, sources)
-            influences = _counted_as(split, influences)
+    sources, triangles, normals, is_flat = shading
+    kind = "file" if primitive.normals is not None else "flat" if is_flat else "smooth"
+    if is_flat:
+        influences = _counted_as(of_rows(influences, sources), influences)
     if np.linalg.det(baked[:3, :3]) < 0.0:
         triangles = triangles[:, ::-1]
-    return Piece(node, part, primitive, baked, influences, sources, triangles, normals, shading)
+    return Piece(node, part, primitive, baked, influences, sources, triangles, normals, kind)
 
 
 def _counted_as(split: Influences, whole: Influences) -> Influences:

@@ -76,7 +76,7 @@ class TransformChannel:
         put("times", (None,))
         count = len(self.times)
         put("values", (count, _COMPONENTS.get(self.path)))
-        if count == 0 or (np.diff(self.times) <= 0).any():
+        if count == 0 or (self.times[1:] <= self.times[:-1]).any():
             raise RigError("times: expected increasing seconds of at least one key")
         if (self.tangents is not None) != (self.interpolation == "cubic"):
             raise RigError("tangents: expected for cubic interpolation, and only there")

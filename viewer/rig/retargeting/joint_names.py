@@ -13,6 +13,7 @@ import re
 import unicodedata
 from collections import Counter
 from collections.abc import Sequence
+from functools import lru_cache
 
 from viewer.rig.arrays import Ints
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
@@ -115,7 +116,13 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
     >>> sided_words(["LeftFoot", "hip_01_r", "spine"])
     [('left', 'foot'), ('right', 'hip01'), ('', 'spine')]
     """
-    return _keys(names)
+    return [*_known_keys(tuple(names))]
+
+
+@lru_cache(16)
+def _known_keys(names: tuple[str, ...]) -> tuple[_Key, ...]:
+    # The front of a figure is estimated from its names in several ways.
+    return tuple(_keys(names))
 
 
 def joint_meanings(skeleton: Skeleton) -> tuple[str, ...]:

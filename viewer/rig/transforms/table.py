@@ -167,28 +167,31 @@ def _timelines(every: Sequence[Floats]) -> tuple[Timelines, list[int]]:
 
 
 def _arcs(channels: list[tuple[TransformChannel, int]]) -> Arcs:
-    keys, angles, bases, row = [np.zeros((0, 4))], [np.zeros(0)], [], 0
-    for channel, _ in channels:
-        unit = channel.values / np.linalg.norm(channel.values, axis=1, keepdims=True)
-        unit = np.concatenate([unit, unit[-1:]])
-        # A quaternion and its negative are the same rotation; the nearer one yields the shorter
-        # arc.
-        far = np.einsum("na,na->n", unit[1:], unit[:-1]) < 0.0
-        unit[1:] *= np.where(np.cumsum(far) % 2 != 0, -1.0, 1.0)[:, None]
-        chords = np.linalg.norm(np.diff(unit, axis=0, append=unit[-1:]), axis=1)
-        keys.append(unit)
-        # The chord is accurate at small angles, whereas the arccosine loses half the digits.
-        angles.append(np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST))
-        bases.append(row)
-        row += len(unit)
-    every = np.concatenate(angles)
+    parts = [part for one, _ in channels for part in (one.values, one.values[-1:])]
+    keys: Floats = np.concatenate([np.zeros((0, 4)), *parts])
+    keys /= np.linalg.norm(keys, axis=1, keepdims=True)
+    counts = np.array([len(one.values) + 1 for one, _ in channels], dtype=np.int64)
+    bases = np.cumsum(counts) - counts
+    is_first = np.zeros(len(keys), dtype=np.bool_)
+    is_first[bases] = True
+    # A quaternion and its negative are the same rotation; the nearer one yields the shorter arc.
+    far = np.zeros(len(keys), dtype=np.int64)
+    far[1:] = np.einsum("na,na->n", keys[1:], keys[:-1]) < 0.0
+    far[is_first] = 0
+    flips = np.cumsum(far)
+    flips -= np.repeat(flips[bases], counts)
+    keys[flips % 2 != 0] *= -1.0
+    chords = np.zeros(len(keys))
+    chords[:-1] = np.where(is_first[1:], 0.0, np.linalg.norm(np.diff(keys, axis=0), axis=1))
+    # The chord is accurate at small angles, whereas the arccosine loses half the digits.
+    angles = np.maximum(2.0 * np.arcsin(np.minimum(0.5 * chords, 1.0)), _SMALLEST)
     return Arcs(
         np.array([timeline for _, timeline in channels], dtype=np.int32),
-        np.array(bases, dtype=np.int32),
+        bases.astype(np.int32),
         np.array([float(one.interpolation != "step") for one, _ in channels]),
-        np.concatenate(keys),
-        every,
-        np.sin(every),
+        keys,
+        angles,
+        np.sin(angles),
     )
 
 
