@@ -114,3 +114,29 @@ def test_empty_record_is_reported_without_keys(tmp_path):
     problem = Phrase("record-no-keys", expected=("poses", "keypoints3d"))
     faults = [values.get("problem") for _, _, values in noticed(parts)]
     assert ("F002.record", None, {"item": "person 0", "problem": problem}) in faults
+
+
+def test_unusual_number_of_pose_values_in_the_first_record_makes_it_a_gap(tmp_path):
+    frames = {0: [body(0, 78)], **{frame: [body(0)] for frame in range(1, 12)}}
+    folder = write_frames(tmp_path / "smpl", frames)
+    capture, parts, _ = opened(tmp_path)
+    assert (capture.model, rows_of(parts, 0)) == ("SMPL", [*range(1, 12)])
+    problem = Phrase("record-lengths", expected=[72], found=78)
+    values = {"item": "person 0: poses", "problem": problem}
+    assert fault_in(parts, folder / "000000.json") == (1, ("F002.record", None, values))
+
+
+def test_omitted_coefficients_are_zero(tmp_path):
+    short, long = [0.25, 0.5], [0.25, 0.5, 0.75, 1.0]
+    people = {0: (short, long), 1: (long, short), 2: ([long], [short])}
+    frames = {
+        frame: [body(person, shapes=shapes[frame]) for person, shapes in people.items()]
+        for frame in range(2)
+    }
+    write_frames(tmp_path / "smpl", frames)
+    _, parts, _ = opened(tmp_path)
+    assert not noticed(parts)
+    padded = [*short, 0.0, 0.0]
+    for person, wanted in {0: [padded, long], 1: [long, padded], 2: [long, padded]}.items():
+        rows = [row for part in parts for row in part.bodies[person].shape.tolist()]
+        assert rows == wanted

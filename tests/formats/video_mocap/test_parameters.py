@@ -182,6 +182,14 @@ def test_recognised_and_ignored_keys_are_reported() -> None:
     }
 
 
+def test_people_with_the_keys_of_wham_but_one_shape_are_not_in_camera_space() -> None:
+    one = {"pose": VECTORS.reshape(4, 72), "trans": PLACES, "betas": waves(10),
+           "frame_ids": np.arange(4)}  # fmt: skip
+    capture = open_results(source({3: one}))
+    assert (capture.up, capture.facts[0][1]) == ("", "SMPL parameters: 1 person, in world space")
+    assert next(iter(capture.parts())).bodies[3].shape.shape == (1, 10)
+
+
 def test_missing_translations_are_reported_in_a_note() -> None:
     opened = source({"rotmat": TURNED})
     open_results(opened)

@@ -8,7 +8,7 @@ the mean hand; those of SMPL+H include it.
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import field, replace
 from typing import Any
 
@@ -92,15 +92,23 @@ _LAYOUTS = {
 }
 
 
-def body_layout(record: dict[str, Any]) -> BodyLayout:
+def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) -> BodyLayout:
     """Return the layout of a record, as determined by the length of its ``poses``.
+
+    Parameters
+    ----------
+    record : dict
+        Body parameters of a person in one frame.
+    usual : mapping of str to int, optional
+        Numbers of values in the recording, see ``usual_widths``.
 
     Raises
     ------
     RecordError
-        If no layout has this length, or the record is invalid and therefore cannot determine the
-        layout of others.
+        If no layout has this length, it is unusual, or the record is invalid and therefore cannot
+        determine the layout of others.
     """
+    usual = usual or {}
     count = len(row_of(record, "poses"))
     if count == _VPOSER:
         raise RecordError("poses", Phrase("record-vposer", found=count))
@@ -114,7 +122,10 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     if count == 63:
         keys += [key for key in ("handl", "handr") if has_numbers(record, key)]
     widths = [(key, width_of(record, key, width)) for key, width in widths]
-    widths += [(key, width_of(record, key)) for key in keys]
+    widths += [(key, max(width_of(record, key), usual.get(key, 0))) for key in keys]
+    if count != usual.get("poses", count):
+        problem = Phrase("record-lengths", expected=[usual["poses"]], found=count)
+        raise RecordError("poses", problem)
     return BodyLayout(
         layout.model,
         layout.names,
@@ -126,8 +137,12 @@ def body_layout(record: dict[str, Any]) -> BodyLayout:
     )
 
 
-def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
+def with_coefficients(
+    layout: BodyLayout, record: dict[str, Any], usual: Mapping[str, int]
+) -> BodyLayout:
     """Return a layout extended by coefficients that occur in a record for the first time.
+
+    ``usual`` are the numbers of values in the recording, see ``usual_widths``.
 
     Raises
     ------
@@ -136,7 +151,7 @@ def with_coefficients(layout: BodyLayout, record: dict[str, Any]) -> BodyLayout:
     """
     known = [key for key, _ in layout.widths]
     new = [key for key in COEFFICIENTS if has_numbers(record, key) and key not in known]
-    more = [(key, width_of(record, key)) for key in new]
+    more = [(key, max(width_of(record, key), usual.get(key, 0))) for key in new]
     return replace(layout, widths=(*layout.widths, *more))
 
 
@@ -171,6 +186,13 @@ class Rows:
         frames = frames if keep is None else frames[keep]
         rows[frames] = np.arange(len(frames))
         return Timing(rate, rows, first_frame, holds=False)
+
+
+def _completed(key: str, values: list[Any], count: int) -> list[Any]:
+    """Return coefficients with zeros for those that a record lacks; raise ValueError for others."""
+    if key not in COEFFICIENTS or not 0 < len(values) < count:
+        raise ValueError(key)
+    return [*values, *([0.0] * (count - len(values)))]
 
 
 @dataclass(slots=True, kw_only=True)
@@ -225,7 +247,7 @@ class BodyRows(Rows):
                 if len(values) == 1:
                     values = values[0]
                 if len(values) != count:
-                    raise ValueError
+                    values = _completed(key, values, count)
                 put(values)
         except (KeyError, TypeError, ValueError, OverflowError):
             self._take_slowly(record)
@@ -237,6 +259,9 @@ class BodyRows(Rows):
         try:
             for key, count, put in self._plan:
                 if has_numbers(record, key) or key not in COEFFICIENTS:
+                    given = row_of(record, key)
+                    if key in COEFFICIENTS and len(given) < count:
+                        record = {**record, key: _completed(key, given, count)}
                     take_row(record, key, count, put)
                 else:
                     self._lack(key, count, put)

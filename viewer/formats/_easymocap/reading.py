@@ -29,6 +29,7 @@ from viewer.formats._easymocap.json_frames import (
 )
 from viewer.formats._easymocap.points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap.shapes import COEFFICIENTS
+from viewer.formats._easymocap.survey import usual_widths
 from viewer.formats._misfit import remark_on
 from viewer.progress import report
 from viewer.rig.arrays import Floats
@@ -76,7 +77,8 @@ class Reading:
     options : Options
         Settings that are not in the files.
     body_layout, point_layout : layouts or None
-        Layout of the first record that has one; other records must agree, but may add coefficients.
+        Layout of the first usual record; other records must agree, but may have fewer coefficients,
+        or be the first with coefficients.
     first_fault : Diagnostic or None
         First error.
     """
@@ -90,6 +92,7 @@ class Reading:
     _n_faults: int = 0
     _known: dict[int, dict[str, Floats]] = field(default_factory=dict)
     _awaited: tuple[str, ...] = ()
+    _usual: dict[str, int] = field(default_factory=dict)
     _has_seen: dict[int, bool] = field(default_factory=dict)
     _found: list[Diagnostic] = field(default_factory=list)
     _said: set[tuple[object, ...]] = field(default_factory=set)
@@ -98,6 +101,7 @@ class Reading:
         """Yield the frames up to the first with a person, then parts of growing size."""
         frames, n_frames = self.files.frames, self.files.n_frames
         self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
+        self._usual = usual_widths(self.files, self.options.max_size)
         sizes = iter(_SIZES)
         part, size, count = _Part(), 0, 0
         for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
@@ -198,9 +202,9 @@ class Reading:
         """Return the layout of all bodies, extended by the first record with coefficients."""
         layout = self.body_layout
         if layout is None:
-            layout = body_layout(record)
+            layout = body_layout(record, self._usual)
         elif first := [key for key in self._awaited if has_numbers(record, key)]:
-            layout = with_coefficients(layout, record)
+            layout = with_coefficients(layout, record, self._usual)
             self.note("F007.record-first", path, keys=tuple(first))
         else:
             return layout

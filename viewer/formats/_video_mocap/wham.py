@@ -38,7 +38,10 @@ def recognises(archive: Archive) -> bool:
     if not archive.keys or person_number(archive.keys[0]) is None:
         return False
     person = archive.inside(archive.keys[0])
-    return any(has(person, *keys, "betas", "frame_ids") for keys in _KEYS.values())
+    # Other tools store the keys of the camera's space, too, but in any space, and no vertices.
+    return has(person, *_KEYS["world"], "betas", "frame_ids") or has(
+        person, *_KEYS["camera"], "betas", "frame_ids", "verts"
+    )
 
 
 def read(source: Source, archive: Archive) -> Results:
