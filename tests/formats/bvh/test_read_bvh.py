@@ -9,11 +9,16 @@ import pytest
 from formats.bvh_text import GOOD, one_joint, read
 from hypothesis import given
 from hypothesis import strategies as st
+from rig.retargeting.trotting import animal
+from rig.retargeting.two_people import figure_of
 
 from viewer.diagnostics import Phrase
 from viewer.formats import Source, detect
+from viewer.formats._bvh.guess import guess_up
 from viewer.rig.motion.evaluation import frames_of, world_frames
+from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
+from viewer.rig.motion.timing import Timing
 
 
 def about(axis: int, degrees: float) -> np.ndarray:
@@ -272,6 +277,16 @@ def test_z_is_up_if_an_unnamed_skeleton_is_longest_along_z() -> None:
     motion, warnings = read(one_joint("Xrotation", "0").replace("0 1.7 0", "0 0.2 1.7"))
     assert motion.figure.up == "z"
     assert warnings == [Phrase("up-of-longest", up="z")]
+
+
+def test_y_is_up_if_an_animal_that_is_longest_along_z_stands_on_its_legs() -> None:
+    figure = figure_of(animal(length=0.8), "animal")
+    points = np.array([place for _, place in animal(length=0.8).values()])
+    assert np.ptp(points[:, 2]) > 2.0 * np.ptp(points[:, 1])
+    timing = Timing(30.0, np.zeros(1, dtype=np.int32))
+    still = SampledClip("", timing, figure.skeleton.rest_rotations[None])
+    up, _, warnings = guess_up(figure, still, points)
+    assert (up, warnings) == ("y", ())
 
 
 def test_frames_upright_along_a_different_axis_are_reported() -> None:

@@ -105,6 +105,15 @@ def a_pose() -> np.ndarray:
     return np.swapaxes(worlds(matrices(vectors))[0], 1, 2)
 
 
+def legs_apart() -> np.ndarray:
+    """Return the axes of a file with legs 25 degrees to the sides in the zero pose."""
+    vectors = np.zeros((1, len(NAMES), 3))
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        vectors[0, NAMES.index(f"{side}UpLeg")] = sign * np.radians(25.0) * Z
+        vectors[0, NAMES.index(f"{side}Foot")] = -sign * np.radians(25.0) * Z
+    return np.swapaxes(worlds(matrices(vectors))[0], 1, 2)
+
+
 def along_x() -> np.ndarray:
     """Return the axes of a file with all bones along +x and arbitrary roll."""
     axes = t_pose()

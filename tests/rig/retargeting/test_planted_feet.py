@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.testing import assert_allclose, assert_array_equal
-from rig.retargeting.rest_twins import NAMES, PERSON, Y, along_x, t_pose, written
+from rig.retargeting.rest_twins import NAMES, PERSON, X, Y, along_x, t_pose, written
 from rig.retargeting.two_people import figure_of, places
 from rig.retargeting.walking import N_WALK, RATE, stands, walk
 
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
@@ -287,3 +288,20 @@ def test_contacts_can_begin_and_end_gradually() -> None:
     assert_array_equal(eased.hold[3:-3], sudden.hold[3:-3])
     ((always,),) = foot_contacts([foot], [(25, 55)], *how[2:], ease=0.05)
     assert (always.hold == 1.0).all()  # it neither begins nor ends within the motion
+
+
+def test_swinging_feet_do_not_sink_into_the_ground() -> None:
+    rotations, path = walk(lift=8.0)
+    frames = np.arange(N_WALK)
+    for side, start in (("Left", 0), ("Right", 50)):
+        phase = np.maximum((frames + start) % 100 - 60, 0) / 40.0
+        pitch = matrices((1.0 * 64.0 * (phase * (1.0 - phase)) ** 3)[:, None] * X)
+        for part in ("Foot", "ToeBase"):  # the toes point down while the foot swings
+            joint = NAMES.index(f"{side}{part}")
+            rotations[:, joint] = pitch @ rotations[:, joint]
+    found = retargeted(written(t_pose(), rotations, path, rate=RATE), OTHER)
+    clip, changes = plant_feet(found, OTHER)
+    assert changes.is_better
+    before, after = places(OTHER, found.clip), places(OTHER, clip)
+    assert min(before[name][:, 1].min() for name in TOES) < -2.0
+    assert min(after[name][:, 1].min() for name in TOES) > -0.3

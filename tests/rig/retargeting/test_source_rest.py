@@ -15,6 +15,7 @@ from rig.retargeting.rest_twins import (
     a_pose,
     along_x,
     arbitrary,
+    legs_apart,
     t_pose,
     truth,
     twin,
@@ -30,7 +31,12 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix as matrices
 from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.retargeting.retarget import retarget
 
-CONVENTIONS = {"a-pose": a_pose, "along-x": along_x, "arbitrary": arbitrary}
+CONVENTIONS = {
+    "a-pose": a_pose,
+    "legs-apart": legs_apart,
+    "along-x": along_x,
+    "arbitrary": arbitrary,
+}
 SCRAMBLED = ("along-x", "arbitrary")
 LIMBS = [
     (f"{side}{mine}", f"{side}{end}", f"{side.lower()}_{joint}", f"{side.lower()}_{tip}")

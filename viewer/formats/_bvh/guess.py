@@ -14,6 +14,7 @@ from viewer.rig.motion.evaluation import frames_of, world_frames
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import DEFAULT_RATE, FASTEST, SLOWEST, is_rate
 from viewer.rig.retargeting.joint_names import joint_meanings
+from viewer.rig.skeleton import Skeleton
 from viewer.rig.units import METRES, SIZES, UNIT_NAMES
 
 __all__ = ["examined_frames", "frame_rate", "guess_unit", "guess_up"]
@@ -94,6 +95,8 @@ def guess_up(
 ) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
     """Return the up axis of the rest skeleton: from feet to head, or along its longest side.
 
+    Animals are longer than high; y is up if their legs then reach the ground.
+
     Parameters
     ----------
     figure, clip : Figure, SampledClip
@@ -117,6 +120,8 @@ def guess_up(
         [names.index(name) for name in part if name in names] for part in (_UPPER, _LOWER)
     )
     if not upper or not lower:
+        if _stands_on_four_legs(skeleton, points):
+            return "y", (("up", "y, the rest skeleton stands on its legs"),), ()
         _, deep, high = np.ptp(points, axis=0)[[0, 1, 2]]
         if high > _LONG * deep:
             note = Phrase("up-of-longest", up="z")
@@ -136,6 +141,18 @@ def guess_up(
     if stands in ("+y", "+z") and stands[1] != up:
         notes.append(Phrase("up-against-frames", up=up, axis=stands))
     return up, (("up", f"{up}, from the rest skeleton"),), tuple(notes)
+
+
+def _stands_on_four_legs(skeleton: Skeleton, points: Floats) -> bool:
+    """Return whether a skeleton has an animal's legs if y is up, but not if z is."""
+    # Imported here because few files need it.
+    from viewer.rig.retargeting.leg_chains import animal_legs
+
+    joints = points[: skeleton.n_joints]
+    return [bool(animal_legs(skeleton.parents, joints, up)) for up in np.eye(3)[1:]] == [
+        True,
+        False,
+    ]
 
 
 def examined_frames(count: int) -> Floats:

@@ -18,7 +18,8 @@ _JUMP = 0.03  # seconds below which a jump of the recording is sudden
 _JUMPS = (0.002, 0.004)  # its sizes, relative to the body, between which it becomes a jump
 _GAP = 0.0007  # maximum distance of a standing foot from the ground in a jump, relative to the body
 _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
-_LIFTS, _LIFTED = 4, 20.0  # number of passes that lift sinking feet, and their weight
+# Number of passes that lift sinking feet, and their weight relative to the stiffness of the curves.
+_LIFTS, _LIFTED = 7, 0.25
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
 _SHAKE = 0.1  # seconds below which changes of the feet's translations are quick
 _FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
@@ -124,7 +125,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
         weights[[foot, count + foot]] = wanted.holds
     targets = _calmed(plan, targets, weights)
     found = _smoothed(plan, targets, _strength(weights))
-    result = []
+    result, lifted = [], 1.0 + _LIFTED * (_EASE * plan.rate) ** 4
     for foot, wanted in enumerate(every):
         row = count + foot
         stands, held = wanted.holds[:, None] >= 1.0, targets[row, :, :1]
@@ -138,7 +139,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
             if not sinks.any():
                 break
             goals[0, sinks, 0] = np.maximum(goals[0, sinks, 0], rise[sinks, 0]) + missing[sinks]
-            force[0, sinks] = np.maximum(force[0, sinks], _LIFTED)
+            force[0, sinks] = np.maximum(force[0, sinks], lifted)
             rise = np.where(stands, held, _smoothed(plan, goals, force)[0])
         result.append(flat + across + (usual[:, None] + rise) * up)
     return result

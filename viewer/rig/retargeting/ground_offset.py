@@ -10,8 +10,9 @@ from viewer.rig.retargeting.joint_matches import Matches
 __all__ = ["ground_offset"]
 
 _FEET = ("left_foot", "right_foot", "left_ankle", "right_ankle")
-# Cosine of the maximum angle between the up axis and the legs of a standing person.
-_UPRIGHT = np.cos(np.radians(25.0))
+# Cosine of the maximum angle between the up axis and the legs of a standing person, from the pelvis
+# to the feet. The legs of some files, such as those of CMU, are 20 degrees apart in the zero pose.
+_UPRIGHT = np.cos(np.radians(40.0))
 
 
 def ground_offset(

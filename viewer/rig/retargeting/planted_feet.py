@@ -42,7 +42,7 @@ _EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its l
 _EASES = (0.1, 0.2)  # longer beginnings and ends of contacts, seconds
 _CALM = 1.15  # ratio of the knees' accelerations to those of the source that needs no longer one
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
-_STEPS = 5  # number of steps reported as progress, from retargeting to the comparison
+_STEPS = 2 + 3 * (1 + len(_EASES))  # maximum number of steps reported as progress
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,26 +139,31 @@ def plant_feet(
     plan = foot_plan(feet, *how, (body.size, body.clearance), up)
     if not any(plan.contacts):
         return found.clip, PlantedFeet()
-    best = _attempt(clip, body, worlds, plan, speed)
-    for ease in _EASES:
+    best = _attempt(clip, body, worlds, plan, speed, 2)
+    for number, ease in enumerate(_EASES, 1):
         if best.knees <= _CALM:
             break
         plan = foot_plan(feet, *how, (body.size, body.clearance), up, ease)
-        tried = _attempt(clip, body, worlds, plan, speed)
+        tried = _attempt(clip, body, worlds, plan, speed, 2 + 3 * number)
         if tried.knees < best.knees and tried.changes.after <= tried.changes.source:
             best = tried
     return (best.clip if best.changes.is_better else found.clip), best.changes
 
 
 def _attempt(
-    clip: SampledClip, body: DrivenLegs, worlds: Floats, plan: FootPlan, ground_speed: float
+    clip: SampledClip,
+    body: DrivenLegs,
+    worlds: Floats,
+    plan: FootPlan,
+    ground_speed: float,
+    step: int,
 ) -> _Attempt:
-    """Return the motion with its feet planted according to a plan."""
-    report(2, _STEPS, "steps")
+    """Return the motion with its feet planted according to a plan; reports progress from a step."""
+    report(step, _STEPS, "steps")
     level = levelled(clip, body, worlds, plan)
-    report(3, _STEPS, "steps")
+    report(step + 1, _STEPS, "steps")
     planted, lowered = _planted(level, body, body.worlds(level), plan)
-    report(4, _STEPS, "steps")
+    report(step + 2, _STEPS, "steps")
     after = body.worlds(planted)
     gaps = [plan.gap(body.heights(each, plan.up)) for each in (worlds, after)]
     changes = PlantedFeet(
