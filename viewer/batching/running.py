@@ -172,9 +172,13 @@ def run_batch(
             file = stack.enter_context(ReportFile(settings.report, replaces))
         stack.enter_context(watched())
         signals = stack.enter_context(postponed())
-        limits = replace(settings.limits, is_stopping=lambda: bool(signals.number))
-        if on_note is not None:
-            limits = replace(limits, note=on_note)
+
+        def note(text: str) -> None:
+            report.notes.append(text)
+            if on_note is not None:
+                on_note(text)
+
+        limits = replace(settings.limits, is_stopping=lambda: bool(signals.number), note=note)
         results = load_engine(settings.engine).run(iter(items), keyed, limits)
         stack.callback(cast("Generator[Result]", results).close)
         for result in results:

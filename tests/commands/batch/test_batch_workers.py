@@ -6,6 +6,7 @@ import os
 
 import pytest
 
+import viewer
 from viewer.commands._batch.planning import Request, plan_of
 from viewer.errors import ViewerError
 
@@ -52,3 +53,10 @@ def test_workers_that_have_no_effect_are_noted(tmp_path) -> None:
     assert notes == ("--workers has no effect: all workers of tcp://node:8786 are used",)
     with pytest.raises(ViewerError, match="--cluster: expected --workers 1 or more, found 0"):
         plan(tmp_path, 2, cluster="local", workers=0)
+
+
+def test_reports_in_python_have_the_notes(tmp_path) -> None:
+    (tmp_path / "a.bvh").touch()
+    (tmp_path / "b.unknown").touch()
+    found = viewer.batch(tmp_path, "info", workers=0)
+    assert found.notes == ["1 file in folders skipped: unknown suffix"]
