@@ -11,6 +11,7 @@ from pathlib import Path
 from viewer.batching.items import Item
 from viewer.errors import ViewerError
 from viewer.media.saving import save_parts
+from viewer.media.targets import check_targets
 
 
 def misbehave(item: Item) -> dict[str, int]:
@@ -65,3 +66,14 @@ def kill_while_writing(item: Item) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
 
     save_parts(item.output, parts())
+
+
+def crash_after_writing(item: Item) -> None:
+    """Write the output like a command without --force, and kill the first process that does so."""
+    path = Path(item.output)
+    check_targets([path], (), force=False)
+    is_first = not path.with_suffix(".started").exists()
+    path.with_suffix(".started").touch()
+    path.write_text("1")
+    if is_first:
+        os.kill(os.getpid(), signal.SIGKILL)

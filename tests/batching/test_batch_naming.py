@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from viewer.batching.inputs import Inputs
+from viewer.batching.items import Item
 from viewer.batching.naming import check_outputs, items_of, template_of
 from viewer.errors import ViewerError
 
@@ -71,3 +72,13 @@ def test_inputs_are_refused_as_outputs(tmp_path):
     for output, more in (("{folder}/b.bvh", ()), ("{folder}/a.bvh", ()), ("o/m.bvh", ("o/m.bvh",))):
         with pytest.raises(ViewerError, match="is an input"):
             check_outputs(items_of(inputs, output), more)
+
+
+def test_outputs_that_differ_only_in_case_are_explained() -> None:
+    items = [Item(0, ("a",), "out/Walk.bvh", "a"), Item(1, ("b",), "out/walk.bvh", "b")]
+    with pytest.raises(ViewerError) as caught:
+        check_outputs(items)
+    assert str(caught.value) == (
+        "1 output would be written twice: out/walk.bvh (a, b); use a template with {index}: names "
+        "that differ only in case or Unicode form are one file on some systems"
+    )

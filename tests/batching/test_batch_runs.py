@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 from batching.batch_jobs import (
     add_numbers,
+    crash_after_writing,
     items_called,
     kill_while_writing,
     misbehave,
@@ -20,6 +21,7 @@ from batching.batch_jobs import (
 
 import viewer
 from viewer import interrupts
+from viewer.batching.engines import Limits
 from viewer.batching.execution import FunctionJob, attempt
 from viewer.batching.items import Item, Result
 from viewer.batching.report import read_results
@@ -63,6 +65,17 @@ def test_workers_that_crash_hang_or_exhaust_memory_affect_no_other_item(tmp_path
     assert os.getpid() not in {one.values.get("process") for one in report.results}
     assert len(list((tmp_path / "out").glob("*.sum"))) == 95
     assert len((tmp_path / "out" / "report.jsonl").read_text().splitlines()) == 105
+
+
+@pytest.mark.slow
+def test_outputs_of_killed_workers_are_replaced_but_no_others(tmp_path):
+    items = [Item(n, (), str(tmp_path / f"{n}.txt"), str(n)) for n in range(3)]
+    # The file of another program, which appeared after the batch had been planned.
+    (tmp_path / "1.txt").write_text("other")
+    report = run_batch(items, FunctionJob(crash_after_writing), Settings("processes", Limits(1)))
+    found = {one.item.index: (one.status, one.attempts) for one in report.results}
+    assert found == {0: ("done", 2), 1: ("failed", 1), 2: ("done", 2)}
+    assert (tmp_path / "1.txt").read_text() == "other"
 
 
 KILLED = """

@@ -118,6 +118,7 @@ def report(costs: dict[str, list[Cost]], count: int) -> None:
         wall = median(warm, "wall") / median(costs[name], "wall")
         work = WORKERS * FILES * one / (start + FILES * each)
         said(f"{name} / one process", wall, work, 1.8)
+        print(f"  once started: {WORKERS * one / each:.2f} by processor time")
     wall = median(loop, "wall") / median(warm, "wall")
     said("one process / shell loop", wall, median(loop, "work") / one, 10.0)
     least = 1e3 * median(empty, "work")

@@ -227,18 +227,7 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     ViewerError
         The message lists the outputs and their inputs.
     """
-    owners: dict[str, Item] = {}
-    here = os.getcwd()
-    clashes = []
-    for item in items:
-        other = owners.setdefault(_identity(here, item.output), item) if item.output else item
-        if other is not item:
-            clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
-    if clashes:
-        raise ViewerError(
-            f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; "
-            "use a template with {parent}, {name} or {index}, such as 'out/{parent}/{name}.bvh'"
-        )
+    _check_clashes(items)
     files = [file for item in items for file in item.files] + list(more_inputs)
     real = _RealPaths()
     inputs = {real.of(file) for file in files}
@@ -248,6 +237,28 @@ def check_outputs(items: Sequence[Item], more_inputs: Iterable[str] = ()) -> Non
     if replaced:
         verb = "is an input" if len(replaced) == 1 else "are inputs"
         raise ViewerError(f"{counted(len(replaced), 'output')} {verb}: {listed(replaced, 10)}")
+
+
+def _check_clashes(items: Sequence[Item]) -> None:
+    """Raise ViewerError if two items have the same output."""
+    owners: dict[str, Item] = {}
+    here = os.getcwd()
+    clashes = []
+    advice = "{parent}, {name} or {index}, such as 'out/{parent}/{name}.bvh'"
+    for item in items:
+        other = owners.setdefault(_identity(here, item.output), item) if item.output else item
+        if other is not item:
+            clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
+            if item.output != other.output:
+                advice = (
+                    "{index}: names that differ only in case or Unicode form are one file on some "
+                    "systems"
+                )
+    if clashes:
+        raise ViewerError(
+            f"{counted(len(clashes), 'output')} would be written twice: {listed(clashes, 10)}; "
+            f"use a template with {advice}"
+        )
 
 
 def check_summaries(

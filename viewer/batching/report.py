@@ -45,6 +45,8 @@ class Report:
         Number of the signal that interrupted it; 0 if none did.
     path : Path or None
         The report's file.
+    notes : list of str
+        Messages about inputs and workers, such as paths that were skipped.
     """
 
     results: list[Result] = field(default_factory=list)
@@ -52,6 +54,7 @@ class Report:
     n_items: int = 0
     signal: int = 0
     path: Path | None = None
+    notes: list[str] = field(default_factory=list)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{count} {status}" for status, count in sorted(self.counts.items()))

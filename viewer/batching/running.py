@@ -129,6 +129,7 @@ def run_batch(
     job: Job,
     settings: Settings,
     on_result: Callable[[Result], None] | None = None,
+    on_note: Callable[[str], None] | None = None,
 ) -> Report:
     """Run the items of a batch; a failed item never stops the others.
 
@@ -144,6 +145,8 @@ def run_batch(
         Engine, limits and report.
     on_result : callable, optional
         Called with each result as soon as its item has finished.
+    on_note : callable, optional
+        Called with messages about workers.
 
     Raises
     ------
@@ -169,7 +172,13 @@ def run_batch(
             file = stack.enter_context(ReportFile(settings.report, replaces))
         stack.enter_context(watched())
         signals = stack.enter_context(postponed())
-        limits = replace(settings.limits, is_stopping=lambda: bool(signals.number))
+
+        def note(text: str) -> None:
+            report.notes.append(text)
+            if on_note is not None:
+                on_note(text)
+
+        limits = replace(settings.limits, is_stopping=lambda: bool(signals.number), note=note)
         results = load_engine(settings.engine).run(iter(items), keyed, limits)
         stack.callback(cast("Generator[Result]", results).close)
         for result in results:

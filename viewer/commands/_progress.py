@@ -22,11 +22,12 @@ class Progress:
 
     ``title``: name of the work.
     ``total``: number of steps.
+    ``unit``: text after the number of steps, such as their unit or rate.
     """
 
     def __init__(self, title: str, total: int) -> None:
         self.title, self.total = title, total
-        self._unit = ""
+        self.unit = ""
         self._due = time.monotonic() + _FIRST
         self._bar: Bar | None = None
 
@@ -45,21 +46,26 @@ class Progress:
             if (task.description, task.total) != (title, self.total or None):
                 self._bar.remove_task(task.id)
         if not self._bar.tasks:
-            self._bar.add_task(title, total=self.total or None, completed=done, unit=self._unit)
-        self._bar.update(self._bar.task_ids[0], completed=done, refresh=True)
+            self._bar.add_task(title, total=self.total or None, completed=done, unit=self.unit)
+        self._bar.update(self._bar.task_ids[0], completed=done, unit=self.unit, refresh=True)
+
+    def hide(self) -> None:
+        """Remove the bar, so that a message can be printed; the next update shows it again."""
+        if self._bar is not None:
+            self._bar.stop()
+            self._bar = None
 
     def receive(self, done: int, total: int, unit: str, what: str) -> None:
         """Update the bar to reported progress; see ``viewer.progress``."""
         self.title = what or self.title
-        self.total, self._unit = total, unit
+        self.total, self.unit = total, unit
         self.show(done)
 
     def __enter__(self) -> Progress:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self.hide()
 
 
 @contextlib.contextmanager

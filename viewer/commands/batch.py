@@ -82,7 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
     print_warnings(plan.notes)
     prints, is_json = JOBS[arguments.job].prints, getattr(arguments, "json", False)
     with Display(arguments.job, plan.items, prints, is_json) as display:
-        report = run_batch(plan.items, job, plan.settings, display.show)
+        report = run_batch(plan.items, job, plan.settings, display.show, display.note)
     stream = sys.stderr if is_json else summary_stream(plan.settings.report or "")
     print("\n".join(summary_lines(report)), file=stream)
     for line in save_results(arguments.job, request.table, request.overview, report.results):

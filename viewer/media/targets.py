@@ -16,6 +16,7 @@ from viewer.streams import is_stdout, require_stdout
 __all__ = ["check_folder_target", "check_targets", "replacing_since"]
 
 _FORCE = "--force replaces it"
+_CLOCKS = 1.0  # seconds by which the clocks of machines and file servers may differ
 _Identity = tuple[int, int] | Path  # device and inode of an existing file, otherwise its path
 _since: ContextVar[float] = ContextVar("since", default=float("inf"))
 
@@ -32,7 +33,7 @@ def replacing_since(start: float) -> Iterator[None]:
     start : float
         Start of the first run, in seconds since 1970.
     """
-    token = _since.set(start)
+    token = _since.set(start - _CLOCKS)
     try:
         yield
     finally:

@@ -47,6 +47,16 @@ class Careful(Job):
         return super().__call__(item)
 
 
+def read_nothing(item: Item) -> Result:
+    """Fail as if the input did not exist."""
+    return Result(item, "failed", 2, message=f"{item.files[0]}: no such file")
+
+
+def write_elsewhere(item: Item) -> Result:
+    """Return an output that does not exist on this machine."""
+    return Result(item, "done", outputs=(item.output,))
+
+
 class Missing:
     """A job that can be pickled but not unpickled, because the worker lacks a module."""
 

@@ -12,7 +12,14 @@ import pytest
 
 import viewer
 from tests.batching.batch_jobs import add_numbers, write_numbers
-from tests.batching.engines.cluster_jobs import Careful, Job, Missing, items
+from tests.batching.engines.cluster_jobs import (
+    Careful,
+    Job,
+    Missing,
+    items,
+    read_nothing,
+    write_elsewhere,
+)
 from viewer.batching.engines import Limits
 from viewer.batching.engines._task_size import LONGEST
 from viewer.errors import ViewerError
@@ -182,6 +189,32 @@ def test_workers_without_the_package_or_with_another_version_are_refused(
     )
     monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
     assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
+
+
+def test_paths_are_relative_to_the_folder_of_the_batch(address, tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    some = [replace(item, output=f"{item.index}.txt") for item in items(5)]
+    finished(Job(), some, Limits(cluster=address))
+    assert sorted(path.name for path in tmp_path.iterdir()) == [f"{n}.txt" for n in range(5)]
+    monkeypatch.setattr(os, "getcwd", lambda: "/absent/folder")
+    with pytest.raises(ViewerError, match=r"cannot enter /absent/folder \(No such file"):
+        list(dask_cluster.run(some, Job(), Limits(cluster=address)))
+    absolute = [replace(item, output=str(tmp_path / item.output)) for item in some]
+    finished(Job(), absolute, Limits(cluster=address))
+
+
+def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeypatch) -> None:
+    absent = str(tmp_path / "absent.npz")
+    some = [replace(item, files=(absent,), output=str(tmp_path / "none.bvh")) for item in items(3)]
+    notes = []
+    limits = Limits(cluster=address, note=notes.append)
+    # A file that is missing here too is only the error of its item.
+    assert {one.status for one in finished(read_nothing, some, limits).values()} == {"failed"}
+    finished(write_elsewhere, some[:1], limits)
+    assert len(notes) == 1 and f"wrote {some[0].output}, which does not exist" in notes[0]
+    monkeypatch.setattr(os.path, "lexists", lambda path: True)
+    with pytest.raises(ViewerError, match=rf"does not find {absent}: workers need access"):
+        list(dask_cluster.run(some, read_nothing, limits))
 
 
 def test_scheduler_without_workers_is_reported(monkeypatch) -> None:

@@ -36,6 +36,10 @@ def _never() -> bool:
     return False
 
 
+def _ignore(text: str) -> None:
+    pass
+
+
 @dataclass(frozen=True)
 class Limits:
     """Limits of a batch.
@@ -54,6 +58,8 @@ class Limits:
         Cluster as given to ``--cluster``; empty for this machine.
     is_stopping : callable
         Returns whether no more items are to be started.
+    note : callable
+        Called with messages about workers, such as that none has started yet.
     """
 
     workers: int = 1
@@ -62,6 +68,7 @@ class Limits:
     memory: int | None = None
     cluster: str = ""
     is_stopping: Callable[[], bool] = _never
+    note: Callable[[str], None] = _ignore
 
 
 class Engine(Protocol):

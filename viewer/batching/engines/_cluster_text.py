@@ -38,6 +38,19 @@ class ClusterName:
     address: str = ""
     options: Mapping[str, str] = field(default_factory=dict)
 
+    @property
+    def workers_per_job(self) -> int:
+        """Number of workers of each SLURM job, the option ``cpus``.
+
+        Raises ViewerError if it is not a positive integer.
+        """
+        count = self.options.get("cpus", "1")
+        if not count.isdecimal() or int(count) < 1:
+            raise ViewerError(
+                f'--cluster slurm: cpus: expected 1 or more, found "{printable(count, 40)}"'
+            )
+        return int(count)
+
 
 def parse_cluster(text: str) -> ClusterName:
     """Parse the value of ``--cluster``.

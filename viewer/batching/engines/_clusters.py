@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import logging
-import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -12,18 +11,16 @@ from typing import TYPE_CHECKING, Any
 from viewer.batching.engines import Limits
 from viewer.batching.engines._cluster_text import ClusterName
 from viewer.batching.engines._process_limits import signals_blocked
+from viewer.batching.engines._slurm import SlurmJobs, slurm_cluster
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
-    from dask_jobqueue import SLURMCluster
     from distributed import Client
 
-__all__ = ["connected", "slurm_cluster"]
+__all__ = ["Check", "connected"]
 
 _CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
-_MEMORY = 4 << 30  # bytes per worker that a SLURM job requests by default
-_GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
 _ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
 # The batch itself counts retries and tracks which items a worker had started.
 _CONFIG = {
@@ -44,8 +41,12 @@ _CONFIG = {
 }
 
 
+Check = Callable[[Iterable[str]], None]
+"""Called with the names of the connected workers; replaces workers that have ended."""
+
+
 @contextmanager
-def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
+def connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Check]]:
     """Connect to a cluster; shut it down at the end if it was started here.
 
     Raises
@@ -55,8 +56,12 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
     """
     import dask
     from distributed import Client
+    from distributed.utils import silence_logging_cmgr
 
+    check: Check = _nothing_to_replace
     with ExitStack() as stack:
+        # Lost connections become messages; Dask would also print tracebacks.
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
         target: Any = name.address
         if name.kind != "address":
             # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
@@ -66,8 +71,10 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
                 if name.kind == "local":
                     target = _local_cluster(limits, folder)
                 else:
-                    target = _slurm(name, limits)
+                    target = slurm_cluster(name, limits.memory, _CONFIG)
             stack.enter_context(target)
+            if name.kind == "slurm":
+                check = SlurmJobs(target, limits.workers, limits.note).check
         try:
             with signals_blocked():
                 client = Client(target, timeout=_CONNECT, set_as_default=False)
@@ -76,7 +83,11 @@ def connected(name: ClusterName, limits: Limits) -> Iterator[Client]:
                 f"--cluster: no scheduler answers at {printable(target, 100)} "
                 f"({printable(problem, 200)})"
             ) from None
-        yield stack.enter_context(client)
+        yield stack.enter_context(client), check
+
+
+def _nothing_to_replace(workers: Iterable[str]) -> None:
+    """Do nothing: Dask restarts the workers of this machine, and others belong to the user."""
 
 
 def _local_cluster(limits: Limits, folder: str) -> Any:
@@ -97,76 +108,3 @@ def _local_cluster(limits: Limits, folder: str) -> Any:
             f"--cluster local: the workers do not start ({printable(problem, 200)}); a script that "
             'calls viewer.batch needs the line if __name__ == "__main__": before its own work'
         ) from None
-
-
-def _slurm(name: ClusterName, limits: Limits) -> SLURMCluster:
-    import shutil
-
-    if shutil.which("sbatch") is None:
-        raise ViewerError(
-            "--cluster slurm: sbatch was not found: run this on a login node, or submit an array "
-            "job of shards (viewer help batches)"
-        )
-    cluster = slurm_cluster(name, limits)
-    cluster.scale(n=limits.workers)
-    return cluster
-
-
-def slurm_cluster(name: ClusterName, limits: Limits) -> SLURMCluster:
-    """Return a cluster whose workers are SLURM jobs; none is submitted yet.
-
-    The options ``partition``, ``account``, ``time``, ``mem``, ``cpus`` (workers per job) and
-    ``interface`` are those of the job's workers; all others are passed to ``sbatch``.
-
-    Raises
-    ------
-    ViewerError
-        If dask-jobqueue is missing, or ``cpus`` is not a positive integer.
-    """
-    try:
-        with _handlers_kept():  # the import replaces the handler of Ctrl-C
-            from dask_jobqueue import SLURMCluster
-    except ImportError:
-        raise ViewerError(
-            "--cluster slurm needs dask-jobqueue: pip install skinning-viewer[batch]"
-        ) from None
-    options = dict(name.options)
-    count = options.pop("cpus", "1")
-    if not count.isdecimal() or int(count) < 1:
-        raise ViewerError(
-            f'--cluster slurm: cpus: expected 1 or more, found "{printable(count, 40)}"'
-        )
-    processes = int(count)
-    has_gpu = any(key in options for key in _GPU_OPTIONS)
-    known = {
-        "queue": options.pop("partition", None),
-        "account": options.pop("account", None),
-        "walltime": options.pop("time", None),
-        "memory": options.pop("mem", None) or f"{(limits.memory or _MEMORY) * processes}B",
-        "interface": options.pop("interface", None),
-    }
-    return SLURMCluster(
-        cores=processes,
-        processes=processes,
-        job_extra_directives=[
-            f"--{key}={value}" if value else f"--{key}" for key, value in options.items()
-        ],
-        worker_extra_args=["--resources", "GPU=1"] if has_gpu else [],
-        # Port 0 selects any free port: other users share the login node.
-        scheduler_options={"dashboard": False, "dashboard_address": ":0"},
-        silence_logs=logging.CRITICAL,
-        **known,
-    )
-
-
-@contextmanager
-def _handlers_kept() -> Iterator[None]:
-    """Restore the signal handlers that the block replaces."""
-    numbers = (signal.SIGINT, signal.SIGTERM)
-    before = [signal.getsignal(number) for number in numbers]
-    try:
-        yield
-    finally:
-        for number, handler in zip(numbers, before, strict=True):
-            if signal.getsignal(number) is not handler:
-                signal.signal(number, handler)

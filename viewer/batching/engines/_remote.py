@@ -6,7 +6,7 @@ import os
 import pickle
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
@@ -19,7 +19,7 @@ from viewer.data_classes import dataclass
 from viewer.media.targets import replacing_since
 from viewer.version import VERSION
 
-__all__ = ["ENDED", "Call", "OtherVersion", "Reply", "run_items"]
+__all__ = ["ENDED", "Call", "NoFolder", "OtherVersion", "Reply", "run_items"]
 
 ENDED = "viewer-ended"
 """Topic of events on the scheduler: attempts ended by their time limit."""
@@ -40,17 +40,18 @@ class Call:
     Attributes
     ----------
     job, items : bytes
-        Pickled; a tuple of items.
-    since : float
-        Start of the batch, in seconds since 1970. The scheduler repeats tasks whose worker died
-        without saying so, and existing outputs that are newer are then replaced.
+        Pickled; a tuple of items, each with the time at which it was first submitted, in seconds
+        since 1970. The scheduler repeats tasks whose worker died without saying so, and outputs
+        that are newer are then replaced.
+    folder : str
+        Working directory of the batch, to which paths are relative.
     timeout, memory : float, int, optional
         As in ``Limits``, for each item.
     """
 
     job: bytes
     items: bytes
-    since: float
+    folder: str
     timeout: float | None = None
     memory: int | None = None
 
@@ -61,14 +62,20 @@ class Reply:
 
     Attributes
     ----------
+    worker : str
+        Address of the worker.
     results : list of Result
         Results of the first items, at least one; the other items were not started.
     seconds : float
         Time that they took.
+    missing : str
+        An input that does not exist on the worker; empty if there is none.
     """
 
+    worker: str
     results: list[Result]
     seconds: float
+    missing: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +86,15 @@ class OtherVersion:
     version: str
 
 
-def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVersion:
+@dataclass(frozen=True, slots=True)
+class NoFolder:
+    """The reply of a worker that cannot enter the working directory of the batch."""
+
+    worker: str
+    reason: str
+
+
+def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVersion | NoFolder:
     """Run items one after another in a thread of a worker.
 
     Parameters
@@ -97,19 +112,37 @@ def run_items(version: str, key: str, call: tuple[Any, ...]) -> Reply | OtherVer
     if version != VERSION:
         return OtherVersion(worker.address, VERSION)
     asked = Call(*call)
-    results = []
-    with _lock, replacing_since(asked.since):
-        start = time.monotonic()
-        items: tuple[Item, ...] = pickle.loads(asked.items)
-        name_worker(worker.name)
-        if asked.memory is not None:
-            limit_memory(asked.memory)
-        for number, item in enumerate(items):
-            with _ended_after(asked.timeout, worker, key, number):
-                results.append(_job(asked.job)(item))
-            if time.monotonic() > start + LONGEST:
-                break
-        return Reply(results, time.monotonic() - start)
+    items: tuple[tuple[Item, float], ...] = pickle.loads(asked.items)
+    with _lock:
+        before = os.getcwd()
+        try:
+            os.chdir(asked.folder)
+        except OSError as problem:
+            paths = (path for item, _ in items for path in (*item.files, item.output))
+            if not all(map(os.path.isabs, filter(None, paths))):
+                return NoFolder(worker.address, problem.strerror or "")
+        try:
+            return _reply(asked, items, worker, key)
+        finally:
+            os.chdir(before)
+
+
+def _reply(asked: Call, items: Iterable[tuple[Item, float]], worker: Any, key: str) -> Reply:
+    start = time.monotonic()
+    results, missing = [], ""
+    name_worker(worker.name)
+    if asked.memory is not None:
+        limit_memory(asked.memory)
+    for number, (item, since) in enumerate(items):
+        with _ended_after(asked.timeout, worker, key, number), replacing_since(since):
+            result = _job(asked.job)(item)
+        results.append(result)
+        if result.status == "failed":
+            absent = (file for file in item.files if not os.path.lexists(file))
+            missing = missing or next(absent, "")
+        if time.monotonic() > start + LONGEST:
+            break
+    return Reply(worker.address, results, time.monotonic() - start, missing)
 
 
 def _job(pickled: bytes) -> Job:

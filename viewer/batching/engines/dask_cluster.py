@@ -7,20 +7,22 @@ reported.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import operator
+import os
 import time
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import CancelledError
-from dataclasses import astuple, replace
+from dataclasses import astuple, field, replace
 from queue import Empty, SimpleQueue
 from typing import TYPE_CHECKING
 from uuid import uuid4
 
 from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import parse_cluster
-from viewer.batching.engines._remote import ENDED, Call, OtherVersion, run_items
+from viewer.batching.engines._remote import ENDED, Call, NoFolder, OtherVersion, Reply, run_items
 from viewer.batching.engines._task_size import TaskSize
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
@@ -31,6 +33,8 @@ from viewer.version import VERSION
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
+
+    from viewer.batching.engines._clusters import Check
 
 __all__ = ["run"]
 
@@ -58,8 +62,8 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         ) from None
     from viewer.batching.engines._clusters import connected
 
-    with connected(parse_cluster(limits.cluster or "local"), limits) as client:
-        flight = _Flight(client, iter(items), job, limits)
+    with connected(parse_cluster(limits.cluster or "local"), limits) as (client, check):
+        flight = _Flight(client, check, iter(items), job, limits)
         try:
             while True:
                 flight.count_workers()
@@ -79,11 +83,13 @@ class _Attempt:
 
     ``earlier``: number of workers that died while running it.
     ``is_alone``: whether it is a task of its own, which shows whether it ends its worker.
+    ``since``: time of its first submission, in seconds since 1970.
     """
 
     item: Item
     earlier: int = 0
     is_alone: bool = False
+    since: float = field(default_factory=time.time)
 
 
 _Task = tuple[_Attempt, ...]
@@ -96,17 +102,20 @@ class _Flight:
     those that had finished, as their results are lost.
     """
 
-    def __init__(self, client: Client, items: Iterator[Item], job: Job, limits: Limits) -> None:
+    def __init__(
+        self, client: Client, check: Check, items: Iterator[Item], job: Job, limits: Limits
+    ) -> None:
         import cloudpickle
 
-        self.client, self.limits = client, limits
+        self.client, self.limits, self._check = client, limits, check
         self.flying: dict[Future, _Task] = {}
         self.unfinished: list[str] = []  # outputs that a dead worker may have been writing
         self._items, self._again = items, deque[_Attempt]()
         self._size = TaskSize()
+        self._writers: set[str] = set()  # workers that have written an output
         self._job = cloudpickle.dumps(job)  # unlike pickle, supports functions of notebooks
         self._done: SimpleQueue[Future] = SimpleQueue()
-        self._batch, self._start = f"viewer-{uuid4().hex[:8]}-", time.time()
+        self._batch = f"viewer-{uuid4().hex[:8]}-"
         self._numbers = itertools.count()
         self._n_workers, self._counted, self._seen = 0, -_COUNT_EVERY, time.monotonic()
         # SLURM starts jobs when resources are free, and local workers are replaced.
@@ -124,6 +133,7 @@ class _Flight:
         if now < self._counted + _COUNT_EVERY:
             return
         workers = self.client.scheduler_info(n_workers=-1)["workers"].values()
+        self._check([str(one["name"]) for one in workers])
         with_gpu = [one for one in workers if one["resources"].get("GPU")]
         # If any workers declare GPUs, only these draw.
         self._resources = {"GPU": 1} if with_gpu and self._uses_gpu else None
@@ -164,8 +174,8 @@ class _Flight:
 
         number = next(self._numbers)
         key = f"{self._batch}{number}"
-        items = pickle.dumps(tuple(attempt.item for attempt in task))
-        call = Call(self._job, items, self._start, self.limits.timeout, self.limits.memory)
+        items = pickle.dumps(tuple((attempt.item, attempt.since) for attempt in task))
+        call = Call(self._job, items, os.getcwd(), self.limits.timeout, self.limits.memory)
         future = self.client.submit(
             run_items,
             VERSION,
@@ -202,7 +212,7 @@ class _Flight:
         for attempt, result in self._results([future for future in done if future in self.flying]):
             n_attempts = attempt.earlier + result.attempts
             if self._is_retried(result, n_attempts):
-                self._again.append(_Attempt(attempt.item, n_attempts, is_alone=True))
+                self._again.append(replace(attempt, earlier=n_attempts, is_alone=True))
             else:
                 yield replace(result, attempts=n_attempts)
 
@@ -224,8 +234,9 @@ class _Flight:
             return self._results(done)
         results: list[tuple[_Attempt, Result]] = []
         for future, reply in zip(finished, replies, strict=True):
-            if isinstance(reply, OtherVersion):
-                raise _other_version(reply)
+            if isinstance(reply, OtherVersion | NoFolder):
+                raise _refusal(reply)
+            self._check_files(reply)
             task = self.flying.pop(future)
             self._size.add(reply.seconds, len(reply.results))
             results += zip(task, reply.results, strict=False)
@@ -234,6 +245,30 @@ class _Flight:
             if future in self.flying:
                 results += self._failure(future, self.flying.pop(future))
         return results
+
+    def _check_files(self, reply: Reply) -> None:
+        """Check that a worker reads and writes the same files as this process.
+
+        Raises ViewerError if it cannot read an input that exists here.
+        """
+        if reply.missing and os.path.lexists(reply.missing):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} does not find "
+                f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
+                "inputs under the same paths"
+            )
+        written = next((path for one in reply.results for path in one.outputs), "")
+        if written and reply.worker not in self._writers:
+            self._writers.add(reply.worker)
+            with contextlib.suppress(OSError):
+                os.listdir(
+                    os.path.dirname(written) or "."
+                )  # updates caches of network file systems
+            if not os.path.lexists(written):
+                self.limits.note(
+                    f"the worker {reply.worker} wrote {printable(written, 300)}, which does not "
+                    "exist on this machine: outputs need a folder that all workers share"
+                )
 
     def _failure(self, future: Future, task: _Task) -> list[tuple[_Attempt, Result]]:
         """Return the result of the item due to which no worker has finished a task, if known."""
@@ -310,8 +345,13 @@ def _lost() -> ViewerError:
     return ViewerError("--cluster: the scheduler disconnected; use --resume to continue")
 
 
-def _other_version(answer: OtherVersion) -> ViewerError:
+def _refusal(reply: OtherVersion | NoFolder) -> ViewerError:
+    if isinstance(reply, NoFolder):
+        return ViewerError(
+            f"--cluster: the worker {reply.worker} cannot enter {printable(os.getcwd(), 300)} "
+            f"({printable(reply.reason, 100)}): start the batch in a folder that all workers share"
+        )
     return ViewerError(
-        f"--cluster: the worker {answer.worker} has viewer {printable(answer.version, 40)}, "
+        f"--cluster: the worker {reply.worker} has viewer {printable(reply.version, 40)}, "
         f"expected {VERSION}: install the same version on all workers"
     )

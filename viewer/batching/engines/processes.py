@@ -13,7 +13,8 @@ import signal
 import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import replace
+from contextlib import ExitStack
+from dataclasses import field, replace
 from multiprocessing.context import SpawnContext, SpawnProcess
 from multiprocessing.synchronize import Event
 from queue import Empty, SimpleQueue
@@ -26,6 +27,7 @@ from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.interrupts import Interrupted
+from viewer.media.targets import replacing_since
 from viewer.phrases import printable
 
 if TYPE_CHECKING:
@@ -85,10 +87,24 @@ def _check_pickles(job: Job) -> None:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item, and the number of times it has been started before."""
+    """An item.
+
+    ``earlier``: number of times that it has been started before.
+    ``since``: time of the first start, in seconds since 1970.
+    """
 
     item: Item
     earlier: int = 0
+    since: float = field(default_factory=time.time)
+
+    @property
+    def arguments(self) -> tuple[Item, float | None]:
+        """Arguments of ``_work``."""
+        return self.item, self.since if self.earlier else None
+
+    def again(self) -> _Attempt:
+        """Return the next attempt."""
+        return replace(self, earlier=self.earlier + 1)
 
 
 class _Worker(SpawnProcess):
@@ -161,11 +177,12 @@ class _Workers:
 
     def schedule(self, attempt: _Attempt) -> None:
         """Submit an item to the pool."""
+        given, timeout = attempt.arguments, self.limits.timeout
         try:
-            future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
+            future = self._pool.schedule(_work, args=given, timeout=timeout)
         except RuntimeError:  # the pool broke after its last result
             self._renew()
-            future = self._pool.schedule(_work, args=(attempt.item,), timeout=self.limits.timeout)
+            future = self._pool.schedule(_work, args=given, timeout=timeout)
         self.flying[future] = attempt
         done = self._done
         future.add_done_callback(lambda _: done.put(future))
@@ -184,7 +201,7 @@ class _Workers:
         if result.status == "cancelled" and not result.message:
             return  # the item was never started
         if result.status in _RETRIED and attempt.earlier < self.limits.retries and not self.stops():
-            self.schedule(_Attempt(attempt.item, attempt.earlier + 1))
+            self.schedule(attempt.again())
             return
         yield replace(result, attempts=attempt.earlier + 1)
 
@@ -305,14 +322,21 @@ def _note_termination(number: int, frame: FrameType | None) -> None:
     _is_terminated = True
 
 
-def _work(item: Item) -> Result:
+def _work(item: Item, since: float | None) -> Result:
+    """Run an item.
+
+    ``since``: time of its first attempt, whose outputs are replaced; None if this is the first.
+    """
     assert _job is not None and _stopping is not None  # set by _prepare
     if _is_terminated:
         os._exit(128 + signal.SIGTERM)
     if _stopping.is_set():
         return Result(item, "cancelled")
     try:
-        result = _job(item)
+        with ExitStack() as stack:
+            if since is not None:
+                stack.enter_context(replacing_since(since))
+            result = _job(item)
     except Interrupted as stop:
         # The pool ends this worker; the item's incomplete output has been removed.
         os._exit(stop.exit_code)

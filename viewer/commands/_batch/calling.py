@@ -107,7 +107,7 @@ def batch(
     Returns
     -------
     Report
-        Results, counts by status, failures.
+        Results, counts by status, failures, notes about inputs and workers.
 
     Raises
     ------
@@ -149,6 +149,7 @@ def _run(plan: Plan, job: Job, on_result: Callable[[Result], None] | None) -> Re
         # The caller's own handler handles it, as if the signal had just arrived.
         signal.raise_signal(stop.number)
         raise KeyboardInterrupt from None
+    found.notes[:0] = plan.notes
     if found.signal:
         signal.raise_signal(found.signal)
     return found

@@ -12,11 +12,12 @@ from viewer.batching.items import Item, Result
 from viewer.batching.report import Report
 from viewer.commands._printing import table_lines
 from viewer.commands._progress import Progress
+from viewer.commands._scene import print_warnings
 from viewer.phrases import counted, printable
 
 __all__ = ["Display", "summary_lines"]
 
-_MINUTE = 60.0  # seconds between lines if there is no terminal
+_MINUTE = 60.0  # seconds between lines if there is no terminal, and of which the rate is shown
 _MOST = 20  # maximum number of failures listed
 
 
@@ -33,9 +34,9 @@ class Display:
         self, title: str, items: Sequence[Item], prints: bool, is_json: bool = False
     ) -> None:
         self._is_json = is_json
-        self._title, self.total = title, len(items)
+        self.total = len(items)
         self._progress = Progress(title, self.total)
-        self._start = self._said = time.monotonic()
+        self._rate, self._said = _Rate(), time.monotonic()
         self._n_done = self._n_failed = self._n_unchanged = 0
         self._texts: dict[int, str] = {}  # text that waits for earlier items, by index
         self._order = deque(item.index for item in items if prints)
@@ -45,12 +46,13 @@ class Display:
         self._n_done += 1
         self._n_unchanged += result.status == "unchanged"
         self._n_failed += result.status not in ("done", "unchanged")
-        now = time.monotonic()
-        rate = (self._n_done - self._n_unchanged) / max(now - self._start, 1e-3)
+        rate = self._rate.at(self._n_done - self._n_unchanged)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
         if not (self._order and sys.stdout.isatty()):  # printed text would break the bar
-            self._progress.title = f"{self._title}, {rate:.3g}/s{failed}"
+            # A title that changes would be a new bar, for which no time left is known.
+            self._progress.unit = f"{rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
+        now = time.monotonic()
         if not sys.stderr.isatty() and now > self._said + _MINUTE:
             self._said = now
             left = duration((self.total - self._n_done) / max(rate, 1e-9))
@@ -58,6 +60,11 @@ class Display:
             print(text, file=sys.stderr)
         if self._order:
             self._print(result)
+
+    def note(self, text: str) -> None:
+        """Print a message about the workers."""
+        self._progress.hide()
+        print_warnings([text], plain="note")
 
     def _print(self, result: Result) -> None:
         text = result.text.rstrip("\n")
@@ -76,6 +83,23 @@ class Display:
 
     def __exit__(self, *_: object) -> None:
         self._progress.__exit__()
+
+
+class _Rate:
+    """Items per second in the last minute, in which many others may have been skipped."""
+
+    def __init__(self) -> None:
+        self._samples = deque([(time.monotonic(), 0)])
+
+    def at(self, count: int) -> float:
+        """Return the rate when ``count`` items have finished."""
+        now = time.monotonic()
+        if now > self._samples[-1][0] + 1.0:
+            self._samples.append((now, count))
+        while len(self._samples) > 1 and self._samples[1][0] < now - _MINUTE:
+            self._samples.popleft()
+        since, earlier = self._samples[0]
+        return (count - earlier) / max(now - since, 1e-3)
 
 
 def _json_line(result: Result) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -174,6 +173,25 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
 
     Few small inputs are run in this process, because starting workers takes about a second.
     """
+    limits = _limits(request, len(items))
+    if request.cluster:
+        return "dask_cluster", limits, _cluster_notes(request)
+    is_limited = request.timeout is not None or request.memory is not None
+    if request.workers is not None:
+        if request.workers == 0 and is_limited:
+            raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
+        return "processes" if request.workers else "sequential", limits, []
+    is_few = len(items) <= request.few and _size(items) < _SMALL
+    if is_few and not is_limited:
+        return "sequential", limits, []
+    if not is_limited and importlib.util.find_spec("pebble") is None:
+        note = "without pebble, one process runs everything (pip install pebble)"
+        return "sequential", limits, [note]
+    return "processes", limits, []
+
+
+def _limits(request: Request, n_items: int) -> Limits:
+    """Return the limits; raise ViewerError if a number is wrong."""
     timeout = request.usual_timeout if request.timeout is None else request.timeout or None
     if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
@@ -182,24 +200,22 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
             raise ViewerError(f"--{name}: expected 0 or more, found {value}")
     if request.memory is not None and request.memory <= 0:
         raise ViewerError(f"--limit-memory: expected more than 0 bytes, found {request.memory}")
-    n_workers = request.workers or _cores()
-    limits = Limits(n_workers, request.retries, timeout, request.memory, request.cluster)
-    if request.cluster:
-        parse_cluster(request.cluster)
-        return "dask_cluster", limits, []
-    is_limited = request.timeout is not None or request.memory is not None
-    workers = request.workers
-    if workers is None:
-        is_few = len(items) <= request.few and _size(items) < _SMALL
-        workers = 0 if is_few and not is_limited else _cores()
-        if workers and not is_limited and importlib.util.find_spec("pebble") is None:
-            note = "without pebble, one process runs everything (pip install pebble)"
-            return "sequential", limits, [note]
-    elif workers == 0 and is_limited:
-        raise ViewerError("--timeout and --limit-memory: expected --workers 1 or more, found 0")
-    if workers == 0:
-        return "sequential", limits, []
-    return "processes", replace(limits, workers=max(1, min(workers, len(items)))), []
+    if request.cluster and request.workers == 0:
+        raise ViewerError("--cluster: expected --workers 1 or more, found 0")
+    count = request.workers
+    if not count and request.cluster:
+        # The cores of a login node say nothing about the cluster.
+        cluster = parse_cluster(request.cluster)
+        count = cluster.workers_per_job if cluster.kind == "slurm" else None
+    workers = max(1, min(count or _cores(), n_items))
+    return Limits(workers, request.retries, timeout, request.memory, request.cluster)
+
+
+def _cluster_notes(request: Request) -> list[str]:
+    cluster = parse_cluster(request.cluster)
+    if cluster.kind == "address" and request.workers is not None:
+        return [f"--workers has no effect: all workers of {cluster.address} are used"]
+    return []
 
 
 def _size(items: Sequence[Item]) -> int:
@@ -210,7 +226,11 @@ def _size(items: Sequence[Item]) -> int:
 
 
 def _cores() -> int:
-    """Return the number of cores that this process may use, as assigned by batch systems."""
+    """Return the number of cores that this process may use."""
     if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+        count = len(os.sched_getaffinity(0))
+    else:
+        count = os.cpu_count() or 1
+    # SLURM need not bind a task to its cores.
+    assigned = os.environ.get("SLURM_CPUS_PER_TASK") or os.environ.get("SLURM_CPUS_ON_NODE", "")
+    return min(count, int(assigned)) if assigned.isdecimal() and int(assigned) else count
