@@ -275,11 +275,20 @@ def test_reading_a_figure_needs_no_opengl() -> None:
     assert not loaded & {"moderngl", "imgui_bundle", "glfw", "scipy", "pyrr"}
 
 
+def test_printing_a_skeleton_loads_few_modules() -> None:
+    """Modules that take long to import: shutil for archives, hashlib for OpenSSL, numpy.random."""
+    command = ["info", str(ROOT / "assets" / "samples" / "fox.skel")]
+    loaded = loaded_modules(f"from viewer.cli import run; run({command})")
+    assert "numpy" in loaded
+    assert not loaded & {"shutil", "hashlib", "secrets", "moderngl", "PIL", "pyrr", "rich", "json"}
+
+
 @pytest.mark.slow
 def test_drawing_headlessly_needs_no_window_library() -> None:
     loaded = loaded_modules("import viewer; viewer.render(viewer.load(), size=(32, 32))")
     assert "moderngl" in loaded
-    assert not loaded & {"imgui_bundle", "glfw", "scipy"}
+    # numpy.random loads secrets.
+    assert not loaded & {"imgui_bundle", "glfw", "scipy", "secrets", "hashlib"}
 
 
 def test_no_module_changes_environment_variables() -> None:

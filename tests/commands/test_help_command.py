@@ -50,6 +50,16 @@ def test_help_for_a_command_lists_its_options(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out.startswith("usage: viewer diff")
 
 
+@pytest.mark.parametrize("width", [60, 140])
+def test_help_for_a_command_is_as_wide_as_the_terminal(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, width: int
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(width))
+    assert run(["help", "diff"]) == 0
+    lengths = [len(line) for line in capsys.readouterr().out.splitlines()]
+    assert width - 20 < max(lengths) < width
+
+
 def test_unknown_topic_suggests_the_nearest_in_one_line(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

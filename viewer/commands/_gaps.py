@@ -16,9 +16,9 @@ ONE_SECOND = 0
 
 _LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|1s)%s)?"
 _PATTERNS = {
-    "view": re.compile(_LIMIT % ""),
-    "check": re.compile("interpolate"),
-    "write": re.compile(rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}"),
+    "view": _LIMIT % "",
+    "check": "interpolate",
+    "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
 }
 _WHAT = {
     "view": "gaps in captures: interpolate all, or those of up to N frames or one second (1s)",
@@ -63,7 +63,7 @@ class _Gaps(argparse.Action):
     ) -> None:
         """Store the results, or raise ArgumentError."""
         text, use = str(values), str(self.const)
-        found = _PATTERNS[use].fullmatch(text)
+        found = re.fullmatch(_PATTERNS[use], text)
         if found is None:
             raise argparse.ArgumentError(
                 self, f"expected {_METAVAR[use]}, found {printable(text, 60)}"

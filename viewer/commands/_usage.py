@@ -25,9 +25,25 @@ _LONGEST = 60  # maximum length of a name in a message, characters
 class Parser(argparse.ArgumentParser):
     """Argument parser that reports a usage error in one line, like every other error."""
 
+    _width: int | None = 80  # of text that is not shown; None for the width of the terminal
+
     def error(self, message: str) -> NoReturn:
         """Raise ViewerError instead of exiting as ``argparse`` does."""
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
+
+    def format_usage(self) -> str:
+        """Return nothing: ``argparse`` formats a usage for errors, which do not show it."""
+        return ""
+
+    def format_help(self) -> str:
+        """Return the help, as wide as the terminal."""
+        self._width = None
+        return super().format_help()
+
+    def _get_formatter(self) -> argparse.HelpFormatter:
+        # argparse checks each new option with a formatter, which would ask for the terminal's width
+        # and import shutil for that.
+        return self.formatter_class(prog=self.prog, width=self._width)  # type: ignore[call-arg]
 
     def print_help(self, file: SupportsWrite[str] | None = None) -> None:
         """Print the help, or raise if it cannot be printed; ``argparse`` ignores that.

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.near_names import did_you_mean
 
 __all__ = [
     "FOLDER",
@@ -113,5 +112,7 @@ def _near_files(path: Path) -> str:
             names = [entry.name for entry in islice(entries, _MOST_FILES)]
     except OSError:  # the folder is missing too, or cannot be listed
         return ""
+    from viewer.near_names import did_you_mean
+
     # A dangling link has exactly the missing name.
     return did_you_mean(path.name, [name for name in names if name != path.name], _ALIKE)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
 from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
-from viewer.formats._long_text import LongText, count_line_ends, line_parts, without_marks
+from viewer.formats._text.long_text import LongText, count_line_ends, line_parts, without_marks
 from viewer.formats._text.numbers import word_begins
 from viewer.progress import report_bytes
 from viewer.rig.arrays import Ints

@@ -92,11 +92,11 @@ def write(figure: Figure, path: str | Path) -> list[Diagnostic]:
 
 def _facts(skeleton: Skeleton, dofs: Floats) -> tuple[tuple[str, Diagnostic], ...]:
     """Return a message about DOFs of the file's pose that were clamped to their limits."""
-    from viewer.rig.posing.dof_text import beyond_text
-
     moved = np.flatnonzero(skeleton.rest_dofs != dofs)
     if len(moved) == 0:
         return ()
+    from viewer.rig.posing.dof_text import beyond_text
+
     first = int(moved[0])
     beyond = beyond_text(skeleton, first, float(dofs[first]))
     values = {"n": len(moved), "dof": beyond}

@@ -7,7 +7,6 @@ import os
 import re
 from collections import defaultdict, deque
 from collections.abc import Iterable
-from hashlib import blake2b
 from pathlib import Path
 
 __all__ = [
@@ -32,6 +31,8 @@ def temporary_prefix(name: str) -> str:
     '.walk.bvh.tmp'
     """
     if len(name) > _LONGEST:
+        from hashlib import blake2b  # loads OpenSSL, which few names need
+
         digest = blake2b(os.fsencode(name), digest_size=8).hexdigest()
         name = f"{name[: _LONGEST - len(digest)]}{digest}"
     return f".{name}{_MARK}"

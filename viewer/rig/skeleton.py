@@ -9,13 +9,12 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.near_names import name_hint
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
-from viewer.rig.humanoid import Humanoid
 
 if TYPE_CHECKING:
     from viewer.rig.bodies.joint_posing import JointPosing
     from viewer.rig.constraints.constraint import Constraint
+    from viewer.rig.humanoid import Humanoid
     from viewer.rig.springs.springs import Springs
 
 __all__ = [
@@ -357,4 +356,6 @@ def find_joint(skeleton: Skeleton, text: str) -> int:
     if found:
         labels = ", ".join(joint_label(skeleton, joint) for joint in found[:4])
         raise RigError(f'"{text}" is the name of {len(found)} joints: use one of {labels}')
+    from viewer.near_names import name_hint
+
     raise RigError(f'no joint is called "{text}"; {name_hint(text, joint_labels(skeleton))}')

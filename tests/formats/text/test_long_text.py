@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from viewer.errors import FormatError
-from viewer.formats import Source, _long_text, _source, read
-from viewer.formats._long_text import LongText, count_line_ends, line_parts, without_marks
+from viewer.formats import Source, _source, read
 from viewer.formats._obj import lines
+from viewer.formats._text import long_text
+from viewer.formats._text.long_text import LongText, count_line_ends, line_parts, without_marks
 
 MARK = b"\xef\xbb\xbf"
 TEXTS = [
@@ -26,7 +27,7 @@ TEXTS = [
 
 @pytest.fixture(autouse=True)
 def _short_is_long(monkeypatch):
-    monkeypatch.setattr(_long_text, "_LONG", 0)
+    monkeypatch.setattr(long_text, "_LONG", 0)
 
 
 def stored(folder, data: bytes) -> LongText:
@@ -51,7 +52,7 @@ def test_parts_of_whole_lines_make_up_the_text(tmp_path, data, length):
 @pytest.mark.parametrize("block", [1, 2, 3, 5, 1000])
 @pytest.mark.parametrize("data", TEXTS)
 def test_line_ends_are_counted_across_blocks(tmp_path, monkeypatch, data, block):
-    monkeypatch.setattr(_long_text, "_BLOCK", block)
+    monkeypatch.setattr(long_text, "_BLOCK", block)
     wanted, text = without_marks(data), stored(tmp_path, data)
     for start in range(len(wanted) + 1):
         for end in range(start, len(wanted) + 1):

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from viewer.phrases import printable
-from viewer.rig.material import Material
+
+if TYPE_CHECKING:
+    from viewer.rig.material import Material
 
 __all__ = ["describe_surface", "surface_words"]
 

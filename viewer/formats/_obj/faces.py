@@ -105,14 +105,37 @@ def _corner_numbers(rows: Rows, begins: Places) -> Corners | None:
     values, bad = parse_numbers(text, 0, len(text), is_kept=False)
     if bad >= 0 or (values == 0.0).any():  # 0 is not a valid index and means "missing" below
         return None
-    slashes = np.flatnonzero(rows.letters == _SLASH)
-    if len(slashes) == 0:
-        # In the second most common kind of file, corners have only a vertex.
-        return _spread(values, np.ones(len(begins), np.int64), None)
+    columns = _common_columns(rows, begins)
+    if columns is not None:
+        return _in_columns(values, columns, len(begins))
     fits, n_numbers, has_gap = fits_corner(rows, begins)
     if not fits.all():
         return None
-    return _spread(values, n_numbers, has_gap if has_gap.any() else None)
+    return _spread(values, n_numbers, has_gap)
+
+
+def _common_columns(rows: Rows, begins: Places) -> list[int] | None:
+    """Return the columns that the numbers of all corners have in common, as in most files.
+
+    None if corners differ, or if one may be invalid.
+    """
+    slashes = np.flatnonzero(rows.letters == _SLASH)
+    if len(slashes) == 0:
+        return [0]
+    n_slashes = len(slashes) // len(begins)
+    if n_slashes > 2 or n_slashes * len(begins) != len(slashes):
+        return None
+    table = slashes.reshape(-1, n_slashes)
+    after = rows.letters.take(table[:, -1] + 1, mode="clip")
+    is_inside = (table[:, 0] > begins) & (np.append(begins[1:], len(rows.letters)) > table[:, -1])
+    if not (is_inside & (after > ord(" ")) & (after != _SLASH)).all():
+        return None
+    if n_slashes == 1:
+        return [0, 1]
+    gaps = table[:, 1] - table[:, 0]
+    if (gaps == 1).all():
+        return [0, 2]
+    return [0, 1, 2] if (gaps > 1).all() else None
 
 
 def _number_begins(rows: Rows) -> Places:
@@ -153,17 +176,29 @@ def fits_corner(rows: Rows, begins: Places) -> tuple[Bools, Places, Bools]:
     return fits, n_numbers, has_gap
 
 
-def _spread(values: Floats, counts: Places, gaps: Bools | None) -> Corners | None:
-    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
-    # Larger numbers are out of range; the function for invalid faces reads them again.
+def _whole(values: Floats) -> Corners | None:
+    """Return numbers as integers; None if one has a fraction, or is too large for an index."""
+    # The function for invalid faces reads large numbers again.
     whole = np.clip(values, -(2.0**30), 2.0**30).astype(np.int32)
-    if (whole != values).any():
+    return whole if (whole == values).all() else None
+
+
+def _in_columns(values: Floats, columns: list[int], count: int) -> Corners | None:
+    """Arrange the numbers of corners in some of three columns; the others are 0."""
+    whole = _whole(values)
+    if whole is None or len(whole) != len(columns) * count:
+        return None
+    table = np.zeros((count, 3), dtype=np.int32)
+    table[:, columns] = whole.reshape(count, -1)
+    return table
+
+
+def _spread(values: Floats, counts: Places, gaps: Bools) -> Corners | None:
+    """Arrange the numbers of corners in rows of three; a gap moves the second to the third."""
+    whole = _whole(values)
+    if whole is None:
         return None
     table = np.zeros((len(counts), 3), dtype=np.int32)
-    if gaps is None and (counts == counts[0]).all():
-        table[:, : counts[0]] = whole.reshape(len(counts), -1)
-        return table
-    gaps = np.zeros(len(counts), dtype=np.bool_) if gaps is None else gaps
     firsts = np.cumsum(counts) - counts
     table[:, 0] = whole[firsts]
     middle, third = (counts > 1) & ~gaps, counts > 2

@@ -151,12 +151,26 @@ def rows_of(lines: Lines, keyword: str) -> Rows:
     if keyword == "f":
         starts = starts + (lines.letters[starts] == ord("o"))
     ends = lines.ends[chosen]
+    if len(chosen) and chosen[-1] - chosen[0] == len(chosen) - 1:
+        return _adjacent_rows(lines, starts, ends, int(lines.starts[chosen[0]]))
     steps = np.zeros(len(lines.letters) + 1, dtype=np.int8)
     steps[starts] += 1
     steps[ends] -= 1
     letters = lines.letters[np.cumsum(steps[:-1], dtype=np.int8).view(np.bool_)]
     places = np.concatenate([[0], np.cumsum(ends - starts)])
     return Rows(letters.tobytes(), letters, places, starts + lines.base)
+
+
+def _adjacent_rows(lines: Lines, starts: Places, ends: Places, first: int) -> Rows:
+    """Return the text of lines that follow each other, with blanks in place of keywords."""
+    letters = lines.letters[first : ends[-1]].copy()
+    starts = starts - first
+    # A keyword has at most two characters; any before the first one is the end of another line.
+    for back in (1, 2):
+        letters[np.maximum(starts - back, 0)] = ord(" ")
+    return Rows(
+        letters.tobytes(), letters, np.append(starts, len(letters)), starts + first + lines.base
+    )
 
 
 NumberRows = tuple[Floats, Places, Floats, Rows]

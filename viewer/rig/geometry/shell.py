@@ -103,14 +103,24 @@ def _has_long_borders(corners: NDArray[np.int64], n_vertices: int) -> bool:
     another, so any numbers of the neighbours cancel out. As many unpaired edges begin as end at a
     vertex, so at least one begins at each vertex where the numbers do not cancel out.
     """
-    # Sums of whole numbers below 2**30 are exact for up to 2**23 neighbours.
-    numbers = np.random.default_rng(0).integers(1 << 30, size=n_vertices).astype(np.float64)
+    numbers = _scattered(n_vertices)
     sums = np.zeros(n_vertices)
     for start, end in ((0, 1), (1, 2), (2, 0)):
         first, second = corners[:, start], corners[:, end]
         sums += np.bincount(first, numbers[second], n_vertices)
         sums -= np.bincount(second, numbers[first], n_vertices)
     return bool(np.count_nonzero(sums) > _MOST_OPEN)
+
+
+def _scattered(count: int) -> Floats:
+    """Return whole numbers below 2**30 without a pattern (splitmix64, Steele et al. 2014).
+
+    Their sums are exact for up to 2**23 numbers. ``numpy.random`` would take longer to import.
+    """
+    values = np.arange(1, count + 1, dtype=np.uint64) * np.uint64(0x9E3779B97F4A7C15)
+    values = (values ^ values >> np.uint64(30)) * np.uint64(0xBF58476D1CE4E5B9)
+    values = (values ^ values >> np.uint64(27)) * np.uint64(0x94D049BB133111EB)
+    return ((values ^ values >> np.uint64(31)) >> np.uint64(34)).astype(np.float64)
 
 
 def _neighbours(corners: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bools] | None:

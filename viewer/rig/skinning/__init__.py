@@ -10,7 +10,6 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
-from viewer.near_names import name_hint
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
@@ -146,6 +145,8 @@ def deform(
     if figure.mesh is None:
         raise RigError(f"figure {figure.name} has no mesh to deform")
     if how.method not in METHODS:
+        from viewer.near_names import name_hint
+
         raise RigError(f'no skinning method "{how.method}"; {name_hint(how.method, METHODS)}')
     weights = figure.rest_shape_weights if pose is None else pose.shape_weights
     figure = shaped(figure, weights)
