@@ -94,6 +94,12 @@ def test_content_of_other_kinds_is_described(data, kind, name, wanted):
     assert fault_of(caught.value.diagnostic) == ("F002.kind", None, values)
 
 
+def test_expected_suffix_is_that_of_the_file():
+    # The suffixes of glTF also include .glb, which comes first in the table.
+    fault = refusal_of(lambda: found("a.GLTF", b""))
+    assert fault == ("F002.kind", None, {"wanted": ".gltf", "looks": "an empty file"})
+
+
 def test_text_in_another_format_is_refused():
     fault = refusal_of(lambda: found("a.txt", b"hello world"))
     assert fault == ("F002.unknown-kind", None, {"wanted": ANY})

@@ -239,7 +239,7 @@ def detect(source: Source) -> str:
     looks = source.looks_like()
     if by_suffix and looks is None:
         return by_suffix  # its reader reports what is missing
-    wanted = FORMATS[by_suffix].suffixes[0] if by_suffix else KNOWN
+    wanted = claimed if by_suffix else KNOWN
     if looks is None:
         raise source.fault("F002.unknown-kind", wanted=wanted)
     raise source.fault("F002.kind", wanted=wanted, looks=looks)
