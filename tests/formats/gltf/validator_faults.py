@@ -1,6 +1,6 @@
 """Tiny files with one error each that Khronos' validator reports, keyed by its code. Each is listed
 with the code that lint reports and the JSON pointer to the error. Codes about unused objects,
-materials, cameras, and skinned meshes below other nodes are omitted, because most files have them.
+materials and cameras are omitted, because most files have them.
 """
 
 from __future__ import annotations
@@ -101,6 +101,27 @@ def _unbounded(file: File) -> None:
     del accessor["min"], accessor["max"]
 
 
+def _view(**members: object) -> Change:
+    return lambda file: file.root["bufferViews"][2].update(members)
+
+
+def _morphed(file: File) -> None:
+    file.primitive["targets"] = [{"NORMAL": 2}]
+
+
+def _other_scene(file: File) -> None:
+    file.root["nodes"].append({"name": "elsewhere"})
+    file.root["scenes"] = [{"nodes": [0, 3]}, {"nodes": [1]}]
+
+
+def _moved_skin(file: File) -> None:
+    times, values = file.times([0.0, 1.0]), file.accessor([[0, 0, 0], [1, 0, 0]])
+    channel = {"sampler": 0, "target": {"node": 0, "path": "translation"}}
+    file.add(
+        "animations", {"channels": [channel], "samplers": [{"input": times, "output": values}]}
+    )
+
+
 _PRIMITIVE = "/meshes/0/primitives/0"
 _WEIGHTS = f"{_PRIMITIVE}/attributes/WEIGHTS_0"
 _JOINTS = f"{_PRIMITIVE}/attributes/JOINTS_0"
@@ -189,5 +210,59 @@ FAULTS: dict[str, tuple[Callable[[], File], str, str]] = {
         "G005", "/animations/0/channels/0/target/node"),
     "ANIMATION_CHANNEL_TARGET_NODE_WEIGHTS_NO_MORPHS": (
         lambda: _moved(_target(path="weights")), "F007", "/animations/0/channels/0"),
+    # Dependencies
+    "EMPTY_ENTITY": (lambda: _skin(_node(2, children=[])), "G003", "/nodes/2/children"),
+    "UNSATISFIED_DEPENDENCY": (lambda: _skin(_node(1, skin=0)), "G003", "/nodes/1/skin"),
+    "NODE_MATRIX_NON_TRS": (
+        lambda: _skin(_node(2, matrix=[1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1])),
+        "G003", "/nodes/2/matrix"),
+    "DUPLICATE_ELEMENTS": (
+        lambda: _skin(lambda file: file.root.update(scenes=[{"nodes": [0, 1, 0]}])),
+        "G003", "/scenes/0/nodes/2"),
+    "NODE_SKINNED_MESH_NON_ROOT": (
+        lambda: _skin(lambda file: file.add("nodes", {"children": [0]})), "G007", "/nodes/0"),
+    "NODE_SKIN_NO_SCENE": (lambda: _skin(_other_scene), "G004", "/nodes/0"),
+    "ANIMATION_CHANNEL_TARGET_NODE_SKIN": (
+        lambda: _skin(_moved_skin), "G007", "/animations/0/channels/0/target/path"),
+    "UNDECLARED_EXTENSION": (
+        lambda: _skin(_node(1, extensions={"ACME_tag": {}})),
+        "G001", "/nodes/1/extensions/ACME_tag"),
+    "UNUSED_EXTENSION_REQUIRED": (
+        lambda: _skin(lambda file: file.root.update(extensionsRequired=["KHR_mesh_quantization"])),
+        "G001", "/extensionsRequired/0"),
+    # Storage
+    "ACCESSOR_NORMALIZED_INVALID": (
+        lambda: _skin(_accessor(normalized=True)), "G002", "/accessors/2/normalized"),
+    "ARRAY_TYPE_MISMATCH": (
+        lambda: _skin(_accessor(max=["a", 1, 0])), "G002", "/accessors/2/max"),
+    "VALUE_NOT_IN_LIST": (lambda: _skin(_view(target=5)), "G002", "/bufferViews/2/target"),
+    "VALUE_NOT_IN_RANGE": (
+        lambda: _skin(_view(byteStride=300)), "G002", "/bufferViews/2/byteStride"),
+    "BUFFER_VIEW_TOO_LONG": (
+        lambda: _skin(lambda file: file.view(bytes(4), byteLength=5000)),
+        "G002", "/bufferViews/3/byteLength"),
+    "BUFFER_VIEW_TARGET_OVERRIDE": (
+        lambda: _skin(_view(target=34963)), "G002", f"{_PRIMITIVE}/attributes/POSITION"),
+    "MESH_PRIMITIVE_INVALID_ATTRIBUTE": (
+        lambda: _skin(_attribute("SPEED", [[0, 0, 1]] * 3)),
+        "G002", f"{_PRIMITIVE}/attributes/SPEED"),
+    "MESH_PRIMITIVE_INDEXED_SEMANTIC_CONTINUITY": (
+        lambda: _skin(_attribute("TEXCOORD_1", [[0, 0]] * 3)), "G002", f"{_PRIMITIVE}/attributes"),
+    "MESH_PRIMITIVE_ATTRIBUTES_ACCESSOR_INVALID_FORMAT": (
+        lambda: _skin(_attribute("NORMAL", [[0, 0, 1]] * 3, "b")),
+        "G002", f"{_PRIMITIVE}/attributes/NORMAL"),
+    "MESH_PRIMITIVE_INDICES_ACCESSOR_INVALID_FORMAT": (
+        lambda: _skin(lambda file: file.primitive.update(indices=file.accessor([0, 1, 2], "h"))),
+        "G002", f"{_PRIMITIVE}/indices"),
+    "MESH_PRIMITIVE_MORPH_TARGET_NO_BASE_ACCESSOR": (
+        lambda: _skin(_morphed), "G002", f"{_PRIMITIVE}/targets/0/NORMAL"),
+    "ACCESSOR_INVALID_SIGN": (
+        lambda: _skin(_attribute("TANGENT", [[1, 0, 0, 0.5]] * 3)),
+        "G002", f"{_PRIMITIVE}/attributes/TANGENT"),
+    "MESH_PRIMITIVE_TOO_FEW_TEXCOORDS": (
+        lambda: _skin(lambda file: (
+            file.add("materials", {"normalTexture": {"index": 0}}),
+            file.primitive.update(material=0))),
+        "G002", _PRIMITIVE),
 }  # fmt: skip
 """A function that creates the file, the code that lint reports, and the JSON pointer."""

@@ -9,6 +9,7 @@ CODES = {
     "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
     "G005": Code("warning", "invalid glTF animation", "export the animation again"),
     "G006": Code("warning", "invalid VRM data", "export the character again"),
+    "G007": Code("note", "transform without effect", "none if intentional"),
 }
 
 MESSAGES = {
@@ -124,6 +125,13 @@ MESSAGES = {
     "G002.no-bounds": "positions: expected an accessor with min and max, found one without",
     "G002.unused-joints": "{n:#influence} of weight 0 {n:?refers|refer} to a joint other than 0 "
     "(first: vertex {vertex})",
+    "G001.structure": "expected {wanted:text}, found {found:text}",
+    "G002.storage": "expected {wanted:text}, found {found:text}",
+    "G003.structure": "expected {wanted:text}, found {found:text}",
+    "G004.structure": "expected {wanted:text}, found {found:text}",
+    "G005.structure": "expected {wanted:text}, found {found:text}",
+    "G007.skinned-child": "node with a skinned mesh: expected {wanted:text}, found {found:text}",
+    "G007.skinned-moved": "expected {wanted:text}, found {found:text}",
     "G003.no-influences": "skin of a mesh without joints and weights: not used",
     "G003.no-skin": "mesh with joints and weights, but no skin: not deformed",
     "G003.unused-transform": "transform of a node with a skinned mesh: not used",

@@ -1,0 +1,1 @@
+"""Violations of the glTF specification that have no effect on reading, reported only by lint."""
