@@ -2,9 +2,10 @@
 
 The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
 MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
-Max's Biped, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify. Sides are detected as ``L``,
-``R``, ``Left`` or ``Right`` at either end of a name; prefixes shared by most joints
-(``mixamorig:``, ``Bip01 ``, ``m_avg_``) are removed.
+Max's Biped, Character Creator, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify and Auto-Rig
+Pro. Sides are detected as ``L``, ``R``, ``Left`` or ``Right`` at either end of a name; prefixes
+shared by most joints (``mixamorig:``, ``Bip01 ``, ``m_avg_``) and the numbers with which some
+programs make all names unique (``LeftArm_07``) are removed.
 """
 
 from __future__ import annotations
@@ -22,23 +23,23 @@ __all__ = ["canonical_names", "joint_meanings", "joints_by_place", "plain_names"
 
 _WORDS = {
     "pelvis": "pelvis hips",
-    "hip": "hip upleg upperleg thigh femur",
-    "knee": "knee leg lowleg lowerleg shin calf tibia",
+    "hip": "hip upleg upperleg thigh thighbend thighstretch femur",
+    "knee": "knee leg lowleg lowerleg legstretch shin calf tibia",
     "ankle": "ankle",
     "foot": "toebase toe toes ball",
     "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper chest chestlower "
     "chestupper upperchest torso thorax waist",
-    "neck": "neck lowerneck upperneck necklower neckupper",
+    "neck": "neck lowerneck upperneck necklower neckupper necktwist",
     "head": "head",
     "collar": "collar clavicle collarbone",
-    "shoulder": "arm upperarm uparm humerus shldr",
-    "elbow": "elbow forearm lowerarm lowarm radius",
+    "shoulder": "arm armstretch upperarm uparm humerus shldr shldrbend",
+    "elbow": "elbow forearm forearmbend forearmstretch lowerarm lowarm radius",
     "wrist": "wrist",
     "jaw": "jaw",
     "eye": "eye eyesmplhf eyeball",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_AMBIGUOUS = {"foot", "shoulder", "hand"}  # words for different joints in different conventions
+_AMBIGUOUS = {"foot", "shoulder", "hand", "leg"}  # words for different joints in different conventions
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
@@ -53,6 +54,8 @@ _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
 _FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_NUMBERED = re.compile(r"(.+)_(\d{1,6})")
+_FEW = 8  # number of joints below which numbers at the end are part of the names
 _SHARED = 0.6  # fraction of the joints above which a shared first word is a prefix
 _MOST = 2000  # maximum number of joints of a body
 _SPINES = ("spine1", "spine2", "spine3")
@@ -261,7 +264,7 @@ def _ancestors(joint: int, parents: Ints) -> list[int]:
 
 def _keys(names: Sequence[str]) -> list[_Key]:
     """Return side and word of every name, without the prefix that most names have."""
-    split = [_tokens(name) for name in names]
+    split = [_tokens(name) for name in _unnumbered(names)]
     while True:
         first = Counter(tokens[0] for tokens in split if tokens)
         token, count = first.most_common(1)[0] if first else ("", 0)
@@ -269,6 +272,15 @@ def _keys(names: Sequence[str]) -> list[_Key]:
         if not shared:
             return [_key(tokens) for tokens in split]
         split = [tokens[1:] if tokens[:1] == [token] else tokens for tokens in split]
+
+
+def _unnumbered(names: Sequence[str]) -> list[str]:
+    """Return names without a number at the end, if most have one and all numbers differ."""
+    found = [_NUMBERED.fullmatch(name) for name in names]
+    numbers = [int(each[2]) for each in found if each is not None]
+    if len(numbers) < max(_FEW, _SHARED * len(names)) or len(set(numbers)) < len(numbers):
+        return list(names)
+    return [name if each is None else each[1] for name, each in zip(names, found, strict=True)]
 
 
 def _tokens(name: str) -> list[str]:
@@ -285,7 +297,9 @@ def _key(tokens: list[str]) -> _Key:
     """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "spine"
-    tokens = [token for token in tokens if token != "c"]  # centre joints in VRM have the prefix c
+    # Centre joints have the prefix c in VRM, and the suffix x in Auto-Rig Pro.
+    tokens = [token for token in tokens if token != "c"]
+    tokens = tokens[:-1] if len(tokens) > 1 and tokens[-1] == "x" else tokens
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
@@ -324,6 +338,7 @@ def _unambiguous(keys: list[_Key]) -> list[_Key]:
         "shoulder": "collar" if has_arm and "collar" not in roles else "upperarm",
         "foot": "toebase" if "ankle" in roles else "ankle",
         "hand": "hand" if "wrist" in roles else "wrist",
+        "leg": "thigh" if "knee" in words and "hip" not in roles else "leg",
     }
     return [(side, renamed.get(word, word)) for side, word in keys]
 
