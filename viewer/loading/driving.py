@@ -40,6 +40,7 @@ if TYPE_CHECKING:
 __all__ = ["drive", "is_body"]
 
 _ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
+_HIP = "left_hip"
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
@@ -123,12 +124,14 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
 def is_body(figure: Figure) -> bool:
     """Return whether a figure can show captured bodies: it has the family's root and a mesh.
 
-    A VRM character cannot, even with the same joint names: its rest pose and origin differ.
+    A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
+    root of Unreal's characters has the family's name, too, but their legs do not.
     """
     skeleton = figure.skeleton
     if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
         return False
-    return skeleton.names[0] in _ROOTS
+    root, is_file = skeleton.names[0], figure.record is not None
+    return root in _ROOTS and not (is_file and root == _ROOTS[0] and _HIP not in skeleton.names)
 
 
 def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:

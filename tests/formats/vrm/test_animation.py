@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError
 from viewer.loading import MotionSettings
+from viewer.loading.driving import is_body
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.skinning import joint_matrices
 
@@ -101,6 +102,30 @@ def test_captured_body_drives_a_character(tmp_path: Path) -> None:
             way = places[names.index(pair[1])] - places[names.index(pair[0])]
             ways.append(way / np.linalg.norm(way))
         assert_allclose(ways[0], ways[1], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("prefix", "is_family"), [("{side}_{bone}", True), ("{bone}_{side}", False)]
+)
+def test_characters_with_the_root_of_a_body_model_are_driven(
+    tmp_path: Path, prefix: str, is_family: bool
+) -> None:
+    """Unreal's characters have the root pelvis, as bodies of the SMPL family have."""
+    sides, legs = ("left", "right") if is_family else ("l", "r"), ("hip", "knee", "ankle")
+    bones = legs if is_family else ("thigh", "calf", "foot")
+    file, nodes = File(), [{"name": "pelvis", "children": [1, 4], "translation": [0, 1, 0]}]
+    for first, side in zip((1, 4), sides, strict=True):
+        for index, bone in enumerate(bones):
+            name = prefix.format(side=side, bone=bone)
+            below = {"children": [first + index + 1]} if index < 2 else {}
+            place = [0.1 if first == 1 else -0.1, 0, 0] if index == 0 else [0, -0.4, 0]
+            nodes.append({"name": name, "translation": place, **below})
+    joints, weights = file.accessor([[0] * 4] * 3, "B"), file.accessor([[1, 0, 0, 0]] * 3)
+    mesh = file.mesh(JOINTS_0=joints, WEIGHTS_0=weights)
+    file.root["nodes"] = [*nodes, {"mesh": mesh, "skin": 0}]
+    file.root["skins"] = [{"joints": [*range(7)]}]
+    (actor,) = viewer.load(written(tmp_path, "a.glb", file)).actors
+    assert is_body(actor.figure) == is_family
 
 
 def test_model_option_accepts_a_character_file(tmp_path: Path) -> None:

@@ -39,7 +39,12 @@ _WORDS = {
     "eye": "eye eyesmplhf eyeball",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_AMBIGUOUS = {"foot", "shoulder", "hand", "leg"}  # words for different joints in different conventions
+_AMBIGUOUS = {
+    "foot",
+    "shoulder",
+    "hand",
+    "leg",
+}  # words for different joints in different conventions
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
