@@ -7,7 +7,7 @@ from dataclasses import field
 from typing import Any
 
 from viewer.data_classes import dataclass
-from viewer.rig.arrays import Ints
+from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["FileRecord", "StoredImage", "StoredTextures", "VrmRecord"]
 
@@ -99,6 +99,9 @@ class FileRecord:
         Names of these blend shapes in the file, which may repeat between parts or be empty.
     scene : mapping
         Name and application data of the scene, as parsed from JSON.
+    tangents : callable
+        Returns the tangents of the mesh in binding space, with the sign of the bitangent, (V, 4):
+        zeros for vertices without any; None if no vertex has one.
     unkept : callable
         Returns the members of the file that are not stored, such as ``images.extras``.
     vrm : VrmRecord or None
@@ -114,5 +117,6 @@ class FileRecord:
     part_shapes: tuple[Ints, ...] = ()
     target_names: tuple[tuple[str, ...], ...] = ()
     scene: Mapping[str, Any] = field(default_factory=dict)
+    tangents: Callable[[], Floats | None] = lambda: None
     unkept: Callable[[], tuple[str, ...]] = tuple
     vrm: VrmRecord | None = None

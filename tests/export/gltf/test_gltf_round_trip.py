@@ -8,8 +8,9 @@ import struct
 from dataclasses import fields, replace
 
 import numpy as np
+import pytest
 from export.seamed import UVS, seamed_mesh
-from formats.gltf.files import animated
+from formats.gltf.files import File, animated
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
@@ -121,7 +122,7 @@ def test_vertex_colours_are_not_tinted_by_the_colour_of_the_figure(tmp_path):
 def test_application_data_of_a_file_is_kept_or_reported(tmp_path):
     """Materials, scenes and animations keep theirs; members that are not read are listed."""
     file = animated()
-    file.root["nodes"] = [{"mesh": file.mesh(TANGENT=file.accessor([[1, 0, 0, 1]] * 3))}]
+    file.root["nodes"] = [{"mesh": file.mesh(_SPEED=file.accessor([1, 2, 3]))}]
     file.primitive.update(material=0, extras={"layer": 3})
     file.add("materials", {"name": "red", "extras": {"kind": "cloth"}})
     file.root["animations"][0]["extras"] = {"loop": True}
@@ -140,5 +141,35 @@ def test_application_data_of_a_file_is_kept_or_reported(tmp_path):
     (scene,) = root["scenes"]
     assert (scene["name"], scene["extras"]) == ("stage", [1])
     (note,) = [note for note in notes if note.key == "X003.file-members"]
-    lost = ("animations.ACME_events", "attributes.TANGENT", "primitives.extras")
+    lost = ("animations.ACME_events", "attributes._SPEED", "primitives.extras")
     assert sorted(note.values["names"]) == sorted(lost)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_tangents_are_kept(tmp_path, mirrored):
+    """Otherwise, normal maps made for them would look different in other programs."""
+    file, tangents = File(), [[1, 0, 0, 1], [0, 1, 0, -1], [0.6, 0.8, 0, 1]]
+    normals, rows = file.accessor([[0, 0, 1]] * 3), file.accessor(tangents)
+    mesh = file.mesh(NORMAL=normals, TANGENT=rows)
+    scale = [1, 1, -2] if mirrored else [2, 2, 2]
+    file.root["nodes"] = [{"mesh": mesh, "scale": scale}]
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    figure = viewer.load(tmp_path / "a.glb").actors[0].figure
+    export(Actor(figure), tmp_path / "b.glb")
+    back = read_nodes(Source.open(tmp_path / "b.glb")).meshes[0].primitives[0]
+    assert back.tangents is not None and back.normals is not None
+    # The mesh is written in the space of the scene, in which the mirrored normals point along -z.
+    assert_array_equal(back.normals, [[0, 0, -1 if mirrored else 1]] * 3)
+    rows = back.tangents()
+    assert_allclose(rows[:, :3], np.array(tangents)[:, :3], rtol=0, atol=1e-7)
+    # Directions of v, s n x t, which lie in the plane and are not mirrored.
+    found = rows[:, 3:] * np.cross(back.normals, rows[:, :3])
+    assert_allclose(found, [[0, 1, 0], [1, 0, 0], [-0.8, 0.6, 0]], rtol=0, atol=1e-7)
+
+
+def test_invalid_tangents_are_omitted(tmp_path):
+    file = File()
+    file.root["nodes"] = [{"mesh": file.mesh(TANGENT=file.accessor([[1, 0, 0, 1]] * 2))}]
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    export(Actor(viewer.load(tmp_path / "a.glb").actors[0].figure), tmp_path / "b.glb")
+    assert read_nodes(Source.open(tmp_path / "b.glb")).meshes[0].primitives[0].tangents is None

@@ -129,8 +129,9 @@ def _add_meshes(
     figure, meshes, document = body.figure, list[Placed](), encoding.document
     record = figure.record
     materials = Materials(document, figure.require_mesh(), color, record is not None)
+    tangents = _tangents(body)
     for part in parts_of(f"{figure.name} mesh", body.shape, body.influences):
-        mesh = add_mesh(encoding, materials, part, body.shape, body.influences)
+        mesh = add_mesh(encoding, materials, part, body.shape, body.influences, tangents)
         if part.joint >= 0:
             node = tree.joints[part.joint]
             document.root["nodes"][node]["mesh"] = mesh
@@ -141,6 +142,15 @@ def _add_meshes(
             node = document.add("nodes", {**item, "mesh": mesh})
         meshes.append(Placed(node, part, encoding.decoding if part.joint < 0 else np.eye(4)))
     return meshes, materials.written
+
+
+def _tangents(body: Body) -> Floats | None:
+    """Return the tangents of the file, if the figure still has its vertices."""
+    record, count = body.figure.record, body.figure.require_mesh().n_vertices
+    if record is None or body.shape.baked is not None:
+        return None
+    found = record.tangents()
+    return found if found is not None and len(found) == count else None
 
 
 def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Placed]) -> list[int]:

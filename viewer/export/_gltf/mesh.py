@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
-from viewer.export._gltf.document import INDICES, Document, text_of
+from viewer.export._gltf.document import INDICES, VERTICES, Document, text_of
 from viewer.export._gltf.encoding import Encoding
 from viewer.export._gltf.materials import Materials
 from viewer.export._gltf.parts import Part
@@ -17,7 +17,7 @@ from viewer.export._gltf.skin import Influences, influence_sets
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.geometry.vectors import unit
+from viewer.rig.geometry.vectors import moved_tangents, unit
 from viewer.rig.mesh import Mesh, vertex_normals
 
 _POINTS = 0  # mode of a primitive without triangles
@@ -31,6 +31,7 @@ def add_mesh(
     part: Part,
     shape: Shape,
     influences: Influences | None,
+    tangents: Floats | None = None,
 ) -> int:
     """Add a part of a figure's mesh; return its index.
 
@@ -39,10 +40,14 @@ def add_mesh(
     ``part``: part with at least one vertex.
     ``shape``: shape of the figure.
     ``influences``: influences of the mesh; None if it is not skinned.
+    ``tangents`` (V, 4): see ``FileRecord.tangents``.
     """
     mesh, surface = shape.figure.require_mesh(), _surface(part, shape)
     document = encoding.document
     attributes = _attributes(encoding, mesh, part, surface)
+    own = None if tangents is None else moved_tangents(tangents[part.sources], surface.linear)
+    if own is not None and own[:, 3].all() and own[:, :3].any(axis=1).all():
+        attributes["TANGENT"] = document.array(own, "VEC4", VERTICES)
     if part.joint < 0 and influences is not None:
         sets = [*influence_sets(influences, part.sources)]
         for number, (joints, weights) in enumerate(encoding.influences(sets)):
@@ -57,8 +62,8 @@ def add_mesh(
         shared["targets"] = _targets(encoding, part, surface, shapes, rows)
         item["weights"] = shape.weights[0, part.targets].tolist()
         if any(part.target_names):
-            own = extras if isinstance(extras, dict) else {}
-            extras = {**own, "targetNames": [text_of(name) for name in part.target_names]}
+            kept = extras if isinstance(extras, dict) else {}
+            extras = {**kept, "targetNames": [text_of(name) for name in part.target_names]}
     if extras is not None:
         item["extras"] = extras
     item["primitives"] = _primitives(document, materials, part, surface, shared)

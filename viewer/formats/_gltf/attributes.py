@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import field
 from typing import Any
 
@@ -11,11 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.errors import FormatError
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["Attributes", "read_colors", "read_normals", "read_positions", "read_uvs"]
+__all__ = [
+    "Attributes",
+    "read_colors",
+    "read_normals",
+    "read_positions",
+    "read_uvs",
+    "tangents_of",
+]
 
 _MOST_UVS = 8  # maximum number of texture coordinate sets
 _NUMBERED = re.compile(r"([A-Z]+)_(0|[1-9][0-9]{0,3})")
@@ -148,6 +156,24 @@ def read_normals(attributes: Attributes) -> Floats | None:
     """Return the normals: (V, 3); None if there are none."""
     normals = attributes.floats("NORMAL", "VEC3")
     return None if normals is None else attributes.finite("NORMAL", normals)
+
+
+def tangents_of(attributes: Attributes) -> Callable[[], Floats | None] | None:
+    """Return a function that reads the tangents, (V, 4); None if there are none.
+
+    They are not drawn, but written back. The function returns None if they are invalid.
+    """
+    if not attributes.element.has("TANGENT"):
+        return None
+
+    def read() -> Floats | None:
+        try:
+            rows = attributes.floats("TANGENT", "VEC4")
+        except FormatError:  # lint reports it
+            return None
+        return None if rows is None or _not_finite(rows).any() else rows
+
+    return read
 
 
 def read_uvs(attributes: Attributes) -> tuple[Floats, ...]:

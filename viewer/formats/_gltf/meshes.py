@@ -14,6 +14,7 @@ from viewer.formats._gltf.attributes import (
     read_normals,
     read_positions,
     read_uvs,
+    tangents_of,
 )
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.draco import decoded_primitive
@@ -140,6 +141,7 @@ def _read(attributes: Attributes, primitive: Element, triangles: Ints) -> Primit
         positions=positions,
         triangles=triangles,
         normals=read_normals(attributes),
+        tangents=tangents_of(attributes),
         uvs=read_uvs(attributes),
         colors=read_colors(attributes),
         joints=joints,

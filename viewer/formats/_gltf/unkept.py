@@ -13,7 +13,7 @@ __all__ = ["unkept_members"]
 _EXTRAS, _EXTENSIONS = "extras", "extensions"
 # Lists whose items have application data that is written back.
 _KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
-_READ = re.compile(r"POSITION|NORMAL|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
+_READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
 
 
 def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
@@ -25,10 +25,10 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
         The document, as parsed from JSON.
 
     >>> images = [{"extras": 1}, {"extras": 2}]
-    >>> attributes = {"POSITION": 0, "TANGENT": 1}
+    >>> attributes = {"POSITION": 0, "_SPEED": 1}
     >>> meshes = [{"extras": 3, "primitives": [{"attributes": attributes}]}]
     >>> unkept_members({"images": images, "meshes": meshes, "extras": 4})
-    ('images.extras', 'attributes.TANGENT')
+    ('images.extras', 'attributes._SPEED')
     """
     found: dict[str, None] = {}
     for kind, listed in root.items():

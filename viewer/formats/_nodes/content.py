@@ -108,6 +108,9 @@ class Primitive:
         Offsets of the normals; None if the file has none.
     pointer : str
         JSON pointer to it; empty for files without JSON.
+    tangents : callable or None
+        Returns the directions of u in mesh space and the signs of the directions of v, (V, 4), or
+        None if they are invalid.
     """
 
     positions: Floats
@@ -121,6 +124,7 @@ class Primitive:
     targets: MorphTargets | None = None
     normal_targets: MorphTargets | None = None
     pointer: str = ""
+    tangents: Callable[[], Floats | None] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._nodes.joints import Joints
-from viewer.formats._nodes.surfaces import Piece, used_materials
+from viewer.formats._nodes.surfaces import Piece, tangents_of, used_materials
 from viewer.rig.arrays import Ints
 from viewer.rig.file_record import FileRecord, VrmRecord
 
@@ -56,6 +57,7 @@ def record_of(
         part_shapes=tuple(columns.get(node, none) for node in nodes),
         target_names=tuple(mesh.target_names for mesh in meshes),
         scene=file.scene,
+        tangents=partial(tangents_of, pieces),
         unkept=file.unkept,
         vrm=_vrm_record(file, joints, nodes, pieces),
     )

@@ -12,10 +12,19 @@ from viewer.formats._nodes.content import NodeFile, Primitive
 from viewer.formats._nodes.flat_normals import flat_shaded
 from viewer.formats._nodes.influences import Influences, divided, of_rows, on_joint
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.vectors import moved_tangents
 from viewer.rig.mesh import Mesh, PartView
 from viewer.rig.skin import Skin
 
-__all__ = ["Piece", "mesh_of", "normal_matrix", "normal_scales", "pieces_of", "skin_of"]
+__all__ = [
+    "Piece",
+    "mesh_of",
+    "normal_matrix",
+    "normal_scales",
+    "pieces_of",
+    "skin_of",
+    "tangents_of",
+]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -186,6 +195,24 @@ def normal_scales(piece: Piece) -> Floats:
     lengths = np.linalg.norm(piece.normals, axis=1)
     scales: Floats = np.where(moved > 0.0, lengths / np.where(moved > 0.0, moved, 1.0), 1.0)
     return scales[:, None]
+
+
+def tangents_of(pieces: list[Piece]) -> Floats | None:
+    """Return the tangents in binding space, t' = A t; see ``FileRecord.tangents``."""
+    rows = [_tangents(piece) for piece in pieces]
+    if all(each is None for each in rows):
+        return None
+    return np.concatenate([
+        np.zeros((piece.n_vertices, 4)) if each is None else each
+        for piece, each in zip(pieces, rows, strict=True)
+    ])  # fmt: skip
+
+
+def _tangents(piece: Piece) -> Floats | None:
+    read = piece.primitive.tangents
+    # Tangents refer to the normals of the file.
+    stored = None if read is None or piece.shading != "file" else read()
+    return None if stored is None else moved_tangents(stored[piece.sources], piece.baked[:3, :3])
 
 
 def _uv_sets(pieces: list[Piece]) -> tuple[Floats, ...]:
