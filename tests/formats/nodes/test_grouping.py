@@ -166,3 +166,20 @@ def test_deep_chain_of_nodes_is_grouped_in_linear_time():
     seconds(1000)
     # Quadratic time would be 256 times as long.
     assert seconds(32000) < 100.0 * max(seconds(2000), 1e-3)
+
+
+def test_animations_of_other_nodes_are_reported():
+    """A camera belongs to no figure; the transform of a skinned mesh has no effect."""
+    tree = tree_of(
+        {"name": "root"},
+        {"name": "hip", "parent": 0},
+        {"name": "skin", "parent": 0, "mesh": 0, "skin": 0},
+        {"name": "eye", "parent": 0, "camera": 0},
+    )
+    meshes, cameras = (mesh(triangle(1, 1)),), (NodeCamera("plan", 1.0),)
+    sweep = NodeAnimation("sweep", 0.0, 1.0, frozenset({1, 2, 3}), tuple)
+    file = file_of(tree, meshes=meshes, skins=(skin([1], 3),), cameras=cameras)
+    notes = source()
+    figure_group(replace(file, animations=(sweep,)), notes)
+    (note,) = notes.diagnostics.warnings
+    assert (note.key, note.values["names"]) == ("F007.animated-others", ["eye"])

@@ -7,6 +7,8 @@ MESSAGES = {
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",
     "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
+    "F007.animated-others": "animations of {n:#node} that {n:?belongs|belong} to no figure are "
+    "omitted: {names:list}",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
     "F007.skinning-method": "skins {names:list} require a different skinning method: select it "
     "with --method {method}",

@@ -50,14 +50,15 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     found = [_figure(file, members, readers, source) for members in groups]
-    _note_normals([piece for _, pieces in found for piece in pieces], source)
-    _note_weights([piece for _, pieces in found for piece in pieces], source)
+    _note_normals([piece for _, pieces, _ in found for piece in pieces], source)
+    _note_weights([piece for _, pieces, _ in found for piece in pieces], source)
+    _note_others(file, {node for _, _, nodes in found for node in nodes}, source)
     order = scene_order(file) if file.cameras else []
     _note_methods(file, groups, source)
     views, left_out = views_of(file.tree, order, file.cameras)
     if left_out:
         source.warn("F007.orthographic", names=left_out)
-    return FigureGroup(file.name, tuple(figure for figure, _ in found), views)
+    return FigureGroup(file.name, tuple(figure for figure, _, _ in found), views)
 
 
 def _is_undrawn(file: NodeFile, source: Source) -> bool:
@@ -68,8 +69,8 @@ def _is_undrawn(file: NodeFile, source: Source) -> bool:
 
 def _figure(
     file: NodeFile, members: Members, readers: list[Reader], source: Source
-) -> tuple[Figure, list[Piece]]:
-    """Return one figure, and the primitives of which it consists."""
+) -> tuple[Figure, list[Piece], set[int]]:
+    """Return one figure, the primitives of which it consists, and the nodes that move it."""
     joints = make_joints(file.tree, members.nodes)
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
@@ -88,7 +89,7 @@ def _figure(
         record=record_of(file, joints, members.meshes, columns, pieces),
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)
-    return figure, pieces
+    return figure, pieces, joints.own.keys() | columns.keys()
 
 
 def _is_skinned(file: NodeFile, node: int) -> bool:
@@ -113,6 +114,18 @@ def _note_normals(pieces: list[Piece], source: Source) -> None:
     smooth = [piece for piece in pieces if piece.shading == "smooth"]
     if smooth:
         source.warn("F007.smooth-normals", n=len(smooth))
+
+
+def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
+    """Report animated nodes that belong to no figure, such as those of cameras.
+
+    The transform of a node with a skinned mesh has no effect.
+    """
+    moved = set[int]().union(*(each.nodes for each in file.animations))
+    others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
+    if others:
+        names = [file.tree.names[node] or f"node {node}" for node in others]
+        source.warn("F007.animated-others", n=len(names), names=names)
 
 
 def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
