@@ -85,7 +85,7 @@ def test_cameras_are_read_back(tmp_path: Path) -> None:
     intrinsic = np.array([[900.0, 0, 400], [0, 900, 300], [0, 0, 1]])
     turn = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     view = CameraView("front", intrinsic, turn, np.array([0.1, 0.2, 5.0]), (800, 600))
-    lens = replace(view, name="lens", distortion=np.array([0.1]))
+    lens = replace(view, name="lens", distortion=np.array([0.1]), near=0.25, far=40.0)
     path = tmp_path / "seen.glb"
     notes = export_figures([Actor(two_parts())], path, None, None, Scene([], views=(view, lens)))
     (lost,) = [note for note in notes if note.key == "X003.camera-lenses"]
@@ -93,7 +93,8 @@ def test_cameras_are_read_back(tmp_path: Path) -> None:
     camera = Evaluator(path).root["cameras"][0]["perspective"]
     assert camera["yfov"] == pytest.approx(2.0 * math.atan(300.0 / 900.0), abs=1e-12)
     assert camera["aspectRatio"] == pytest.approx(4.0 / 3.0, abs=1e-12)
-    front, _ = viewer.load(path).views
+    front, back = viewer.load(path).views
+    assert (front.near, front.far, back.near, back.far) == (0.01, None, 0.25, 40.0)
     assert front.name == "front"
     assert_allclose(front.rotation, turn, atol=1e-12)
     assert_allclose(front.translation, view.translation, atol=1e-12)

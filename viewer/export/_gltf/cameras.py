@@ -37,7 +37,7 @@ def add_cameras(
         width, height = _size(view)
         angle = 2.0 * math.atan(0.5 * height / focal_y)
         aspect = (width / focal_x) / (height / focal_y)
-        lens = {"yfov": angle, "aspectRatio": aspect, "znear": _NEAR}
+        lens = {"yfov": angle, "aspectRatio": aspect, **_planes(view, to_file)}
         index = document.add("cameras", {**camera, "type": "perspective", "perspective": lens})
         center = to_file @ np.append(-view.rotation.T @ view.translation, 1.0)
         turned = nearest_rotations(to_file[:3, :3])[0] @ view.rotation.T @ _FLIP
@@ -55,6 +55,13 @@ def add_cameras(
         for key, names in found.items()
         if names
     ]
+
+
+def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
+    """Return the distances of the clipping planes."""
+    scale = float(np.cbrt(abs(np.linalg.det(to_file[:3, :3]))))
+    near = _NEAR if view.near is None else scale * view.near
+    return {"znear": near} | ({} if view.far is None else {"zfar": scale * view.far})
 
 
 def _size(view: CameraView) -> tuple[float, float]:

@@ -42,5 +42,12 @@ def _camera(camera: Element) -> NodeCamera:
     angle = lens.number("yfov")
     if not 0.0 < angle < math.pi:
         raise lens.wrong("yfov", "an angle between 0 and pi")
-    aspect = lens.number("aspectRatio") if lens.has("aspectRatio") else None
-    return NodeCamera(name, angle, aspect if aspect is None or aspect > 0.0 else None)
+    aspect, near, far = (_positive(lens, each) for each in ("aspectRatio", "znear", "zfar"))
+    far = None if near is not None and far is not None and far <= near else far
+    return NodeCamera(name, angle, aspect, near=near, far=far)
+
+
+def _positive(lens: Element, name: str) -> float | None:
+    """Return a number above 0; None if it is missing or not above 0."""
+    found = lens.number(name) if lens.has(name) else 0.0
+    return found if found > 0.0 else None

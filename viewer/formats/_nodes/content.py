@@ -245,12 +245,16 @@ class NodeCamera:
         Width divided by height, if the file specifies it.
     height : float
         Height of an orthographic camera's view, file units.
+    near, far : float or None
+        Distances of the clipping planes, file units; None if there is none.
     """
 
     name: str
     vertical_angle: float | None
     aspect: float | None = None
     height: float = 0.0
+    near: float | None = None
+    far: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

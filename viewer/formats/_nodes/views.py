@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -56,7 +57,8 @@ def views_of(
             left_out.append(name)
         else:
             world = worlds[joints.carrier[node]]
-            views.append(_view(name, world, camera.vertical_angle, camera.aspect or _ASPECT))
+            view = _view(name, world, camera.vertical_angle, camera.aspect or _ASPECT)
+            views.append(replace(view, near=camera.near, far=camera.far))
     return tuple(views), left_out
 
 

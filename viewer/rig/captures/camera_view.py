@@ -67,6 +67,8 @@ class CameraView:
         OpenCV's coefficients k1 k2 p1 p2 k3; zeros mean none.
     motion : CameraMotion or None
         Its placement over time if it moves; the fields above then apply to the first frame.
+    near, far : float or None
+        Distances of the clipping planes that its file states, scene units. They are not used.
     """
 
     name: str
@@ -76,6 +78,8 @@ class CameraView:
     size: tuple[int, int] | None = None
     distortion: Floats = ()  # type: ignore[assignment]  # converted to an array below
     motion: CameraMotion | None = None
+    near: float | None = None
+    far: float | None = None
 
     def __post_init__(self) -> None:
         shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}
