@@ -52,6 +52,12 @@ def unknown_bone() -> File:
     return file
 
 
+def skinned_child() -> File:
+    file = skinned()
+    file.add("nodes", {"children": [0]})
+    return file
+
+
 PLANTED = {
     "G001": (without_asset, ""),
     "G002": (misaligned, "/accessors/0"),
@@ -59,5 +65,6 @@ PLANTED = {
     "G004": (joint_twice, "/skins/0/joints"),
     "G005": (keys_at_one_time, "/animations/0/samplers"),
     "G006": (unknown_bone, "/extensions/VRMC_vrm/humanoid/humanBones"),
+    "G007": (skinned_child, "/nodes/0"),
 }
 """A function that creates the document, and the JSON pointer to its error."""

@@ -116,6 +116,8 @@ def test_old_materials_add_what_the_core_material_omits(tmp_path: Path) -> None:
     found = _old(tmp_path, {"alphaMode": "OPAQUE", "doubleSided": False}, **told)
     assert (found.alpha_mode, found.double_sided) == ("opaque", False)
     assert _old(tmp_path, {}, keywordMap={"_ALPHABLEND_ON": True}).alpha_mode == "blend"
+    for kind, mode in (("Cutout", "mask"), ("TransparentZWrite", "blend"), ("Texture", "opaque")):
+        assert _old(tmp_path, {}, shader=f"VRM/Unlit{kind}").alpha_mode == mode
 
 
 def test_old_colours_replace_those_of_the_core_material(tmp_path: Path) -> None:

@@ -121,6 +121,21 @@ def test_trunk_and_feet_keep_their_rest_shape() -> None:
         )
 
 
+def test_eyes_and_jaw_do_not_tilt_the_head() -> None:
+    """One person has the head joint at the neck, the other one between the ears."""
+    high = {"LeftEye": ("Head", (3, 172, 4)), "RightEye": ("Head", (-3, 172, 4))}
+    far = {
+        "left_eye": ("head", (0.03, 1.5, 0.1)),
+        "right_eye": ("head", (-0.03, 1.5, 0.1)),
+        "jaw": ("head", (0.0, 1.45, 0.05)),
+    }
+    source, figure = moving(figure_of(HIK | high, "mocap")), figure_of(BODY | far, "body")
+    clip, _ = retarget(source, figure)
+    head = figure.skeleton.names.index("head")
+    # The trunk of both people is upright.
+    np.testing.assert_allclose(np.abs(clip.rotations[0, head, 3]), 1.0, atol=EXACT)
+
+
 def test_result_does_not_depend_on_the_joint_axes_of_the_figure() -> None:
     source, plain = moving(figure_of(HIK, "mocap")), figure_of(BODY, "body")
     rng = np.random.default_rng(1)

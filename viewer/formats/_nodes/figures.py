@@ -121,8 +121,8 @@ def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
 
     The transform of a node with a skinned mesh has no effect.
     """
-    moved = dict.fromkeys(node for each in file.animations for node in sorted(each.nodes))
-    others = [node for node in moved if node not in shown and file.tree.skins[node] < 0]
+    moved = set[int]().union(*(each.nodes for each in file.animations))
+    others = [node for node in sorted(moved - shown) if file.tree.skins[node] < 0]
     if others:
         names = [file.tree.names[node] or f"node {node}" for node in others]
         source.warn("F007.animated-others", n=len(names), names=names)

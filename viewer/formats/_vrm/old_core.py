@@ -6,6 +6,7 @@
                        _MainTex                                 placement of all textures
     textureProperties  _MainTex, _BumpMap, _EmissionMap         textures
     keywordMap         _ALPHATEST_ON, _ALPHABLEND_ON            alphaMode, if the core has none
+    shader             VRM/UnlitCutout, VRM/UnlitTransparent…   alphaMode, if the core has none
     floatProperties    _Cutoff, _CullMode, _BumpScale           alphaCutoff, doubleSided, scale of
                                                                 normals, if the core has none
 """
@@ -104,9 +105,10 @@ def _scale(told: Any, name: str) -> dict[str, float]:
 def _opacity(told: Any) -> dict[str, Any]:
     """Return opacity and culling."""
     found: dict[str, Any] = {}
-    if part(told, "keywordMap", "_ALPHABLEND_ON") is True:
+    shader, keywords = str(part(told, "shader")), part(told, "keywordMap")
+    if part(keywords, "_ALPHABLEND_ON") is True or "Transparent" in shader:
         found["alphaMode"] = "BLEND"
-    elif part(told, "keywordMap", "_ALPHATEST_ON") is True:
+    elif part(keywords, "_ALPHATEST_ON") is True or "Cutout" in shader:
         found["alphaMode"] = "MASK"
         cutoff = value_of(part(told, "floatProperties", "_Cutoff"), 0.5)
         found |= {} if cutoff is None else {"alphaCutoff": cutoff}

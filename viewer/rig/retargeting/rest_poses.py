@@ -29,6 +29,7 @@ _UPRIGHT = np.cos(np.radians(25.0))
 _SHORT = 1e-6
 _TRUNK = ("pelvis", "spine", "neck", "head", "jaw", "collar", "ankle", "foot", "eye")
 _SPINE = ("spine", "neck", "head")
+_FACE = ("eye", "jaw")  # joints that do not indicate the direction of the head
 _FINGERS = ("index", "middle", "pinky", "ring", "thumb")
 
 
@@ -128,6 +129,7 @@ def alignment(source: RestPose, target: RestPose, matches: Matches, parents: Int
     for joint in np.flatnonzero(matches.partners >= 0):
         reference = stands if above[joint] < 0 else result[above[joint]]
         children = [int(child) for child in np.flatnonzero(above == joint)]
+        children = [child for child in children if not matches.names[child].endswith(_FACE)]
         mine, theirs = _bones(source, target, matches, int(joint), children)
         # Joints attached to the side of a spine do not indicate its direction.
         spine = np.array([matches.names[child].startswith(_SPINE) for child in children])
