@@ -11,7 +11,7 @@ from viewer.diagnostics import Phrase, frame_range
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._track import Indices, Track
 from viewer.lint._tracks import frame_numbers, key_times, track_of
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import SHORTEST, Clip
 from viewer.rig.motion.clip_table import evaluate_all
@@ -22,6 +22,8 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["check", "missing_frames"]
 
+_LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
+_SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
 _SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
@@ -124,8 +126,8 @@ def _outside(subject: Subject, clip: Clip, skeleton: Skeleton) -> list[Finding]:
 
 
 def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
-    limit = subject.options.max_speed
-    limit = _SIZES * track.size if limit is None else limit * track.scale
+    given = subject.options.max_speed
+    limit = _SIZES * track.size if given is None else given * track.scale
     if limit == 0.0:  # a single joint without a mesh has no size
         return []
     speeds = np.zeros((len(track.times), skeleton.n_joints))
@@ -133,6 +135,12 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
     speeds[1:] = steps / np.diff(track.times)[:, None]
     speeds[track.stepped] = 0.0
     fast = _too_fast(track, speeds, limit)
+    if fast is None and given is None:
+        limit = _LEAPS * track.size
+        flat = [axis for axis in range(3) if axis != (2 if subject.up == "z" else 1)]
+        steps = np.linalg.norm(np.diff(track.positions[..., flat], axis=0), axis=2)
+        speeds[1:] = np.where(track.stepped[1:], 0.0, steps / np.diff(track.times)[:, None])
+        fast = _too_fast(track, _leaps(speeds, skeleton.parents < 0), limit)
     if fast is None:
         return []
     return [
@@ -152,6 +160,19 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
             at=("frames", fast.worst),
         )
     ]
+
+
+def _leaps(speeds: Floats, is_root: Bools) -> Floats:
+    """Return the speeds of roots that are much slower in the two steps before and after: (F, J).
+
+    Two steps, because files with repeated frames stand still in every second one.
+    """
+    steps = speeds[1:]
+    around = np.pad(steps, ((2, 2), (0, 0)))
+    count = len(steps)
+    others = np.max([around[k : k + count] for k in (0, 1, 3, 4)], axis=0)
+    alone = (others < _SLOWLY * steps) & is_root
+    return np.pad(np.where(alone, steps, 0.0), ((1, 0), (0, 0)))
 
 
 def _fast_rotations(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
