@@ -63,26 +63,33 @@ def test_straight_leg_bends_its_knee_forwards() -> None:
 
 
 @pytest.mark.parametrize("angle", [-0.05, -0.01, 0.0, 0.01, 0.05])
-def test_nearly_straight_leg_bends_about_the_axis_of_its_knee(angle) -> None:
+def test_knee_of_a_nearly_straight_leg_points_forwards(angle) -> None:
     # The knee is bent sideways by up to 3 degrees, as in noisy recordings, once to each side.
     hip, knee = np.array([[0.0, 0.8, 0.0]]), np.array([[0.0, 0.4, 0.0]])
     ankle = knee + 0.4 * np.array([[np.sin(angle), -np.cos(angle), 0.0]])
     thigh, _ = bend(hip, knee, ankle, np.array([[0.0, 0.2, 0.0]]), SIDE)
     moved = hip + (knee - hip) @ quaternion_to_matrix(thigh)[0].T
-    # The triangle has two sides of 0.4 and a base of 0.6; the sideways part stays as small.
-    assert_allclose(moved[0, 1:], [0.5, np.sqrt(0.4**2 - 0.3**2)], atol=1e-3)
-    assert abs(moved[0, 0]) < 0.4 * abs(angle) + 1e-12
+    # The triangle has two sides of 0.4 and a base of 0.6. The knee is 0.4 sin(angle / 2) aside of
+    # the straight line, and its direction is moved forwards by a tenth of the leg's length, 0.08,
+    # times the sine of the angle between the leg and the knee's axis.
+    offset = np.array([-0.4 * np.sin(angle / 2.0), 0.0, 0.08 * np.cos(angle / 2.0)])
+    height = np.sqrt(0.4**2 - 0.3**2)
+    expected = [0.0, 0.5, 0.0] + height * offset / np.linalg.norm(offset)
+    assert_allclose(moved[0], expected, atol=1e-9)
 
 
-def test_hinge_is_found_from_strongly_bent_knees() -> None:
-    # The knee bends by 1 rad about +x in half of the frames and by 0.06 rad about -y in the others.
-    # Each plane counts with the square of the bend's sine: 0.708 and 0.0036.
+def test_axis_of_a_knee_is_found_from_strong_bends() -> None:
+    # The knee bends by 1 rad about +x in half of the frames and by 0.06 rad about -z in the others;
+    # the direction across is z. The weights are the fourth powers of sines: 0.5014 and 1.3e-5 in
+    # 4 frames each, and 0.004487, that of 15 degrees, in all 8.
     knees = np.tile([0.0, -0.4, 0.0], (8, 1))
     ankles = knees + 0.4 * np.array([[0.0, -np.cos(1.0), -np.sin(1.0)]])
-    ankles[4:] = knees[4:] + 0.4 * np.array([np.sin(0.06), -np.cos(0.06), 0.0])
+    ankles[4:] = knees[4:] + 0.4 * np.array([-np.sin(0.06), -np.cos(0.06), 0.0])
     thighs = np.broadcast_to(np.eye(3), (8, 3, 3))
-    found = hinges(thighs, (np.zeros((8, 3)), knees, ankles), np.tile(SIDE, (8, 1)))
-    assert_allclose(found, np.tile([1.0, 0.0, np.tan(0.0036 / 0.708)], (8, 1)), atol=1e-3)
+    found = hinges(thighs, (np.zeros((8, 3)), knees, ankles), np.tile([0.0, 0.0, 3.0], (8, 1)))
+    ratio = (8 * 0.004487 - 4 * 1.3e-5) / (4 * 0.5014)
+    wanted = np.array([1.0, 0.0, ratio]) / np.hypot(1.0, ratio)
+    assert_allclose(found, np.tile(wanted, (8, 1)), atol=1e-5)
 
 
 def test_contacts_start_and_end_with_hysteresis_of_height_and_speed() -> None:

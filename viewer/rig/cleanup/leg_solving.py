@@ -11,10 +11,11 @@ from viewer.rig.cleanup.easing import EASE
 from viewer.rig.cleanup.leg_ik import Leg, bend, reach
 from viewer.rig.geometry.quaternion import conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.geometry.vectors import unit
 
 __all__ = ["hinges", "leg_rotations", "lowering"]
 
-_FLEXED = np.sin(np.radians(5.0))  # sine of the bend below which a straight knee hides its axis
+_FLEXED = np.sin(np.radians(15.0))  # sine of the bend that shows the axis of a knee
 
 
 def leg_rotations(
@@ -86,7 +87,8 @@ def _reach_for(
 def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats) -> Floats:
     """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
 
-    This is the mean normal of the leg's plane, thigh x shin; strongly bent knees count most.
+    This is the mean normal of the leg's plane, thigh x shin, weighted by the fourth power of the
+    sine of the bend; ``across`` has the weight of a slight bend.
 
     Parameters
     ----------
@@ -95,17 +97,15 @@ def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats
     points : ((N, 3), (N, 3), (N, 3))
         World positions of hip, knee and ankle.
     across : (N, 3)
-        Directions from right to left: the axis of a knee that never bends.
+        Directions from right to left: the axis of a knee that hardly bends.
     """
     hips, knees, ankles = points
     upper, lower = knees - hips, ankles - knees
     bones = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower, axis=1)
     normals = np.cross(upper, lower) / np.maximum(bones, 1e-30)[:, None]
     sines = np.linalg.norm(normals, axis=1, keepdims=True)
-    found = np.einsum("nba,nb->a", thighs, sines * normals)
-    if float(np.linalg.norm(found)) < _FLEXED**2 * len(thighs):
-        found = np.einsum("nba,nb->a", thighs, across)
-    return thighs @ (found / max(float(np.linalg.norm(found)), 1e-30))
+    found = np.einsum("nba,nb->a", thighs, sines**3 * normals + _FLEXED**4 * unit(across))
+    return thighs @ unit(found)
 
 
 def _unscaled(linear: Floats) -> Floats:

@@ -76,7 +76,7 @@ def foot_shifts(
     shifts = _shifts(plan, every, still)
     sway = _sway(plan, shifts, 1.0 - bent, still) + _shake(plan, shifts)
     sway += _shake(plan, [shift - sway for shift in _shifts(plan, every, sway)])
-    return _shifts(plan, every, sway), sway
+    return _shifts(plan, every, sway, _LIFTS), sway
 
 
 def _wanted(plan: FootPlan, foot: int, points: tuple[Floats, Floats], heights: Floats) -> _Wanted:
@@ -112,8 +112,11 @@ def _level(low: Floats, contact: Contact) -> Floats:
     return np.interp(np.arange(len(low)), held, low[held])
 
 
-def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
-    """Return the translations of the feet, which approach ``base`` away from contacts: (N, 3)."""
+def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats, n_lifts: int = 0) -> list[Floats]:
+    """Return the translations of the feet, which approach ``base`` away from contacts: (N, 3).
+
+    ``n_lifts`` is the number of passes that lift sinking feet.
+    """
     up, count = plan.up, len(every)
     usual = base @ up
     flat = base - usual[:, None] * up
@@ -133,7 +136,7 @@ def _shifts(plan: FootPlan, every: list[_Wanted], base: Floats) -> list[Floats]:
         rise = np.where(stands, held, found[row, :, :1])
         least = np.where(stands, -np.inf, -wanted.above[:, None] - usual[:, None])
         goals, force = targets[row : row + 1, :, :1].copy(), _strength(weights[row : row + 1])
-        for _ in range(_LIFTS):
+        for _ in range(n_lifts):
             missing = (least - rise)[:, 0]
             sinks = missing > 0.0
             if not sinks.any():
