@@ -23,7 +23,7 @@ from viewer.phrases import printable
 
 _KILLED = ("crashed", "timeout", "memory")  # the worker could not remove its temporary files
 
-__all__ = ["KeyedJob", "Settings", "related_reports", "run_batch", "shard_of"]
+__all__ = ["KeyedJob", "Settings", "run_batch", "shard_of"]
 
 
 @dataclass(frozen=True)
@@ -116,14 +116,6 @@ def shard_of(items: Sequence[Item], text: str) -> list[Item]:
     return list(items[int(first) :: int(count)])
 
 
-def related_reports(path: Path) -> list[Path]:
-    """Return an existing report and the reports of other shards next to it."""
-    stem = glob.escape(path.stem.partition(".")[0])
-    names = f"{stem}.*-of-*.jsonl"
-    shards = sorted(path.parent.glob(names)) if path.parent.is_dir() else []
-    return [one for one in dict.fromkeys([path, *shards]) if one.is_file()]
-
-
 def run_batch(
     items: Sequence[Item],
     job: Job,
@@ -207,12 +199,20 @@ def _earlier(settings: Settings) -> dict[str, Result]:
                 "--force starts it again)"
             )
         return {}
-    found = [one for path in related_reports(settings.report) for one in read_results(path)]
+    found = [one for path in _related_reports(settings.report) for one in read_results(path)]
     # A later result of another shard or with other options has replaced the same output.
     last = {one.item.output or one.item.name: one for one in sorted(found, key=_time)}
     return {
         one.key: one for one in last.values() if one.status == "done" and one.key and _is_there(one)
     }
+
+
+def _related_reports(path: Path) -> list[Path]:
+    """Return an existing report and the reports of other shards next to it."""
+    stem = glob.escape(path.stem.partition(".")[0])
+    names = f"{stem}.*-of-*.jsonl"
+    shards = sorted(path.parent.glob(names)) if path.parent.is_dir() else []
+    return [one for one in dict.fromkeys([path, *shards]) if one.is_file()]
 
 
 def _time(result: Result) -> float:

@@ -27,7 +27,7 @@ from viewer.media.unfinished import temporary_prefix
 from viewer.version import VERSION
 
 pytest.importorskip("distributed")
-from viewer.batching.engines import dask_cluster
+from viewer.batching.engines import _worker_checks, dask_cluster
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
@@ -188,6 +188,7 @@ def test_workers_without_the_package_or_with_another_version_are_refused(
         Missing()
     )
     monkeypatch.setattr(dask_cluster, "VERSION", "99.1")
+    monkeypatch.setattr(_worker_checks, "VERSION", "99.1")
     assert f"has viewer {VERSION}, expected 99.1: install the same version" in refusal(Job())
 
 

@@ -15,7 +15,7 @@ from typing import Protocol
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 
-__all__ = ["ENGINES", "Engine", "EngineKind", "Job", "Limits", "load_engine"]
+__all__ = ["ENGINES", "Engine", "Job", "Limits", "load_engine"]
 
 IN_FLIGHT = 4
 """Number of items assigned to each worker, including the one that runs."""
@@ -79,30 +79,12 @@ class Engine(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-class EngineKind:
-    """Properties of an engine that are needed before its module is imported.
-
-    Attributes
-    ----------
-    title : str
-        Where items run, for messages.
-    packages : tuple of str
-        Packages of the extra ``batch`` that it needs.
-    is_isolated : bool
-        Whether time and memory limits can be enforced, and a crash affects only its item.
-    """
-
-    title: str
-    packages: tuple[str, ...] = ()
-    is_isolated: bool = True
-
-
 ENGINES = {
-    "sequential": EngineKind("in this process", is_isolated=False),
-    "processes": EngineKind("in worker processes", ("pebble",)),
-    "dask_cluster": EngineKind("on a cluster", ("dask", "distributed")),
+    "sequential": "in this process",
+    "processes": "in worker processes of this machine, by pebble",
+    "dask_cluster": "on a Dask cluster",
 }
+"""Where the items of each engine run."""
 
 
 def load_engine(name: str) -> Engine:

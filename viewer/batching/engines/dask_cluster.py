@@ -7,7 +7,6 @@ reported.
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import operator
 import os
@@ -22,8 +21,9 @@ from uuid import uuid4
 
 from viewer.batching.engines import Job, Limits
 from viewer.batching.engines._cluster_text import parse_cluster
-from viewer.batching.engines._remote import ENDED, Call, NoFolder, OtherVersion, Reply, run_items
+from viewer.batching.engines._remote import ENDED, Call, run_items
 from viewer.batching.engines._task_size import TaskSize
+from viewer.batching.engines._worker_checks import WorkerChecks
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
@@ -112,7 +112,7 @@ class _Flight:
         self.unfinished: list[str] = []  # outputs that a dead worker may have been writing
         self._items, self._again = items, deque[_Attempt]()
         self._size = TaskSize()
-        self._writers: set[str] = set()  # workers that have written an output
+        self._checks = WorkerChecks(limits.note)
         self._job = cloudpickle.dumps(job)  # unlike pickle, supports functions of notebooks
         self._done: SimpleQueue[Future] = SimpleQueue()
         self._batch = f"viewer-{uuid4().hex[:8]}-"
@@ -234,41 +234,15 @@ class _Flight:
             return self._results(done)
         results: list[tuple[_Attempt, Result]] = []
         for future, reply in zip(finished, replies, strict=True):
-            if isinstance(reply, OtherVersion | NoFolder):
-                raise _refusal(reply)
-            self._check_files(reply)
+            accepted = self._checks.accepted(reply)
             task = self.flying.pop(future)
-            self._size.add(reply.seconds, len(reply.results))
-            results += zip(task, reply.results, strict=False)
-            self._again.extend(task[len(reply.results) :])
+            self._size.add(accepted.seconds, len(accepted.results))
+            results += zip(task, accepted.results, strict=False)
+            self._again.extend(task[len(accepted.results) :])
         for future in done:
             if future in self.flying:
                 results += self._failure(future, self.flying.pop(future))
         return results
-
-    def _check_files(self, reply: Reply) -> None:
-        """Check that a worker reads and writes the same files as this process.
-
-        Raises ViewerError if it cannot read an input that exists here.
-        """
-        if reply.missing and os.path.lexists(reply.missing):
-            raise ViewerError(
-                f"--cluster: the worker {reply.worker} does not find "
-                f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
-                "inputs under the same paths"
-            )
-        written = next((path for one in reply.results for path in one.outputs), "")
-        if written and reply.worker not in self._writers:
-            self._writers.add(reply.worker)
-            with contextlib.suppress(OSError):
-                os.listdir(
-                    os.path.dirname(written) or "."
-                )  # updates caches of network file systems
-            if not os.path.lexists(written):
-                self.limits.note(
-                    f"the worker {reply.worker} wrote {printable(written, 300)}, which does not "
-                    "exist on this machine: outputs need a folder that all workers share"
-                )
 
     def _failure(self, future: Future, task: _Task) -> list[tuple[_Attempt, Result]]:
         """Return the result of the item due to which no worker has finished a task, if known."""
@@ -343,15 +317,3 @@ def _number(key: str) -> int:
 
 def _lost() -> ViewerError:
     return ViewerError("--cluster: the scheduler disconnected; use --resume to continue")
-
-
-def _refusal(reply: OtherVersion | NoFolder) -> ViewerError:
-    if isinstance(reply, NoFolder):
-        return ViewerError(
-            f"--cluster: the worker {reply.worker} cannot enter {printable(os.getcwd(), 300)} "
-            f"({printable(reply.reason, 100)}): start the batch in a folder that all workers share"
-        )
-    return ViewerError(
-        f"--cluster: the worker {reply.worker} has viewer {printable(reply.version, 40)}, "
-        f"expected {VERSION}: install the same version on all workers"
-    )

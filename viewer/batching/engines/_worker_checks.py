@@ -1,0 +1,70 @@
+"""Checks that a cluster's workers have this version of the program, and the same files."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Callable
+
+from viewer.batching.engines._remote import NoFolder, OtherVersion, Reply
+from viewer.errors import ViewerError
+from viewer.phrases import printable
+from viewer.version import VERSION
+
+__all__ = ["WorkerChecks"]
+
+
+class WorkerChecks:
+    """Checks of what workers reply.
+
+    Parameters
+    ----------
+    note : callable
+        Called with messages for the user.
+    """
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self._note = note
+        self._writers: set[str] = set()  # workers whose first output has been checked
+
+    def accepted(self, reply: Reply | OtherVersion | NoFolder) -> Reply:
+        """Return the reply of a suitable worker.
+
+        Raises
+        ------
+        ViewerError
+            If the worker has another version, or cannot read the files of the batch.
+        """
+        if isinstance(reply, OtherVersion):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} has viewer {printable(reply.version, 40)}, "
+                f"expected {VERSION}: install the same version on all workers"
+            )
+        if isinstance(reply, NoFolder):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} cannot enter {printable(os.getcwd(), 300)} "
+                f"({printable(reply.reason, 100)}): start the batch in a folder that all workers "
+                "share"
+            )
+        if reply.missing and os.path.lexists(reply.missing):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} does not find "
+                f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
+                "inputs under the same paths"
+            )
+        written = next((path for one in reply.results for path in one.outputs), "")
+        if written and reply.worker not in self._writers:
+            self._writers.add(reply.worker)
+            self._check_output(reply.worker, written)
+        return reply
+
+    def _check_output(self, worker: str, path: str) -> None:
+        """Note an output of a worker that does not exist on this machine."""
+        with contextlib.suppress(OSError):
+            # This updates the cache of a network file system.
+            os.listdir(os.path.dirname(path) or ".")
+        if not os.path.lexists(path):
+            self._note(
+                f"the worker {worker} wrote {printable(path, 300)}, which does not exist on this "
+                "machine: outputs need a folder that all workers share"
+            )
