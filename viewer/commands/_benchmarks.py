@@ -109,21 +109,28 @@ def _frames() -> Iterator[Measured]:
     from viewer.rendering.options import DisplayOptions
 
     scene = load(bundled_body())
+    crowd, many = _crowd(scene), f"{_INSTANCES} bodies"
     plain = DisplayOptions(grid=False, samples=1)
-    cases = (("4 samples and grid", DisplayOptions()), ("1 sample, no grid", plain))
+    cases = (
+        ("a body that moves, 4 samples and grid", scene, DisplayOptions(), _FRAMES, "a still body"),
+        ("a body that moves, 1 sample, no grid", scene, plain, _FRAMES, "a still body"),
+        (
+            f"{many} that move, 1 sample, no grid",
+            crowd,
+            plain,
+            _ROUNDS_OF_MANY,
+            f"{_INSTANCES} still bodies",
+        ),
+    )
     with Offscreen() as offscreen:
-        for name, options in cases:
+        for subject, drawn, options, rounds, base in cases:
             work = {
-                "still": _drawn(offscreen, scene, options),
-                "moved": _drawn(offscreen, scene, options, moves=True),
+                "still": _drawn(offscreen, drawn, options),
+                "moved": _drawn(offscreen, drawn, options, moves=True),
             }
-            times = _interleaved(work, _FRAMES)
+            times = _interleaved(work, rounds)
             ratio = _ratio(times["moved"], times["still"])
-            subject = f"frame of a body that moves, {name}"
-            yield Measured(subject, statistics.median(times["moved"]), ratio, "a still body")
-        crowd = {"": _drawn(offscreen, _crowd(scene), plain, moves=True)}
-        median = statistics.median(_interleaved(crowd, _ROUNDS_OF_MANY)[""])
-        yield Measured(f"frame of {_INSTANCES} bodies that move, 1 sample, no grid", median)
+            yield Measured(f"frame of {subject}", statistics.median(times["moved"]), ratio, base)
 
 
 def _drawn(
