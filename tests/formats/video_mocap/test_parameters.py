@@ -190,6 +190,26 @@ def test_people_with_the_keys_of_wham_but_one_shape_are_not_in_camera_space() ->
     assert next(iter(capture.parts())).bodies[3].shape.shape == (1, 10)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "rate"),
+    [("fps", 24, 24.0), ("frame_rate", np.array(60.0), 60.0), ("fps", -1.0, 30.0)],
+)
+def test_frame_rate_is_found_under_the_usual_keys(key: str, value: Any, rate: float) -> None:
+    (body,) = bodies({"rotmat": TURNED, "trans": PLACES, key: value}).values()
+    assert body.timing.frame_rate == rate
+
+
+def test_parameters_of_smplcodec_are_read() -> None:
+    given = {
+        "codecVersion": np.array(2), "frameRate": np.array(24.0), "shapeParameters": waves(10),
+        "bodyTranslation": PLACES, "bodyPose": VECTORS[:, :22],
+    }  # fmt: skip
+    ((_, body),) = next(iter(open_results(Source("a.smpl", npz(**given))).parts())).bodies.items()
+    assert_allclose(body.vectors, VECTORS[:, :22], atol=1e-12)
+    assert_allclose(body.translations, PLACES, atol=1e-12)
+    assert (body.timing.frame_rate, body.shape.shape) == (24.0, (1, 10))
+
+
 def test_missing_translations_are_reported_in_a_note() -> None:
     opened = source({"rotmat": TURNED})
     open_results(opened)

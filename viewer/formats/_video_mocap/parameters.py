@@ -7,6 +7,7 @@
     shape      betas, shape …
     frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
     person     person_id, track_id, id …, one number, or one for each frame
+    rate       fps, frame_rate, frameRate …, frames per second
 
 Several rows with the same frame are several people. Dicts may be nested: people by number, frames
 in a list, or parameters within another dict. AMASS files and single poses have other spellings and
@@ -38,6 +39,7 @@ from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats
+from viewer.rig.motion.timing import is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 
 __all__ = ["read", "recognises"]
@@ -49,7 +51,7 @@ _AMASS = {
 _WHOLE = (
     *("pose_world", "poses_world", "poses", "pose", "fullpose", "full_pose", "smpl_poses"),
     *("smpl_pose", "thetas", "theta", "pred_thetas", "smpl_thetas"),
-    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "body_rotmat"),
+    *("rotmat", "pred_rotmat", "pose_rotmat", "pred_pose", "body_rotmat", "bodyPose"),
 )
 _ROOTS = (
     *("global_orient", "root_orient", "pred_global_orient", "orient", "root_pose", "root_rot"),
@@ -57,16 +59,8 @@ _ROOTS = (
 )
 _BODIES = ("body_pose", "pose_body", "pred_body_pose", "smplx_body_pose")
 _WORLD = (
-    *(
-        "trans_world",
-        "trans",
-        "transl",
-        "translation",
-        "smpl_trans",
-        "root_trans",
-        "smplx_transl",
-        "Th",
-    ),
+    *("trans_world", "trans", "transl", "translation", "smpl_trans", "root_trans"),
+    *("smplx_transl", "Th", "bodyTranslation"),
 )
 _CAMERA = (
     *("cam_t", "pred_cam_t", "cam_trans", "camera_translation", "pred_trans", "pred_cam_trans"),
@@ -74,8 +68,10 @@ _CAMERA = (
 )
 _SHAPES = (
     *("betas", "shape", "shapes", "pred_betas", "pred_shape", "beta", "smpl_shape", "smplx_shape"),
+    *("shapeParameters",),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
+_RATES = ("fps", "frame_rate", "frameRate", "mocap_framerate", "mocap_frame_rate")
 _DETECTIONS = "detection_all"
 _PEOPLE = (
     *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
@@ -98,10 +94,11 @@ class _Layout:
     shape: str
     frames: str
     person: str
+    rate: str
 
     @property
     def keys(self) -> list[str]:
-        others = (self.place, self.shape, self.frames, self.person)
+        others = (self.place, self.shape, self.frames, self.person, self.rate)
         return [key for key, _ in self.poses] + [key for key in others if key]
 
 
@@ -136,8 +133,23 @@ def read(source: Source, archive: Archive) -> Results:
     model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
     facts = (("recognised", ", ".join(recognised)),)
     return Results(
-        "SMPL parameters", model, {space: people}, {space: "-y" if is_camera else ""}, facts=facts
+        "SMPL parameters",
+        model,
+        {space: people},
+        {space: "-y" if is_camera else ""},
+        frame_rate=_rate(found[0][1], layout.rate),
+        facts=facts,
     )
+
+
+def _rate(archive: Archive, key: str) -> float | None:
+    """Return the frame rate; None for a value that is none."""
+    value = archive.get(key) if key else None
+    if isinstance(value, Deferred) and value.dtype.kind in "iuf":
+        value = float(value.values().reshape(-1)[0])
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return None
+    return float(value) if is_rate(value) else None
 
 
 def _layout(archive: Archive) -> _Layout | None:
@@ -164,7 +176,8 @@ def _layout(archive: Archive) -> _Layout | None:
         frames = _DETECTIONS
     if frames and count > 1:
         person = _first(archive, _PEOPLE, lambda shape: shape == (count,))
-    return _Layout(poses, place, shape, frames, person)
+    rate = _first(archive, _RATES, lambda shape: shape in ((), (1,)))
+    return _Layout(poses, place, shape, frames, person, rate)
 
 
 def _first_form(
