@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 from collections import Counter
@@ -221,11 +222,15 @@ def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeyp
 def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
     from distributed import Scheduler, SpecCluster
 
-    monkeypatch.setattr(dask_cluster, "_ALONE", 0.1)
-    monkeypatch.setattr(dask_cluster, "_COUNT_EVERY", 0.1)
     options = {"host": "tcp://127.0.0.1", "dashboard_address": ":0", "port": 0}
     with SpecCluster({}, {"cls": Scheduler, "options": options}, silence_logs=50) as cluster:
         limits = Limits(cluster=cluster.scheduler_address)
+        # Ctrl-C once the tasks have been submitted ends a batch that waits for workers.
+        asked = itertools.count()
+        stopping = replace(limits, is_stopping=lambda: next(asked) > 10)
+        assert not list(dask_cluster.run(items(30), Job(), stopping))
+        monkeypatch.setattr(dask_cluster, "_ALONE", 0.1)
+        monkeypatch.setattr(dask_cluster, "_COUNT_EVERY", 0.1)
         with pytest.raises(ViewerError, match=r"has had no workers for 0\.1 s; start some with: "):
             list(dask_cluster.run(items(3), Job(), limits))
 

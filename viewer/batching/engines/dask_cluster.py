@@ -67,7 +67,8 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         try:
             while True:
                 flight.count_workers()
-                while flight.has_room() and not flight.stops() and flight.starts_next():
+                # Also checked if there is no room: no worker may have started yet.
+                while not flight.stops() and flight.has_room() and flight.starts_next():
                     pass
                 if not flight.flying:
                     remove_leftovers(flight.unfinished)
