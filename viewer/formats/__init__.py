@@ -22,11 +22,11 @@ if TYPE_CHECKING:
     from viewer.formats.rig import NamedFiles
     from viewer.media.file_names import file_stem, folder_name, opened_text
     from viewer.media.image import is_picture, save_image
+    from viewer.media.named_arrays import save_arrays
     from viewer.media.saving import (
         all_or_none,
         free_path,
         keeping_written,
-        save_arrays,
         save_bytes,
         save_parts,
         save_text,

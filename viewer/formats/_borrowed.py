@@ -9,9 +9,10 @@ _BY_MODULE = {
     "viewer.formats._references": ("referenced_path",),
     "viewer.media.file_names": ("file_stem", "folder_name", "opened_text"),
     "viewer.media.image": ("is_picture", "save_image"),
+    "viewer.media.named_arrays": ("save_arrays",),
     "viewer.media.saving": (
         *("all_or_none", "free_path", "keeping_written"),
-        *("save_arrays", "save_bytes", "save_parts", "save_text"),
+        *("save_bytes", "save_parts", "save_text"),
     ),
     "viewer.media.targets": ("check_folder_target", "check_targets"),
 }

@@ -41,7 +41,8 @@ from viewer.formats._pose.named_values import NamedValues, described, parse_json
 from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
 from viewer.formats._text.table import read_numbers
-from viewer.media.saving import save_arrays, save_text
+from viewer.media.named_arrays import save_arrays
+from viewer.media.saving import save_text
 from viewer.near_names import did_you_mean, near_names, question
 from viewer.phrases import printable
 from viewer.rig.arrays import Deferred, Floats

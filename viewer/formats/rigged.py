@@ -36,7 +36,7 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._rigged.materials import texts
 from viewer.formats._rigged.mesh import mesh_arrays, read_mesh
 from viewer.formats._source import Source
-from viewer.media.saving import save_arrays
+from viewer.media.named_arrays import save_arrays
 from viewer.rig.annotations import VertexField
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.blendshapes import Correctives

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-import io
 import os
 import stat
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, BinaryIO
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import BinaryIO
 
 from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
@@ -29,7 +25,6 @@ __all__ = [
     "as_words",
     "free_path",
     "keeping_written",
-    "save_arrays",
     "save_bytes",
     "save_parts",
     "save_text",
@@ -96,21 +91,6 @@ def keeping_written() -> Iterator[dict[Path, bytes]]:
 def save_text(path: str | Path, text: str) -> None:
     """Write text as UTF-8 with LF line endings; see ``save_bytes``."""
     save_bytes(path, text.encode("utf-8", "surrogateescape"))
-
-
-def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
-    """Write named arrays as an ``.npz`` without pickled objects; see ``save_bytes``."""
-    import zipfile
-
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, array in arrays.items():
-            member = io.BytesIO()
-            np.lib.format.write_array(member, array, allow_pickle=False)
-            # A fixed date, so that the same arrays give the same bytes.
-            entry = zipfile.ZipInfo(f"{name}.npy")
-            archive.writestr(entry, member.getvalue(), zipfile.ZIP_DEFLATED)
-    save_bytes(path, buffer.getvalue())
 
 
 def save_bytes(path: str | Path, data: bytes) -> None:
