@@ -139,8 +139,10 @@ def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagn
     axis, hangs = own_up(scene, actor)
     found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
     if not lock.n_contacts:
-        return clip, Diagnostic("X006.no-contacts", values={"figure": actor.name})
+        key = "X006.only-glides" if lock.n_glides else "X006.no-contacts"
+        return clip, Diagnostic(key, values={"figure": actor.name, "n": lock.n_glides})
     values = {
+        "glides": lock.n_glides,
         "n": lock.n_contacts,
         "before": length_text(figure, lock.before),
         "after": length_text(figure, lock.after if lock.after > _ROUNDING else 0.0),

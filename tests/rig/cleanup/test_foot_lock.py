@@ -173,3 +173,22 @@ def test_corrections_fade_after_the_contact() -> None:
     assert abs(shift[30]) > 0.02  # the foot is held up to this frame
     assert_allclose(shift[45:], 0.0, atol=1e-9)
     assert np.abs(np.diff(shift[32:])).max() < 0.02  # no jump while the correction fades
+
+
+@pytest.mark.parametrize("glides", [False, True])
+def test_feet_are_not_held_where_they_glide_too_far(glides) -> None:
+    # The joints at rest are 0.9 high, so a foot may be corrected by 0.135. After the feet were
+    # lifted, the body glides by 0.24 or 0.30, at 0.18 or 0.22 m/s; contacts begin below 0.27 m/s.
+    moved = np.zeros((FRAMES, 7, 3))
+    moved[15:19, 0, 1] = 0.1
+    moved[19:, 0, 2] = (0.15 if glides else 0.12) * np.linspace(-1.0, 1.0, FRAMES - 19)
+    clip = standing(FIGURE, translations=moved)
+    found, lock = lock_feet(FIGURE, clip, 1)
+    assert (lock.n_contacts, lock.n_glides) == ((2, 2) if glides else (4, 0))
+    last, kept = (places(each)[30:, [3, 6]] for each in (clip, found))
+    if glides:
+        # Straight legs that are held are shortened by 0.0001 of their length, 0.8.
+        assert_allclose(kept, last, atol=1e-4)
+        assert lock.lowered < 1e-4 and lock.before < 1e-9
+    else:
+        assert_allclose(kept, np.broadcast_to(kept[:1], kept.shape), atol=1e-9)

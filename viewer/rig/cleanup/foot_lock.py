@@ -26,6 +26,8 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["FootLock", "legs_of", "lock_feet"]
 
+_FARTHEST = 0.15  # maximum horizontal correction of a foot, relative to the figure's height at rest
+
 
 @dataclass(frozen=True, slots=True)
 class FootLock:
@@ -39,12 +41,16 @@ class FootLock:
         Total distance that feet slide while they are on the ground, figure units.
     lowered : float
         Largest distance by which the body was lowered because a leg was too short.
+    n_glides : int
+        Number of contacts in which a foot is not held because it glides too far, as on skates or
+        where the whole body drifts.
     """
 
     n_contacts: int = 0
     before: float = 0.0
     after: float = 0.0
     lowered: float = 0.0
+    n_glides: int = 0
 
 
 def legs_of(skeleton: Skeleton) -> list[Leg]:
@@ -68,7 +74,7 @@ def lock_feet(
     During a contact of the ball of a foot, or of its ankle if the ball is not in contact, that
     joint stays fixed; the foot keeps its orientation. Before and after contacts, the correction
     fades. Hips and knees rotate so that the ankles reach their targets; if a leg is too short, the
-    body is lowered.
+    body is lowered. Feet that glide farther than legs can follow are not held.
 
     Parameters
     ----------
@@ -94,6 +100,7 @@ def lock_feet(
     size = float(base.figure_scales[0]) * extent(shaped(figure, base.shape_weights[0]))[1]
     shifts, count, before = [], 0, 0.0
     stands = _stands(places, legs, timing, size, up, way)
+    n_glides = _drop_glides(places, legs, stands, size, up)
     for leg, (toe, ankle) in zip(legs, stands, strict=True):
         shift, slid = _corrections(places, leg, toe, ankle, timing, up)
         shifts.append(shift[frames])
@@ -104,7 +111,7 @@ def lock_feet(
     rotations = leg_rotations(clip.rotations, world, skeleton.parents, legs, drop, shifts)
     found = replace(clip, rotations=rotations, figure_translations=base.figure_translations + drop)
     after = _slid_again(figure, found, legs, stands, up)
-    return found, FootLock(count, before, after, float(lowered.max(initial=0.0)))
+    return found, FootLock(count, before, after, float(lowered.max(initial=0.0)), n_glides)
 
 
 def _stands(
@@ -118,23 +125,48 @@ def _stands(
     ]
 
 
+def _drop_glides(
+    places: Floats, legs: list[Leg], stands: list[tuple[Bools, Bools]], size: float, up: int
+) -> int:
+    """Remove contacts in which a foot glides too far; return their number."""
+    flat = [axis for axis in range(3) if axis != up]
+    count = 0
+    for leg, (toe, ankle) in zip(legs, stands, strict=True):
+        for start, stop in runs_of(toe | ankle):
+            shift, _ = _held(places, leg, toe, (start, stop), up)
+            if np.linalg.norm(shift[:, flat], axis=1).max() > _FARTHEST * size:
+                toe[start:stop] = ankle[start:stop] = False
+                count += 1
+    return count
+
+
 def _corrections(
     places: Floats, leg: Leg, toe: Bools, ankle: Bools, timing: Timing, up: int
 ) -> tuple[Floats, float]:
     """Return the shifts of a foot (F, 3), and the distance that it slides without them."""
     shift, is_held, slid = np.zeros((len(places), 3)), np.zeros(len(places), dtype=np.bool_), 0.0
     for start, stop in runs_of(toe | ankle):
-        held: Floats | None = None
-        for joint, a, b in _parts(leg, toe, start, stop):
-            part = places[a:b, joint]
-            slid += _path(part, up)
-            # A contact that follows another one continues from the foot's position there.
-            kept = part.mean(axis=0) if held is None else part[0] + held
-            shift[a:b] = kept - part
-            held = shift[b - 1].copy()
+        shift[start:stop], path = _held(places, leg, toe, (start, stop), up)
         is_held[start:stop] = True
+        slid += path
     ease = round(EASE * timing.frame_rate)
     return faded(shift, is_held, timing.present, ease), slid
+
+
+def _held(
+    places: Floats, leg: Leg, toe: Bools, run: tuple[int, int], up: int
+) -> tuple[Floats, float]:
+    """Return the shifts that hold a foot in a run of frames (N, 3), and how far it slides there."""
+    start, stop = run
+    shift, slid, held = np.zeros((stop - start, 3)), 0.0, None
+    for joint, a, b in _parts(leg, toe, start, stop):
+        part = places[a:b, joint]
+        slid += _path(part, up)
+        # A contact that follows another one continues from the foot's position there.
+        kept = part.mean(axis=0) if held is None else part[0] + held
+        shift[a - start : b - start] = kept - part
+        held = shift[b - 1 - start].copy()
+    return shift, slid
 
 
 def _parts(leg: Leg, toe: Bools, start: int, stop: int) -> list[tuple[int, int, int]]:
