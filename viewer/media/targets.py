@@ -26,7 +26,7 @@ def replacing_since(start: float) -> Iterator[None]:
     """Let the block replace files without ``force`` if they were written after a time.
 
     A run that is repeated, because its process died before it reported success, replaces its own
-    outputs, but nothing that existed before.
+    outputs, but nothing that is more than a second older.
 
     Parameters
     ----------
