@@ -8,7 +8,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor, Scene
 
-NAMES = {"RightForeArm": "rElbow_x"}
+NAMES = {"RightForeArm": "rEllbogen_x"}
 
 
 def driven_scene() -> Scene:
