@@ -6,6 +6,7 @@ Times are seconds of the clip; angles have the unit of the Joints panel.
 from __future__ import annotations
 
 import math
+from typing import TypeAlias
 
 import numpy as np
 from imgui_bundle import imgui, implot
@@ -28,9 +29,11 @@ from viewer.app.curves.plotted_keys import draw_keys, edit
 from viewer.app.curves.state import Curves
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.points import PointClip
+from viewer.rig.memo import Memo
 from viewer.rig.motion.sampled_clip import SampledClip
+from viewer.rig.scene import Motion
 
-__all__ = ["draw_plot", "unit_text"]
+__all__ = ["draw_plot", "keyed_lines", "unit_text"]
 
 _TIME, _RANGE = (1.0, 0.62, 0.25, 1.0), 0.55
 _OUTSIDE = (0.0, 0.0, 0.0, 0.2)
@@ -39,6 +42,11 @@ _DASHES = 90  # number of samples across the plot
 _MARGIN = 0.08  # margin before and after the clip, relative to its duration
 _FARTHEST = 1e9
 _TIME_ID, _START_ID, _END_ID = 1, 2, 3
+
+_Points: TypeAlias = tuple[Floats, Floats]
+"""Times and values, (P,) each: seconds; lengths, radians or factors."""
+_Lines: TypeAlias = tuple[_Points | None, _Points | None, _Points | None]
+_lines: Memo[Motion, _Lines] = Memo(kept=256)  # sampled again only after an edit, pan or zoom
 
 
 def draw_plot(state: AppState, curves: tuple[Curve, ...]) -> None:
@@ -136,21 +144,48 @@ def _draw_line(plot: Plot, row: int) -> None:
         implot.plot_line(f"##{row}", times, factor * values, _spec(color))
         return
     keyed = keyed_of(plot.state.actor)
-    if keyed is None:
+    if keyed is None or clip is None:
         return
+    key = id(plot.state.actor.figure.skeleton), row, low, high
+    line, *dashes = _lines.get(clip, key, lambda: keyed_lines(keyed, row, low, high))
+    if line is not None:
+        implot.plot_line(f"##{row}", line[0], factor * line[1], _spec(color))
+    spec = _spec((*color[:3], 0.75), 1.2, implot.LineFlags_.segments)
+    for side, found in enumerate(dashes):
+        if found is not None:
+            implot.plot_line(f"##outside {row} {side}", found[0], factor * found[1], spec)
+
+
+def keyed_lines(keyed: KeyedMotion, row: int, low: float, high: float) -> _Lines:
+    """Return the points of a curve between its keys, and those of dashes before and after them."""
     found = keyed.keys(row)
     keys = np.zeros(0) if found is None else found[0]
     # A curve without keys is 0 everywhere: all of it is extrapolation.
     first, last = (float(keys[0]), float(keys[-1])) if len(keys) else (high, high)
+    line = None
     if len(keys) and first <= high and last >= low:
         times = _inner_times(keys, max(low, first), min(high, last))
-        values = keyed.values((row,), times)[:, 0]
+        line = times, keyed.values((row,), times)[:, 0]
         if keyed.wraps(row):
-            times, values = _broken(times, values)
-        implot.plot_line(f"##{row}", times, factor * values, _spec(color))
-    for start, end in ((low, min(high, first)), (max(low, last), high)):
-        if start < end:
-            _draw_dashes(plot, keyed, row, start, end)
+            line = _broken(*line)
+    step = (high - low) / _DASHES
+    sides = (low, min(high, first)), (max(low, last), high)
+    before, after = (
+        _dashes(keyed, row, side, step) if side[0] < side[1] else None for side in sides
+    )
+    return line, before, after
+
+
+def _dashes(
+    keyed: KeyedMotion, row: int, side: tuple[float, float], step: float
+) -> tuple[Floats, Floats]:
+    """Return dashes along a curve, each of three short segments that follow its shape."""
+    start, end = side
+    # Multiples of the step, so that dashes stay in place while panning.
+    lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
+    fractions = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
+    points = np.clip((lows[:, None] + step * fractions).ravel(), start, end)
+    return points, keyed.values((row,), points)[:, 0]
 
 
 def _broken(times: Floats, values: Floats) -> tuple[Floats, Floats]:
@@ -165,18 +200,6 @@ def _inner_times(keys: Floats, low: float, high: float) -> Floats:
     # Times just before the keys are included, because two keys at the same time create a jump.
     times = np.concatenate([np.linspace(low, high, _MOST_SAMPLES), seen, np.nextafter(seen, low)])
     return np.sort(np.clip(times, low, high))
-
-
-def _draw_dashes(plot: Plot, keyed: KeyedMotion, row: int, start: float, end: float) -> None:
-    """Draw dashes along a curve, each of three short segments that follow its shape."""
-    step = (plot.limits[1] - plot.limits[0]) / _DASHES
-    # Multiples of the step, so that dashes stay in place while panning.
-    lows = step * np.arange(math.floor(start / step), math.ceil(end / step))
-    fractions = np.array([0.0, 0.2, 0.2, 0.4, 0.4, 0.6])
-    points = np.clip((lows[:, None] + step * fractions).ravel(), start, end)
-    values = plot.factor(row) * keyed.values((row,), points)[:, 0]
-    spec = _spec((*plot.color(row)[:3], 0.75), 1.2, implot.LineFlags_.segments)
-    implot.plot_line(f"##outside {row} {start < plot.limits[1]}", points, values, spec)
 
 
 def _draw_outside(plot: Plot) -> None:
