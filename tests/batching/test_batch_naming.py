@@ -80,5 +80,5 @@ def test_outputs_that_differ_only_in_case_are_explained() -> None:
         check_outputs(items)
     assert str(caught.value) == (
         "1 output would be written twice: out/walk.bvh (a, b); use a template with {index}: names "
-        "that differ only in case or Unicode form are one file on some systems"
+        "that differ only in case or Unicode form are the same file on some systems"
     )

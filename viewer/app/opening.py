@@ -1,4 +1,4 @@
-"""Opening of the first files in a thread; after a moment, a window shows the progress."""
+"""Opening of the first files in a thread, with a progress window if it takes more than a moment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 __all__ = ["Opening", "watch"]
 
-_PATIENCE = 0.6  # seconds before the window opens; most files are read in less
+_PATIENCE = 0.6  # seconds before the window opens; most files take less time to read
 _EVERY = 0.05  # seconds between frames
 _BAR_WIDTH = 26.0  # width of the progress bar, in font sizes
 
@@ -38,7 +38,7 @@ class Opening(Generic[Found]):
     title : str
         Description of the files.
     progress : (int, int, str)
-        Completed steps, their total, 0 if it is unknown, and their unit.
+        Completed steps, their total (0 if unknown) and their unit.
     """
 
     def __init__(self, title: str, act: Callable[[], Found]) -> None:
@@ -65,7 +65,7 @@ class Opening(Generic[Found]):
         self.progress = (done, total, unit)
 
     def wait(self, seconds: float) -> bool:
-        """Wait until the files are open, at most for some time; return whether they are."""
+        """Wait for the files for at most some seconds; return whether opening them has ended."""
         self._thread.join(seconds)
         return not self._thread.is_alive()
 
@@ -75,7 +75,7 @@ class Opening(Generic[Found]):
 
     def result(self) -> Found:
         """Wait for the end; return the result, or raise the error."""
-        while not self.wait(0.1):  # so that signals are handled
+        while not self.wait(0.1):  # a limited wait, so that signals are handled
             pass
         if self._problem is not None:
             raise self._problem
@@ -88,7 +88,7 @@ class Opening(Generic[Found]):
 
 
 def watch(opening: Opening[Found], scale: float | None = None) -> Shell | None:
-    """Wait for the files; if it takes longer than a moment, open a window with the progress.
+    """Wait for the files; if it takes more than a moment, open a window with the progress.
 
     Parameters
     ----------

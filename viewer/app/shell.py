@@ -1,4 +1,4 @@
-"""The window of the operating system: GLFW, its OpenGL context, ImGui, and recorded events."""
+"""The native window: GLFW, its OpenGL context, ImGui, and the events that the loop handles."""
 
 from __future__ import annotations
 
@@ -31,21 +31,21 @@ _SIZE = (1280, 800)
 
 
 class Shell:
-    """A window, in which the files are opened and then shown.
+    """Window that shows the progress of opening files, and then the files.
 
     Parameters
     ----------
     title : str
         Title of the window.
     scale : float or None
-        Scale of the interface; that of the preferences or of the screen if omitted.
+        Scale of the interface; the preferred scale or the screen's if omitted.
 
     Attributes
     ----------
     handle, context, imgui, implot : any
-        The window, and its contexts of OpenGL, ImGui and ImPlot.
+        The window and its OpenGL, ImGui and ImPlot contexts.
     preferences, appearance : Preferences, Appearance
-        The stored preferences, and how they are applied to this window.
+        The stored preferences, and the settings applied to this window.
     dropped : list of Path
         Files that were dropped onto the window since the list was last cleared.
     is_dirty : bool
@@ -149,7 +149,7 @@ class Shell:
             self._title = title
 
     def release(self) -> None:
-        """Close the window, and release everything."""
+        """Close the window and release everything."""
         imgui.backends.opengl3_shutdown()
         imgui.backends.glfw_shutdown()
         implot.destroy_context(self.implot)

@@ -251,8 +251,8 @@ def _check_clashes(items: Sequence[Item]) -> None:
             clashes.append(f"{_shown(item.output)} ({_shown(other.name)}, {_shown(item.name)})")
             if item.output != other.output:
                 advice = (
-                    "{index}: names that differ only in case or Unicode form are one file on some "
-                    "systems"
+                    "{index}: names that differ only in case or Unicode form are the same file on "
+                    "some systems"
                 )
     if clashes:
         raise ViewerError(

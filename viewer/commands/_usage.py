@@ -25,14 +25,14 @@ _LONGEST = 60  # maximum length of a name in a message, characters
 class Parser(argparse.ArgumentParser):
     """Argument parser that reports a usage error in one line, like every other error."""
 
-    _width: int | None = 80  # of text that is not shown; None for the width of the terminal
+    _width: int | None = 80  # columns of text that is not shown; None: width of the terminal
 
     def error(self, message: str) -> NoReturn:
         """Raise ViewerError instead of exiting as ``argparse`` does."""
         raise ViewerError(f"{message} ({self.prog} --help lists the options)")
 
     def format_usage(self) -> str:
-        """Return nothing: ``argparse`` formats a usage for errors, which do not show it."""
+        """Return an empty text: ``argparse`` formats the usage for errors, which do not show it."""
         return ""
 
     def format_help(self) -> str:

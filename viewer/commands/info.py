@@ -282,7 +282,7 @@ def _skeleton_lines(skeleton: dict[str, Any]) -> list[str]:
         f"  skeleton   {counted(skeleton['joints'], 'joint')}, {counted(skeleton['dofs'], 'DOF')} "
         f"({skeleton['limited_dofs']} limited, {skeleton['locked_dofs']} of them locked)"
     ]
-    # The many ball joints of glTF, FBX and BVH would bury everything else.
+    # The many ball joints of glTF, FBX and BVH would hide everything else.
     too_many = sum(_is_free(dof) and dof["value"] != 0.0 for dof in table) > MOST_FREE_DOFS
     listed_dofs = [dof for dof in table if not _is_free(dof) or (dof["value"] and not too_many)]
     lines += [_dof_line(dof) for dof in listed_dofs]

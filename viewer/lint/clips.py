@@ -22,9 +22,9 @@ from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["check", "missing_frames"]
 
+_SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _LEAPS = 5.0  # the same for a root that moves slowly before and after, horizontally: 10 m/s
 _SLOWLY = 0.2  # maximum speed before and after, relative to the speed in between
-_SIZES = 15.0  # maximum speed of a joint, in figure sizes per second: about 30 m/s for a person
 _ALIKE = 1e-9  # relative tolerance for equal speeds of joints that move together
 _ROUNDING = 1e-6  # tolerance beyond a limit, radians or lengths
 _MOST = 20_000  # maximum number of times at which curves are compared with their limits
@@ -165,7 +165,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
 def _leaps(speeds: Floats, is_root: Bools) -> Floats:
     """Return the speeds of roots that are much slower in the two steps before and after: (F, J).
 
-    Two steps, because files with repeated frames stand still in every second one.
+    Two steps, because in files with repeated frames every second step is 0. Other speeds are 0.
     """
     steps = speeds[1:]
     around = np.pad(steps, ((2, 2), (0, 0)))

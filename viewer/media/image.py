@@ -33,7 +33,7 @@ __all__ = [
 
 _MAX_PIXELS = 16384 * 16384  # limit for one image, and for all images that are decoded together
 _MOST_THREADS = 8
-_FEW_BYTES = 1 << 18  # size of encoded images that take about as long to decode as threads to start
+_FEW_BYTES = 1 << 18  # size of images that are decoded in about the time that threads take to start
 _REFUSALS = (OSError, ValueError, SyntaxError, MemoryError, Warning)  # raised by Pillow
 _FORMATS = ("PNG", "JPEG", "BMP", "TGA", "TIFF", "GIF", "WEBP", "PPM")
 
@@ -87,7 +87,8 @@ def decoding_pictures(
 ) -> Iterator[Callable[[], list[Bytes | FormatError]]]:
     """Decode several images in other threads while the body of the ``with`` statement runs.
 
-    Few bytes are decoded at once in the calling thread, because starting threads takes longer.
+    Small images are decoded immediately, in the calling thread, because starting threads takes
+    longer.
 
     Parameters
     ----------

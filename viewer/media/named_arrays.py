@@ -39,7 +39,7 @@ def save_arrays(path: str | Path, arrays: Mapping[str, NDArray[Any]]) -> None:
 
 
 class _Compressed:
-    """Members of an archive; numpy writes arrays to it in blocks, whose progress is reported."""
+    """Members of an archive, to which numpy writes arrays in blocks; reports the progress."""
 
     def __init__(self, what: str, total: int) -> None:
         self.member: IO[bytes] | None = None

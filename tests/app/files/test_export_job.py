@@ -1,4 +1,4 @@
-"""Export of the chosen actor in the background: progress, cancellation, edits meanwhile."""
+"""Export of the chosen actor in the background: progress, cancellation, and concurrent edits."""
 
 import threading
 

@@ -210,12 +210,12 @@ def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeyp
     some = [replace(item, files=(absent,), output=str(tmp_path / "none.bvh")) for item in items(3)]
     notes = []
     limits = Limits(cluster=address, note=notes.append)
-    # A file that is missing here too is only the error of its item.
+    # A file that is missing on this machine too causes an error of its item only.
     assert {one.status for one in finished(read_nothing, some, limits).values()} == {"failed"}
     finished(write_elsewhere, some[:1], limits)
     assert len(notes) == 1 and f"wrote {some[0].output}, which does not exist" in notes[0]
     monkeypatch.setattr(os.path, "lexists", lambda path: True)
-    with pytest.raises(ViewerError, match=rf"does not find {absent}: workers need access"):
+    with pytest.raises(ViewerError, match=rf"cannot find {absent}: workers need access"):
         list(dask_cluster.run(some, read_nothing, limits))
 
 

@@ -1,4 +1,4 @@
-"""SLURM jobs, with commands in place of SLURM's own that start real workers on this machine."""
+"""SLURM jobs, with substitutes for SLURM's commands that start real workers on this machine."""
 
 from __future__ import annotations
 
@@ -92,8 +92,8 @@ def test_jobs_that_end_are_submitted_again(jobs, tmp_path) -> None:
     assert Counter(one.item.index for one in results) == Counter(range(60))
     assert {one.status for one in results} == {"done"}
     assert notes == [
-        "waiting for SLURM to start 1 job (squeue --me)",
-        "the SLURM job 1 has ended and is submitted again",
+        "waiting for SLURM to start 1 job (squeue --me lists the queue)",
+        "SLURM job 1 has ended and is submitted again",
     ]
     assert sorted(path.name for path in jobs.glob("job*")) == ["job1", "job2"]
     for job in jobs.glob("job*"):

@@ -246,7 +246,7 @@ def test_memory_does_not_depend_on_the_number_of_frames(tmp_path, monkeypatch, c
 
 
 def test_progress_is_reported_in_frames_only(tmp_path, monkeypatch):
-    """The bar in the terminal would flicker between two units."""
+    """Reports in two units would make the progress bar in the terminal flicker."""
     monkeypatch.setattr(streamed_bvh, "_LARGE", 0)
     monkeypatch.setattr(streaming, "_PART", 2000)
     (tmp_path / "a.bvh").write_text(motion(frames=100))

@@ -120,7 +120,7 @@ def test_vertex_colours_are_not_tinted_by_the_colour_of_the_figure(tmp_path):
 
 
 def test_application_data_of_a_file_is_kept_or_reported(tmp_path):
-    """Materials, scenes and animations keep theirs; members that are not read are listed."""
+    """Materials, scenes and animations keep their data; members that are not read are listed."""
     file = animated()
     file.root["nodes"] = [{"mesh": file.mesh(_SPEED=file.accessor([1, 2, 3]))}]
     file.primitive.update(material=0, extras={"layer": 3})
@@ -147,7 +147,7 @@ def test_application_data_of_a_file_is_kept_or_reported(tmp_path):
 
 @pytest.mark.parametrize("mirrored", [False, True])
 def test_tangents_are_kept(tmp_path, mirrored):
-    """Otherwise, normal maps made for them would look different in other programs."""
+    """Normal maps made for other tangents would look different in other programs."""
     file, tangents = File(), [[1, 0, 0, 1], [0, 1, 0, -1], [0.6, 0.8, 0, 1]]
     normals, rows = file.accessor([[0, 0, 1]] * 3), file.accessor(tangents)
     mesh = file.mesh(NORMAL=normals, TANGENT=rows)

@@ -93,7 +93,7 @@ def _old(tmp_path: Path, material: dict[str, Any], **told: Any) -> Any:
 
 
 def test_old_textures_are_placed_like_the_main_texture(tmp_path: Path) -> None:
-    """Offset (0.25, 0.125) and scale (2, 3), v from the bottom, which is how images are stored."""
+    """The offset is (0.25, 0.125) and the scale (2, 3), with v from the bottom of the image."""
     core = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}}
     place = {"vectorProperties": {"_MainTex": [0.25, 0.125, 2.0, 3.0]}}
     found = _old(tmp_path, core, **place)

@@ -1,4 +1,4 @@
-"""Corners of faces: the four forms, also mixed, and invalid ones with as many slashes."""
+"""Corners of faces: the four forms, mixed forms, and invalid corners with the same slashes."""
 
 import pytest
 

@@ -103,7 +103,7 @@ def test_matcap_is_relative_to_the_eye(offscreen):
 
 
 def test_toon_materials_ignore_vertex_colours(offscreen):
-    """As VRMC_materials_mtoon 1.0 requires; other materials are multiplied by them."""
+    """VRMC_materials_mtoon 1.0 requires this; vertex colours multiply those of other materials."""
     lit = replace(SHADED, base_color=(1.0, 1.0, 0.0, 1.0), shade_range=(-3.0, -2.0))
     plain = replace(lit, shade_color=None)
     for material, wanted in ((lit, [255, 255, 0]), (plain, [255, 0, 0])):

@@ -33,7 +33,7 @@ def save_in_background(
     files: Sequence[Path],
     inputs: Sequence[Path] = (),
 ) -> None:
-    """Write files in a job that reports its progress; cancelling it leaves no file changed.
+    """Write files in a job that reports its progress; cancelling it leaves all files unchanged.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def save_in_background(
         Receives the job, or an error if another job is running or the scene was read from a file
         that would be replaced.
     act : callable
-        Writes the files in another thread; returns notes.
+        Writes the files in another thread and returns notes.
     files : sequence of Path
         The files; the job is named after the first.
     inputs : sequence of Path

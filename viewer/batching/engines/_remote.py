@@ -41,8 +41,8 @@ class Call:
     ----------
     job, items : bytes
         Pickled; a tuple of items, each with the time at which it was first submitted, in seconds
-        since 1970. The scheduler repeats tasks whose worker died without saying so, and outputs
-        that are newer are then replaced.
+        since 1970. The scheduler reruns tasks whose worker died without reporting it; outputs
+        that are newer than this time are then replaced.
     folder : str
         Working directory of the batch, to which paths are relative.
     timeout, memory : float, int, optional

@@ -25,7 +25,7 @@ _MEMORY = 4 << 30  # bytes per worker that a job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
 _ASK_EVERY = 10.0  # seconds between calls of squeue while workers are missing
 _PATIENCE = 5.0  # seconds without any worker before a note says so
-_MOST_VAIN = 3  # jobs in a row that end before their workers connect, at which the batch fails
+_MOST_VAIN = 3  # consecutive jobs that end before their workers connect; then the batch fails
 
 
 def slurm_cluster(
@@ -34,7 +34,7 @@ def slurm_cluster(
     """Return a cluster whose workers are SLURM jobs; none is submitted yet.
 
     The options ``partition``, ``account``, ``time``, ``mem``, ``cpus`` (workers per job) and
-    ``interface`` are those of the job's workers; all others are passed to ``sbatch``.
+    ``interface`` describe a job; all others are passed to ``sbatch``.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def slurm_cluster(
     Raises
     ------
     ViewerError
-        If sbatch or dask-jobqueue is missing, or an option is wrong.
+        If sbatch or dask-jobqueue is missing, or an option is invalid.
     """
     if shutil.which("sbatch") is None:
         raise ViewerError(
@@ -114,7 +114,7 @@ def _exported(key: str, value: object) -> str:
 
 
 class SlurmJobs:
-    """The jobs of a batch, of which those that end are submitted again.
+    """The jobs of a batch; jobs that end are submitted again.
 
     Jobs end at their time limit, are preempted, or fail with their node.
 
@@ -157,7 +157,8 @@ class SlurmJobs:
         now = time.monotonic()
         if not names and not self._has_waited and now > self._start + _PATIENCE:
             self._has_waited = True
-            self._note(f"waiting for SLURM to start {counted(len(jobs), 'job')} (squeue --me)")
+            count = counted(len(jobs), "job")
+            self._note(f"waiting for SLURM to start {count} (squeue --me lists the queue)")
         if len(present) == len(jobs) or now < self._asked + _ASK_EVERY:
             return
         self._asked = now
@@ -183,32 +184,33 @@ class SlurmJobs:
         self._cluster.sync(self._cluster.scale_down, [*refused])
 
     def _replace(self, ended: Mapping[str, str]) -> None:
-        """Submit new jobs in place of some that have ended.
+        """Submit new jobs in place of those that have ended.
 
-        ``ended``: numbers of the jobs by name.
+        ``ended``: job numbers by name.
         """
         has_worked = not self._connected.isdisjoint(ended)
         self._n_vain = 0 if has_worked else self._n_vain + len(ended)
         numbers = listed(sorted(ended.values()), 5)
         if self._n_vain >= _MOST_VAIN:
             raise ViewerError(
-                f"--cluster slurm: {self._n_vain} jobs ended before their workers connected; the "
-                f"reason is in the output of {numbers}, by default slurm-{min(ended.values())}.out"
+                f"--cluster slurm: {self._n_vain} jobs ended before their workers connected: see "
+                f"the reason in the output of {numbers}, by default slurm-{min(ended.values())}.out"
             )
         verb = "has ended and is" if len(ended) == 1 else "have ended and are"
-        jobs = "the SLURM job" if len(ended) == 1 else "the SLURM jobs"
+        jobs = "SLURM job" if len(ended) == 1 else "SLURM jobs"
         self._note(f"{jobs} {numbers} {verb} submitted again")
         self._cluster.sync(self._cluster.scale_down, [*ended])
         self._cluster.scale(self._n_workers)
 
 
 def _queued() -> set[str]:
-    """Return the numbers of this user's jobs that wait or run; empty if SLURM does not answer."""
+    """Return the numbers of this user's pending and running jobs; empty without an answer."""
     command = ["squeue", "--me", "--noheader", "--format=%A"]
     try:
         found = subprocess.run(command, capture_output=True, text=True, timeout=30.0, check=True)
     except (OSError, subprocess.SubprocessError):
         return set()
+    # An answer without jobs is not empty.
     return {*found.stdout.split(), "none"}
 
 

@@ -1,4 +1,4 @@
-"""A SLURM job whose refusal by ``sbatch`` is kept, instead of logged as a traceback."""
+"""A SLURM job that stores its refusal by ``sbatch`` instead of logging a traceback."""
 
 from __future__ import annotations
 

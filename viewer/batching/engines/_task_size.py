@@ -7,7 +7,7 @@ from statistics import median
 
 __all__ = ["LONGEST", "TaskSize"]
 
-_SECONDS = 0.5  # duration of a task at which scheduling takes about a percent of its time
+_SECONDS = 0.5  # duration of a task for which scheduling takes about 1 % of the time
 _MOST = 64  # maximum number of items per task
 _GROWTH = 8  # items that finish before tasks grow by one item
 _RECENT = 32  # number of items whose times are used
@@ -39,7 +39,7 @@ class TaskSize:
     def now(self, n_left: int, n_workers: int) -> int:
         """Return the number of items for the next task, from 1 to 64.
 
-        ``n_left``: number of items that no task has yet; 0 if it is unknown.
+        ``n_left``: number of items that are not in a task yet; 0 if unknown.
         """
         # Not the mean, because a worker's first item also loads modules.
         each = median(self._seconds) if self._seconds else _SECONDS

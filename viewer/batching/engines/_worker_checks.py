@@ -15,7 +15,7 @@ __all__ = ["WorkerChecks"]
 
 
 class WorkerChecks:
-    """Checks of what workers reply.
+    """Checks of the replies of workers.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ class WorkerChecks:
             )
         if reply.missing and os.path.lexists(reply.missing):
             raise ViewerError(
-                f"--cluster: the worker {reply.worker} does not find "
+                f"--cluster: the worker {reply.worker} cannot find "
                 f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
                 "inputs under the same paths"
             )
@@ -66,5 +66,5 @@ class WorkerChecks:
         if not os.path.lexists(path):
             self._note(
                 f"the worker {worker} wrote {printable(path, 300)}, which does not exist on this "
-                "machine: outputs need a folder that all workers share"
+                "machine: write outputs to a folder that all workers share"
             )

@@ -87,7 +87,7 @@ def _check_pickles(job: Job) -> None:
 
 @dataclass(frozen=True)
 class _Attempt:
-    """An item.
+    """One run of an item.
 
     ``earlier``: number of times that it has been started before.
     ``since``: time of the first start, in seconds since 1970.

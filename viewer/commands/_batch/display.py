@@ -17,7 +17,7 @@ from viewer.phrases import counted, printable
 
 __all__ = ["Display", "summary_lines"]
 
-_MINUTE = 60.0  # seconds between lines if there is no terminal, and of which the rate is shown
+_MINUTE = 60.0  # seconds between lines without a terminal, and over which the rate is averaged
 _MOST = 20  # maximum number of failures listed
 
 
@@ -49,7 +49,7 @@ class Display:
         rate = self._rate.at(self._n_done - self._n_unchanged)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
         if not (self._order and sys.stdout.isatty()):  # printed text would break the bar
-            # A title that changes would be a new bar, for which no time left is known.
+            # A new title would start a new bar, which could not estimate the time left.
             self._progress.unit = f"{rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
         now = time.monotonic()
@@ -86,7 +86,7 @@ class Display:
 
 
 class _Rate:
-    """Items per second in the last minute, in which many others may have been skipped."""
+    """Items per second over the last minute; unchanged items do not count."""
 
     def __init__(self) -> None:
         self._samples = deque([(time.monotonic(), 0)])

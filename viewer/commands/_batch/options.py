@@ -86,7 +86,7 @@ def _add_processes(group: argparse._ArgumentGroup, timeout: float | None) -> Non
         type=_whole,
         metavar="N",
         help="worker processes; 0: run in this process (default: 0 for few inputs, otherwise one "
-        "per core; with --cluster slurm, those of one job)",
+        "per core; with --cluster slurm, the workers of one job)",
     )
     group.add_argument(
         "--cluster",

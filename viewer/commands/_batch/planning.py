@@ -191,7 +191,7 @@ def _processes(request: Request, items: Sequence[Item]) -> tuple[str, Limits, li
 
 
 def _limits(request: Request, n_items: int) -> Limits:
-    """Return the limits; raise ViewerError if a number is wrong."""
+    """Return the limits; raise ViewerError if one is invalid."""
     timeout = request.usual_timeout if request.timeout is None else request.timeout or None
     if timeout is not None and not timeout >= 0.0:  # also true for NaN
         raise ViewerError(f"--timeout: expected 0 or more, found {timeout:g}")
@@ -231,6 +231,6 @@ def _cores() -> int:
         count = len(os.sched_getaffinity(0))
     else:
         count = os.cpu_count() or 1
-    # SLURM need not bind a task to its cores.
+    # SLURM does not always bind a task to its assigned cores.
     assigned = os.environ.get("SLURM_CPUS_PER_TASK") or os.environ.get("SLURM_CPUS_ON_NODE", "")
     return min(count, int(assigned)) if assigned.isdecimal() and int(assigned) else count

@@ -92,7 +92,7 @@ MESSAGES = {
     "F007.video-tracks": "ignored because it does not match the people in the results: all are "
     "treated as present in every frame",
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
-    "their order in the list",
+    "their order",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
     "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "

@@ -35,7 +35,7 @@ MESSAGES = {
     "D002.points-by-index": "no point names in common: compared by index",
     "D002.rates": "frame rates differ ({first:g} and {second:g} fps): compared at the first",
     "D002.searched": "closest points computed in {n:#frame/{all}}",
-    "D002.unit": "units differ: the second is in {second}, compared in {first}",
+    "D002.unit": "units differ ({first} and {second}): compared in {first}",
     "D002.up": "up axes differ ({first} and {second}): compared without conversion",
 }
 

@@ -72,9 +72,9 @@ MESSAGES = {
     "{gaps:list}",
     "X006.locked": "{figure:text}: feet held in place in {n:#contact}; they slide by {after} "
     f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}"
-    f"{{glides:+; contacts in which they glide too far to be held: {{}}}}: {_MOVED}",
+    f"{{glides:+; contacts not held because the feet glide too far: {{}}}}: {_MOVED}",
     "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
-    "X006.only-glides": "{figure:text}: no foot is held, since they glide too far in "
+    "X006.only-glides": "{figure:text}: feet not held, since they glide too far in "
     "{n:#contact} with the ground",
     "X006.no-legs": "{figure:text}: feet not held, since no legs were found by joint name",
     "X006.grounded": "{figure:text}: {way} by {height}, so that its feet rest at height 0",

@@ -1,4 +1,4 @@
-r"""Reader of ``.npz`` and ``.npy`` files: arrays, and by the pickle reader also dicts in objects.
+r"""Reader of ``.npz`` and ``.npy`` files: arrays, and dicts in arrays of objects.
 
 ::
 

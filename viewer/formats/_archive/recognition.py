@@ -52,7 +52,7 @@ def _is_video_mocap(archive: Archive) -> bool:
 
 
 def _has_tool(archive: Archive) -> bool:
-    """Return the same for an archive that can be opened even if a nested pickle cannot be read."""
+    """Return whether a tool is recognised; False if a nested pickle cannot be read."""
     try:
         return _is_video_mocap(archive)
     except FormatError:

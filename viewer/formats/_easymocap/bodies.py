@@ -105,8 +105,8 @@ def body_layout(record: dict[str, Any], usual: Mapping[str, int] | None = None) 
     Raises
     ------
     RecordError
-        If no layout has this length, it is unusual, or the record is invalid and therefore cannot
-        determine the layout of others.
+        If no layout has this length, the length is unusual, or the record is invalid and therefore
+        cannot determine the layout of others.
     """
     usual = usual or {}
     count = len(row_of(record, "poses"))

@@ -1,6 +1,6 @@
-"""Numbers of values that are usual in a recording, from a few files spread over it.
+"""Usual numbers of values in a recording, determined from a few frames spread over it.
 
-The first record alone must not decide for all others: it may be the unusual one.
+The first record alone must not decide for all others, because it may be unusual.
 """
 
 from __future__ import annotations

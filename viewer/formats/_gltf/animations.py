@@ -155,8 +155,8 @@ def _range(document: Document, animation: Element, inputs: set[int]) -> tuple[fl
 def _declared(accessors: Table, inputs: set[int]) -> tuple[float, float] | None:
     """Return the least minimum and the largest maximum that accessors declare.
 
-    None if any is unusable. Files may have a separate accessor for each of their thousands of
-    channels, so a valid one costs little.
+    None if any is invalid. Each of thousands of channels may have its own accessor, so the check of
+    valid ones is short.
     """
     try:
         if min(inputs) < 0 or set(map(type, inputs)) != {int}:

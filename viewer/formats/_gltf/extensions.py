@@ -31,7 +31,7 @@ _ABOUT = re.compile(r"[A-Z]+_(materials|texture)_")
 _WITHOUT_EFFECT = ("KHR_lights_punctual", "KHR_xmp_json_ld")
 
 KEPT_EXTENSIONS = frozenset((*_GEOMETRY, *DRAWN_EXTENSIONS, *_CHARACTERS))
-"""Extensions whose effect is written back, if not always in the same form."""
+"""Extensions whose effect is written back, although not always in the same form."""
 
 _KNOWN = KEPT_EXTENSIONS | {*_WITHOUT_EFFECT}
 """Extensions that a file may require."""

@@ -17,7 +17,7 @@ _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\
 
 
 def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
-    """Return the members that are not written back, each once: ``images.extras``.
+    """Return the members that are not written back, each once, such as ``images.extras``.
 
     Parameters
     ----------

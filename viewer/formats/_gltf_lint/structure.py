@@ -46,7 +46,7 @@ def check_structure(
         for place, root_node in enumerate(listed(scene, "nodes")):
             if isinstance(root_node, int) and root_node in seen:
                 at = ("scenes", index, "nodes", place)
-                report("G003.structure", "each node once", root_node, at)
+                report("G003.structure", "each node once", f"node {root_node} again", at)
             elif isinstance(root_node, int):
                 seen.add(root_node)
     nodes = dict(items_of(root, "nodes"))
@@ -89,14 +89,14 @@ def _check_skinned(
     ]
     for node in np.flatnonzero(tree.skins >= 0).tolist():
         if parents[node] >= 0:
-            found = f"one below node {parents[node]}, whose transform has no effect"
+            found = f"a child of node {parents[node]}, whose transform has no effect"
             report("G007.skinned-child", "a root", found, ("nodes", node))
         joints = skins[int(tree.skins[node])].joints.tolist()
         top, roots = path_to_root(parents, node)[-1], {path_to_root(parents, j)[-1] for j in joints}
         shown = [scene for scene in scenes if top in scene]
         if shown and not any(scene >= roots for scene in shown):
             wanted = "joints in the scene of the mesh"
-            report("G004.structure", wanted, "joints outside of it", ("nodes", node))
+            report("G004.structure", wanted, "joints outside it", ("nodes", node))
 
 
 def _check_animation(
@@ -110,7 +110,7 @@ def _check_animation(
         moved, node = part(channel, "target", "path"), part(channel, "target", "node")
         owner = nodes.get(node, {}) if isinstance(node, int) else {}
         if "skin" in owner and moved in ("translation", "rotation", "scale"):
-            found = f"the {moved} of one, which has no effect"
+            found = f"a node with a skinned mesh, whose {moved} has no effect"
             at = (*path, "channels", place, "target", "path")
             report("G007.skinned-moved", "a node without a skinned mesh", found, at)
 

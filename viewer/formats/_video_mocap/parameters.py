@@ -143,7 +143,7 @@ def read(source: Source, archive: Archive) -> Results:
 
 
 def _rate(archive: Archive, key: str) -> float | None:
-    """Return the frame rate; None for a value that is none."""
+    """Return the frame rate; None if the value is not a frame rate."""
     value = archive.get(key) if key else None
     if isinstance(value, Deferred) and value.dtype.kind in "iuf":
         value = float(value.values().reshape(-1)[0])
@@ -255,7 +255,7 @@ def _people(
 def _people_of_arrays(
     source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]], tracks: list[Track]
 ) -> dict[int, Track]:
-    """Return the people of dicts, each of which has all frames of one person, or of several."""
+    """Return the people of dicts, each of which has all frames of one or several people."""
     people: dict[int, Track] = {}
     most = 1
     for index, ((path, archive, layout), track) in enumerate(zip(found, tracks, strict=True)):
@@ -289,7 +289,7 @@ def _persons(archive: Archive, layout: _Layout, frames: Frames) -> Frames:
 
 
 def _rows_of(track: Track, chosen: Frames) -> Track:
-    """Return rows of a track, in the order of frames, of which only the first row is kept."""
+    """Return rows of a track in the order of their frames; only the first of a frame is kept."""
     frames, first = np.unique(track.frames[chosen], return_index=True)
     kept = chosen[first]
     shape, count = track.shape, len(track.frames)

@@ -65,7 +65,7 @@ def tool_of(archive: Archive) -> str | None:
         try:
             if module_of(tool).recognises(archive):
                 return tool
-        except FormatError as found:  # of an array of objects that another tool may not need
+        except FormatError as found:  # in an array of objects that other tools may not need
             problem = problem or found
     if problem is not None:
         raise problem

@@ -38,7 +38,7 @@ def recognises(archive: Archive) -> bool:
     if not archive.keys or person_number(archive.keys[0]) is None:
         return False
     person = archive.inside(archive.keys[0])
-    # Other tools store the keys of the camera's space, too, but in any space, and no vertices.
+    # Other tools also use the keys of the camera's space, but in any space and without vertices.
     return has(person, *_KEYS["world"], "betas", "frame_ids") or has(
         person, *_KEYS["camera"], "betas", "frame_ids", "verts"
     )

@@ -11,8 +11,8 @@ from viewer.rig.geometry.vectors import unit
 
 __all__ = ["Leg", "bend", "reach"]
 
-# Offset of the knee, relative to the leg's length, by which its direction is moved forwards: 80 mm
-# for a person. The direction of a nearly straight leg is noise.
+# Forward bias of the direction of the knee, relative to the leg's length: 80 mm for a person. The
+# direction of a nearly straight knee is only noise.
 _FORWARDS = 0.1
 _REACH = 0.9999  # maximum extension relative to the leg's length: a straight knee has no direction
 

@@ -15,7 +15,9 @@ from viewer.rig.geometry.vectors import unit
 
 __all__ = ["hinges", "leg_rotations", "lowering"]
 
-_FLEXED = np.sin(np.radians(15.0))  # sine of the bend that shows the axis of a knee
+_FLEXED = np.sin(
+    np.radians(15.0)
+)  # sine of the bend at which a leg and ``across`` determine the axis equally
 
 
 def leg_rotations(
@@ -88,7 +90,7 @@ def hinges(thighs: Floats, points: tuple[Floats, Floats, Floats], across: Floats
     """Return the axis of a knee in every frame, a unit vector fixed to the thigh: (N, 3).
 
     This is the mean normal of the leg's plane, thigh x shin, weighted by the fourth power of the
-    sine of the bend; ``across`` has the weight of a slight bend.
+    sine of the bend; ``across`` has the weight of a bend of 15 degrees.
 
     Parameters
     ----------

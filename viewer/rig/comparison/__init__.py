@@ -89,7 +89,7 @@ class _Comparison:
         self.factor = self._unit_factor()
 
     def _unit_factor(self) -> float:
-        """Return the unit of the second over that of the first; 1 if either is unknown."""
+        """Return the ratio of the second unit to the first; 1 if either is unknown."""
         units = [actor.figure.unit for actor in (self.first, self.second)]
         if units[0] == units[1] or not all(unit in METRES for unit in units):
             return 1.0

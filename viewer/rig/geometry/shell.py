@@ -113,7 +113,7 @@ def _has_long_borders(corners: NDArray[np.int64], n_vertices: int) -> bool:
 
 
 def _scattered(count: int) -> Floats:
-    """Return whole numbers below 2**30 without a pattern (splitmix64, Steele et al. 2014).
+    """Return pseudo-random integers below 2**30 (splitmix64, Steele et al. 2014).
 
     Their sums are exact for up to 2**23 numbers. ``numpy.random`` would take longer to import.
     """

@@ -2,9 +2,9 @@
 
 The trunk stands upright in its mean posture, the legs hang straight down with the knees' axes
 sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
-level. Hands are straight if the file lays the bones of an arm along one line. All other joints keep
-their mean rotation. A bend of the spine or a twist of the forearms that never changes cannot be
-detected and becomes part of the rest pose.
+level. Hands are straight if shoulder, elbow and wrist are collinear in the zero pose. All other
+joints keep their mean rotation. A bend of the spine or a twist of the forearms that never changes
+cannot be detected and becomes part of the rest pose.
 """
 
 from __future__ import annotations
@@ -188,7 +188,7 @@ def _toes(postures: Postures, limb: LimbAxes, stands: Floats) -> dict[int, Float
 def _hands(skeleton: Skeleton, joints: dict[str, int]) -> dict[int, tuple[Floats, Floats]]:
     """Return the directions of hands whose arms are straight in the zero pose.
 
-    These are two directions for each wrist: in the axes of the forearm and of the hand.
+    For each wrist, this is the direction of the forearm in the axes of forearm and hand.
     """
     parents, found = skeleton.parents, {}
     turns, offsets = quaternion_to_matrix(skeleton.rest_rotations), skeleton.rest_translations
@@ -207,7 +207,7 @@ def _hands(skeleton: Skeleton, joints: dict[str, int]) -> dict[int, tuple[Floats
 
 
 def _straight(mean: Floats, forearm: Floats, hand: Floats) -> Floats:
-    """Return the mean rotation of a hand without its bend, if that is plausible."""
+    """Return the mean rotation of a hand without its bend, unless the bend is too large."""
     bent = mean @ hand
     return shortest_arc(bent, forearm) @ mean if bent @ forearm > _BENT else mean
 

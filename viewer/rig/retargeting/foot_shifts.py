@@ -21,7 +21,7 @@ _EXACT = 12.0  # decimal exponent of the weight of a fully held foot, plus 3
 # Number of passes that lift sinking feet, and their weight relative to the stiffness of the curves.
 _LIFTS, _LIFTED = 7, 0.25
 _SWAY = 0.15  # half the window of the two moving averages of the feet's shifts, seconds
-_SHAKE = 0.1  # seconds below which changes of the feet's translations are quick
+_SHAKE = 0.1  # duration below which changes of the feet's translations count as quick, seconds
 _FLIGHT = 0.05  # weight of the default translation relative to the weight of a planted foot
 _STRAIGHT = (0.8, 0.95)  # relative lengths below which a leg is bent and above which it is straight
 
@@ -200,7 +200,7 @@ def _sway(plan: FootPlan, shifts: list[Floats], weights: Floats, usual: Floats) 
 
 
 def _shake(plan: FootPlan, shifts: list[Floats]) -> Floats:
-    """Return the quick translation on which all planted feet agree: (N, 3).
+    """Return the quick translation that all planted feet have in common: (N, 3).
 
     Noise of the source's root moves body and feet alike. If the feet stay in place and the body
     does not follow them, this noise moves the knees. Noise of one leg must not move the others.

@@ -40,12 +40,8 @@ _WORDS = {
     "eye": "eye eyesmplhf eyeball",
 }
 _ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-_AMBIGUOUS = {
-    "foot",
-    "shoulder",
-    "hand",
-    "leg",
-}  # words for different joints in different conventions
+# Words for different joints in different conventions.
+_AMBIGUOUS = {"foot", "shoulder", "hand", "leg"}
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
 
@@ -129,7 +125,7 @@ def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
 
 @lru_cache(16)
 def _known_keys(names: tuple[str, ...]) -> tuple[_Key, ...]:
-    # The front of a figure is estimated from its names in several ways.
+    # Cached, because estimating the front of a figure requires them several times.
     return tuple(_keys(names))
 
 

@@ -40,7 +40,7 @@ __all__ = ["PlantedFeet", "plant_feet"]
 
 _EXTENDED = 0.97  # maximum extension of a corrected leg, as a fraction of its length
 _EASES = (0.1, 0.2)  # longer beginnings and ends of contacts, seconds
-_CALM = 1.15  # ratio of the knees' accelerations to those of the source that needs no longer one
+_CALM = 1.15  # largest growth of the knees' accelerations that needs no longer ease, a factor
 _ROUNDING = 1e-6  # tolerance of lengths, relative to the body
 _STEPS = 2 + 3 * (1 + len(_EASES))  # maximum number of steps reported as progress
 
@@ -90,7 +90,7 @@ class _Attempt:
 
     clip: SampledClip
     changes: PlantedFeet
-    knees: float  # the knees' largest accelerations relative to those before
+    knees: float  # ratio of the knees' largest accelerations to those before
 
 
 def plant_feet(

@@ -27,7 +27,7 @@ _SLOW, _FAST = 0.08, 0.2  # speeds per second at which a contact begins and ends
 _LOW, _HIGH = 0.015, 0.025
 _LOWEST = 0.02  # maximum height above the other foot of a foot that may be the lowest
 _UPRIGHT = 0.3  # minimum sine of the slope from the heel to the hip of a standing person
-_LOOSE = 0.05  # hold up to which a foot is not in contact at the beginning and end of a contact
+_LOOSE = 0.05  # maximum hold of rows that are removed from both ends of a contact
 _SHORTEST = 0.1  # minimum duration of a contact, seconds
 _LEVEL = 0.015  # maximum difference between heights of one level
 _GROUND = (-0.015, 0.06)  # range of heights of feet on a ground at height 0
@@ -109,7 +109,7 @@ def foot_contacts(
     up : (3,)
         The up axis.
     ease : float
-        Seconds over which a foot is held more at the beginning of a contact, and less at its end.
+        Seconds over which the hold rises at the beginning of a contact, and falls at its end.
     """
     lows = np.array([foot.lowest(up) for foot in feet])
     result = []
@@ -140,7 +140,7 @@ def _contact(
     eased: Floats,
     up: Floats,
 ) -> Contact | None:
-    """Return a contact without the loose rows at its ends; None if the person lies."""
+    """Return a contact without the loose rows at its ends; None if the person lies down."""
     toe, heel = stands
     slow = np.flatnonzero(hold >= 1.0) + start
     legs = foot.hip[slow] - foot.heel[slow]
