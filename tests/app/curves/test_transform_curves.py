@@ -131,6 +131,16 @@ def test_added_and_deleted_keys_are_undone(hand):
     assert len(channels(hand)) == 5 and not hand.state.of(Curves).keys
 
 
+def test_delete_without_selected_keys_changes_nothing(hand):
+    show(hand, "hip.tx")
+    old, steps = hand.state.actor.clip, hand.undo_steps
+    (x0, y0), (x1, _) = _center(hand, "key hip.tx 0"), _center(hand, "key hip.tx 1")
+    hand.move(((x0 + x1) / 2, y0 - 30))
+    hand.key("delete")
+    hand.step(2)
+    assert hand.state.actor.clip is old and hand.undo_steps == steps
+
+
 def test_pose_is_keyed_from_the_panel(hand):
     assert no_keys(hand.state) == ""
     hand.state.clock.seek(1.0)

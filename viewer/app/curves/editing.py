@@ -94,7 +94,8 @@ def nearest_row(
 def delete_chosen(state: AppState) -> None:
     """Delete the selected keys."""
     curves, keyed = state.of(Curves), keyed_of(state.actor)
-    if keyed is not None:
+    # Without selected keys, an equal clip would be an undo step that changes nothing.
+    if keyed is not None and curves.keys:
         state.actor.clip = keyed.deleted(curves.keys)
     curves.keys = frozenset()
 
