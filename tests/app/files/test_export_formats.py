@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from viewer.app.files.export_formats import FOLDER
+from viewer.app.files.export_formats import FOLDER, pose_formats
 from viewer.app.files.motion_export import motion_formats, unsuited_formats
 from viewer.app.files.state import Files
 
@@ -14,6 +14,12 @@ def test_chosen_format_changes_the_suffix_of_the_name(hand):
     hand.click("format .ply")
     assert hand.state.of(Files).dialog.name == "my.figure.ply"
     assert "format .bvh" not in hand.state.item_rects
+
+
+def test_export_of_a_pose_omits_the_motion_and_that_of_a_motion_keeps_it(curves):
+    posed, moving = pose_formats()[".glb"], motion_formats(curves.state.actor)[".glb"]
+    assert "motion" not in posed.keeps and posed.omits.startswith("motion, ")
+    assert moving.keeps == f"{posed.keeps}, motion" and "motion" not in moving.omits
 
 
 def test_format_that_cannot_store_the_motion_states_the_reason(curves):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from imgui_bundle import imgui
@@ -24,9 +25,18 @@ _COLUMNS = (("Format", 0.3), ("Keeps", 0.4), ("Omits", 0.3))
 
 
 def pose_formats() -> dict[str, Exporter]:
-    """Return the exporters of poses by suffix."""
-    kinds = [kind for kind in EXPORTERS.values() if kind.writes_pose]
+    """Return the exporters of poses by suffix; none of them keeps a motion then."""
+    kinds = [_of_pose(kind) for kind in EXPORTERS.values() if kind.writes_pose]
     return {suffix: kind for kind in kinds for suffix in kind.suffixes}
+
+
+def _of_pose(kind: Exporter) -> Exporter:
+    """Return an exporter with the data that it keeps and omits when it writes a single pose."""
+    kept = kind.keeps.split(", ")
+    if "motion" not in kept:
+        return kind
+    kept.remove("motion")
+    return replace(kind, keeps=", ".join(kept), omits=f"motion, {kind.omits}")
 
 
 def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
