@@ -44,6 +44,7 @@ def test_dialog_opens_a_file_by_double_click(dialog, rig):
 
 
 def test_dialog_chooses_several_with_ctrl(dialog):
+    assert "several files" in dialog.state.item_rects
     dialog.click("file inner")
     assert _listed(dialog) == ["inside.skel", "inside.skin"]
     dialog.click("file inside.skel")

@@ -10,6 +10,7 @@ from app.retargeting.driven import driven_scene
 from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_panel
+from viewer.app.core.undo_actions import redo, undo
 from viewer.app.files.state import Files
 from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.match_actions import (
@@ -127,9 +128,15 @@ def test_saved_maps_can_be_loaded(panel, tmp_path):
     match_automatically(state)
     assert np.array_equal(state.actor.clip.rotations, own.rotations)
     ask_for_map(state)
+    panel.step(2)
+    assert "Cancel" in state.item_rects and "several files" not in state.item_rects
     dialog = state.of(Files).dialog
     dialog.done(state, [path])
     assert np.array_equal(state.actor.clip.rotations, edited.rotations)
+    assert panel.says("Joints matched by")
+    undo(state)
+    assert panel.says("Undone") and not panel.says("Joints matched by")
+    redo(state)
     path.write_text("right_elbow = rEllbogn_x\n")
     kept = state.actor.clip
     dialog.done(state, [path])

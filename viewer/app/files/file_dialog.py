@@ -21,11 +21,7 @@ from viewer.phrases import printable
 __all__ = ["draw_file_dialog"]
 
 _SIZE = (46.0, 33.0)  # size of the dialog, in font sizes
-_HINTS = {
-    "open": "Ctrl+click selects several: a .skel and its .skin",
-    "folder": "",
-    "save": "",
-}
+_RIG = {".skel", ".skin"}
 
 
 def draw_file_dialog(state: AppState) -> None:
@@ -106,8 +102,10 @@ def _draw_buttons(state: AppState, dialog: FileDialog) -> list[Path]:
     imgui.same_line()
     if button(state, "Cancel"):
         state.of(Files).dialog = None
-    imgui.same_line()
-    imgui.text_disabled(_HINTS[dialog.purpose])
+    if dialog.purpose == "open" and dialog.suffixes >= _RIG:
+        imgui.same_line()
+        imgui.text_disabled("Ctrl+click selects several: a .skel and its .skin")
+        note_item(state, "several files")
     return result
 
 

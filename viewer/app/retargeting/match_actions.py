@@ -97,7 +97,7 @@ def _load(state: AppState, paths: list[Path]) -> None:
         state.error = str(problem)
         return
     text = f"Joints matched by {printable(paths[0], 200)}"
-    _apply(state, joint_map, lambda: state.say(text))
+    _apply(state, joint_map, lambda: state.say_status(text))
 
 
 def _save(state: AppState, paths: list[Path]) -> None:
