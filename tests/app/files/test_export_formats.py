@@ -18,7 +18,7 @@ def test_chosen_format_changes_the_suffix_of_the_name(hand):
 
 def test_export_of_a_pose_omits_the_motion_and_that_of_a_motion_keeps_it(curves):
     posed, moving = pose_formats()[".glb"], motion_formats(curves.state.actor)[".glb"]
-    assert "motion" not in posed.keeps and posed.omits.startswith("motion, ")
+    assert "motion" not in posed.title + posed.keeps and posed.omits.startswith("motion, ")
     assert moving.keeps == f"{posed.keeps}, motion" and "motion" not in moving.omits
 
 

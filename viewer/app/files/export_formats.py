@@ -36,7 +36,8 @@ def _of_pose(kind: Exporter) -> Exporter:
     if "motion" not in kept:
         return kind
     kept.remove("motion")
-    return replace(kind, keeps=", ".join(kept), omits=f"motion, {kind.omits}")
+    title = kind.title.partition(":")[0]
+    return replace(kind, title=title, keeps=", ".join(kept), omits=f"motion, {kind.omits}")
 
 
 def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
