@@ -9,14 +9,14 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.loading.cast import Cast
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
 from viewer.rig.units import METRES, UNIT_NAMES
 
 if TYPE_CHECKING:
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.figure_group import FigureGroup
 
-__all__ = ["place_side_by_side", "placed_views", "scale_to_one_unit", "stand_up"]
+__all__ = ["place_side_by_side", "placed_like", "placed_views", "scale_to_one_unit", "stand_up"]
 
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
@@ -24,9 +24,24 @@ _GAP = 0.25  # gap between actors side by side, relative to the width of the wid
 def stand_up(cast: Cast, world_up: str) -> None:
     """Rotate actors whose up axis differs from the scene's."""
     for actor, up in zip(cast.actors, cast.ups, strict=True):
-        if up != world_up:
-            quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
-            actor.placement = rotation_transform(0, quarter) @ actor.placement
+        _turn(actor, up, world_up)
+
+
+def _turn(actor: Actor, up: str, world_up: str) -> None:
+    if up != world_up:
+        quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
+        actor.placement = rotation_transform(0, quarter) @ actor.placement
+
+
+def placed_like(scene: Scene, actor: Actor) -> list[Diagnostic]:
+    """Rotate and scale an actor that is added to a scene; a note states a change of unit.
+
+    Its figure's up axis becomes that of the scene, and its unit that of the scene if both are
+    known.
+    """
+    unit = scene_unit(scene)
+    _turn(actor, actor.figure.up, scene.up)
+    return _scale(actor, unit) if unit else []
 
 
 def scale_to_one_unit(cast: Cast) -> None:
@@ -38,13 +53,18 @@ def scale_to_one_unit(cast: Cast) -> None:
     order = sorted(range(len(cast.actors)), key=lambda index: not cast.placed[index])
     unit = next((found for index in order if (found := _unit(cast.actors[index]))), "")
     for actor in cast.actors:
-        own = _unit(actor)
-        if own not in ("", unit):
-            factor = METRES[own] / METRES[unit]
-            actor.placement = np.diag([factor, factor, factor, 1.0]) @ actor.placement
-            values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
-            note = Diagnostic("F007.unit-matched", values={**values, "factor": factor})
-            cast.diagnostics.append(note)
+        cast.diagnostics += _scale(actor, unit)
+
+
+def _scale(actor: Actor, unit: str) -> list[Diagnostic]:
+    """Scale an actor to a unit; return a note if its own unit differs."""
+    own = _unit(actor)
+    if own in ("", unit):
+        return []
+    factor = METRES[own] / METRES[unit]
+    actor.placement = np.diag([factor, factor, factor, 1.0]) @ actor.placement
+    values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
+    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
 
 
 def _unit(actor: Actor) -> str:
