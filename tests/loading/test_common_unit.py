@@ -2,13 +2,21 @@
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from formats.capture_files import body, points, write_frames
+from formats.easymocap.test_camera_files import cameras
 from numpy.testing import assert_allclose
 from rig.animated import leg
 
-from viewer.loading import Contents, begin
+from viewer.export.rig import scaled
+from viewer.formats.rigged import save
+from viewer.loading import Contents, begin, bundled_body, load
+from viewer.loading.cast import Cast
+from viewer.loading.placing import placed_views, stand_up
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.scene import scene_unit
 
 
@@ -43,3 +51,38 @@ def test_scaled_figures_stand_side_by_side():
     sides = [actor.placement[0, 3] for actor in scene.actors]
     # The second is 0.01 times as wide as the first.
     assert 0.0 < sides[1] - sides[0] < 3.0
+
+
+def test_later_people_and_cameras_of_a_capture_are_scaled(tmp_path):
+    known = load(bundled_body()).actors[0].figure
+    skeleton = scaled(known, 100.0).skeleton
+    names = ("Hips", *skeleton.names[1:])  # another name, so that the capture drives the figure
+    save(
+        replace(scaled(known, 100.0), unit="cm", skeleton=replace(skeleton, names=names)),
+        tmp_path / "large.npz",
+    )
+    folder = tmp_path / "capture"
+    first, both = (0,), (0, 1)
+    for name, record in {"smpl": body, "keypoints3d": points}.items():
+        frames = {
+            n: [record(person) for person in people] for n, people in enumerate([first, both])
+        }
+        write_frames(folder / name, frames)
+    cameras(folder)
+    scene = load(tmp_path / "large.npz", folder)
+    assert scene_unit(scene) == "cm"
+    scales = [np.linalg.norm(a.placement[:3, 0]) for a in scene.actors if a.figure.points]
+    assert scales == pytest.approx([100.0, 100.0])
+    assert_allclose(scene.views[0].translation, [50.0, -100.0, 300.0])
+    notes = [found for found in scene.diagnostics if found.key == "F007.unit-matched"]
+    assert len(notes) == 1  # of the first person only
+
+
+def test_later_people_and_cameras_are_upright():
+    late, cast = SimpleNamespace(placement=np.eye(4), up="y", views=(), unit=""), Cast([])
+    late.views = (CameraView("1", np.eye(3), np.eye(3), np.array([0.0, 1.0, 0.0])),)
+    cast.builders = [late]
+    stand_up(cast, "z")
+    assert_allclose(late.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], atol=1e-12)
+    view = placed_views(cast)[0]
+    assert_allclose(-view.rotation.T @ view.translation, [0.0, 0.0, -1.0], atol=1e-12)

@@ -13,7 +13,9 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
+from viewer.loading.placing import scale_to_unit
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart
 from viewer.rig.captures.person import is_tracked, person_label
 from viewer.rig.captures.points import PointClip, PointLayout
@@ -64,6 +66,10 @@ class Builder:
         Whether the capture's shape coefficients are valid for the model.
     placement : (4, 4)
         Placement of every actor.
+    unit : str
+        Unit of the scene, to which later people are scaled; empty if it is unknown.
+    views : tuple of CameraView
+        Its cameras, in metres, before placement.
     up : "y" or "z"
         The axis along which people stand before placement.
     n_read : int
@@ -92,6 +98,8 @@ class Builder:
     called: str = ""
     keeps_shape: bool = True
     placement: Floats = field(default_factory=lambda: np.eye(4))
+    unit: str = ""
+    views: tuple[CameraView, ...] = ()
     up: Literal["y", "z"] = "y"
     n_read: int = 0
     is_cut: bool = False
@@ -298,9 +306,10 @@ class Builder:
         return []
 
     def _actor(self, figure: Figure, clip: SampledClip | PointClip, person: int) -> Actor:
-        called = self.called or self.capture.name
-        placement = self.placement.copy()
-        return Actor(figure, clip=clip, placement=placement, person=person, called=called)
+        actor = Actor(figure, clip=clip, placement=self.placement.copy(), person=person)
+        actor.called = self.called or self.capture.name
+        scale_to_unit(actor, self.unit)
+        return actor
 
     @property
     def actors(self) -> list[Actor]:

@@ -21,7 +21,6 @@ from viewer.loading.contents import Contents
 from viewer.loading.filming import filmed
 from viewer.loading.refusals import map_refusal, model_refusal
 from viewer.loading.settings import MotionSettings
-from viewer.rig.captures.camera_view import placed_view
 from viewer.rig.captures.capture import Capture
 from viewer.rig.captures.capture_rate import capture_rate
 from viewer.rig.figure import Figure
@@ -355,7 +354,7 @@ def _begin_capture(
     rate = _rate(builder.actors, settings)
     views, images, notes = filmed(capture, capture.views, settings, rate)
     cast.diagnostics += notes
-    cast.views += [placed_view(view, builder.placement) for view in views]
+    builder.views = tuple(views)
     cast.images = cast.images or images
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)

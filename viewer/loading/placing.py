@@ -9,14 +9,23 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.loading.cast import Cast
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
-from viewer.rig.scene import Actor, Scene, scene_box
+from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
 from viewer.rig.units import METRES, UNIT_NAMES
 
 if TYPE_CHECKING:
+    from viewer.loading.capturing import Builder
+    from viewer.rig.arrays import Floats
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.figure_group import FigureGroup
 
-__all__ = ["place_side_by_side", "placed_views", "scale_to_one_unit", "stand_up"]
+__all__ = [
+    "place_side_by_side",
+    "placed_like",
+    "placed_views",
+    "scale_to_one_unit",
+    "scale_to_unit",
+    "stand_up",
+]
 
 _GAP = 0.25  # gap between actors side by side, relative to the width of the wider one
 
@@ -24,9 +33,26 @@ _GAP = 0.25  # gap between actors side by side, relative to the width of the wid
 def stand_up(cast: Cast, world_up: str) -> None:
     """Rotate actors whose up axis differs from the scene's."""
     for actor, up in zip(cast.actors, cast.ups, strict=True):
-        if up != world_up:
-            quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
-            actor.placement = rotation_transform(0, quarter) @ actor.placement
+        _turn(actor, up, world_up)
+    for builder in cast.builders:  # for people who appear later
+        _turn(builder, builder.up, world_up)
+
+
+def _turn(turned: Actor | Builder, up: str, world_up: str) -> None:
+    if up != world_up:
+        quarter = np.pi / 2 if world_up == "z" else -np.pi / 2
+        turned.placement = rotation_transform(0, quarter) @ turned.placement
+
+
+def placed_like(scene: Scene, actor: Actor) -> list[Diagnostic]:
+    """Rotate and scale an actor that is added to a scene; a note states a change of unit.
+
+    Its figure's up axis becomes that of the scene, and its unit that of the scene if both are
+    known.
+    """
+    unit = scene_unit(scene)
+    _turn(actor, actor.figure.up, scene.up)
+    return scale_to_unit(actor, unit)
 
 
 def scale_to_one_unit(cast: Cast) -> None:
@@ -38,13 +64,24 @@ def scale_to_one_unit(cast: Cast) -> None:
     order = sorted(range(len(cast.actors)), key=lambda index: not cast.placed[index])
     unit = next((found for index in order if (found := _unit(cast.actors[index]))), "")
     for actor in cast.actors:
-        own = _unit(actor)
-        if own not in ("", unit):
-            factor = METRES[own] / METRES[unit]
-            actor.placement = np.diag([factor, factor, factor, 1.0]) @ actor.placement
-            values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
-            note = Diagnostic("F007.unit-matched", values={**values, "factor": factor})
-            cast.diagnostics.append(note)
+        cast.diagnostics += scale_to_unit(actor, unit)
+    for builder in cast.builders:
+        builder.unit = unit
+
+
+def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
+    """Scale an actor to a unit; return a note if both units are known and differ."""
+    own = _unit(actor)
+    if not unit or own in ("", unit):
+        return []
+    factor = METRES[own] / METRES[unit]
+    actor.placement = _scaling(factor) @ actor.placement
+    values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
+    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
+
+
+def _scaling(factor: float) -> Floats:
+    return np.diag([factor, factor, factor, 1.0])
 
 
 def _unit(actor: Actor) -> str:
@@ -90,18 +127,20 @@ def _by_group(cast: Cast) -> list[list[Actor]]:
 
 
 def placed_views(cast: Cast) -> list[CameraView]:
-    """Return the cameras of figure groups, moved with their figures."""
+    """Return the cameras of captures and figure groups, moved and scaled with their figures."""
+    placed = [
+        # Captures are in metres.
+        (builder.views, _scaling(1.0 / METRES[builder.unit or "m"]) @ builder.placement)
+        for builder in cast.builders
+    ]
     placements = {
         group: actor.placement
         for actor, group in zip(cast.actors, cast.groups, strict=True)
         if group is not None
     }
-    if not placements:
+    placed += [(group.views, placement) for group, placement in placements.items()]
+    if not any(views for views, _ in placed):
         return []
     from viewer.rig.captures.camera_view import placed_view
 
-    return [
-        placed_view(view, placement)
-        for group, placement in placements.items()
-        for view in group.views
-    ]
+    return [placed_view(view, placement) for views, placement in placed for view in views]

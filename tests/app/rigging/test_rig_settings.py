@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from viewer.autorig.alignment.surface_alignment import AlignmentSettings
 from viewer.export import export
 from viewer.formats.rigged import save
 from viewer.rig.geometry.transform import apply_transform
-from viewer.rig.scene import Actor, Scene
+from viewer.rig.scene import Actor, Scene, actor_points
 from viewer.rig.skinning import deform
 
 pytestmark = pytest.mark.usefixtures("quick_fits")
@@ -231,6 +232,33 @@ def test_target_that_is_already_rigged_is_refused(drive, tmp_path):
     assert hand.state.error == (
         f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found a rigged mesh"
     )
+
+
+def test_mesh_and_template_are_added_in_the_unit_and_up_axis_of_the_scene(drive, tmp_path):
+    figure, pose = rig_scene.bent()
+    scan = rig_scene.scan(figure, pose)
+    held = Actor(replace(scan, unit="cm", up="z"))
+    hand = drive(scene=Scene([held], (), "z"), size=SIZE, samples=1)
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    mesh = replace(scan, name="other", unit="m", up="y")
+    export(Actor(mesh), tmp_path / "other.obj")
+    save(replace(figure, unit="mm", up="y"), tmp_path / "arm.npz")
+    start_adding(hand.state, tmp_path / "other.obj")
+    hand.finish_job()
+    assert hand.state.error == ""
+    added = hand.state.scene.actors[1]
+    # The y axis of the file becomes the z axis of the scene, and a metre 100 units.
+    assert_allclose(added.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 100.0], atol=1e-9)
+    assert hand.says("other is in metres")
+    start_reading(hand.state, (tmp_path / "arm.npz",))
+    hand.finish_job()
+    hand.click("Pose it…")
+    hand.step(2)
+    posed = hand.state.scene.actors[2]
+    assert_allclose(posed.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 0.1], atol=1e-12)
+    points = [actor_points(actor)[:, 0] for actor in hand.state.scene.actors]
+    assert points[2].min() > max(points[0].max(), points[1].max())
 
 
 def test_result_is_saved_and_opens_again(rigging, tmp_path):

@@ -1,6 +1,7 @@
 """Long text files, which are read part by part: the same content, offsets and lines."""
 
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -47,6 +48,9 @@ def test_parts_of_whole_lines_make_up_the_text(tmp_path, data, length):
     assert len(text) == len(wanted)
     assert all(part.endswith((b"\n", b"\r")) for part in parts[:-1])
     assert all(parts)
+    assert not any(
+        one.endswith(b"\r") and next_.startswith(b"\n") for one, next_ in pairwise(parts)
+    )
 
 
 @pytest.mark.parametrize("block", [1, 2, 3, 5, 1000])

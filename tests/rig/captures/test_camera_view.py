@@ -1,5 +1,7 @@
 """Moving cameras: their placement at frames, between frames and across gaps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -73,6 +75,14 @@ def test_camera_scaled_with_its_scene_shows_the_same_pixels() -> None:
         # Only the depths of all points change, by the same factor.
         assert_allclose(seen, 0.01 * (old.rotation @ point + old.translation), atol=1e-12)
         assert_allclose(new.rotation @ new.rotation.T, np.eye(3), atol=1e-12)
+
+
+def test_clipping_planes_are_scaled_with_the_scene() -> None:
+    view = CameraView("1", np.eye(3), np.eye(3), np.zeros(3), near=5.0, far=2000.0)
+    after = placed_view(view, np.diag([0.01, 0.01, 0.01, 1.0]))
+    assert (after.near, after.far) == pytest.approx((0.05, 20.0))
+    endless = placed_view(replace(view, near=None, far=None), np.eye(4))
+    assert (endless.near, endless.far) == (None, None)
 
 
 def test_motion_times_skip_gaps_and_include_both_ends() -> None:

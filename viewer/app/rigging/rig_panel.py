@@ -39,6 +39,7 @@ from viewer.app.rigging.state import RigChoices, Rigging, Template
 from viewer.app.rigging.work import start_adding, start_match, start_reading, start_run
 from viewer.autorig.settings import JOINTS, METHODS
 from viewer.formats import MESHES
+from viewer.loading.placing import placed_like
 from viewer.phrases import printable
 from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import bounding_box
@@ -153,12 +154,13 @@ def _add_template(state: AppState) -> None:
     assert template is not None  # the template has been read
     actor = Actor(template.figure, template.pose.copy(), template.clip)
     actor.called = free_title(state.scene.actors, actor.title)
+    state.say(*placed_like(state.scene, actor))
     span = bounding_box(actor_points(actor))[:, 0]
     edge = max(
         (actor_points(one)[:, 0].max() for one in state.scene.actors if one.is_drawn), default=0.0
     )
     shift = edge - span[0] + (_GAP - 1.0) * (span[1] - span[0])
-    actor.placement = translation_matrix(np.array([shift, 0.0, 0.0]))
+    actor.placement = translation_matrix(np.array([shift, 0.0, 0.0])) @ actor.placement
     state.scene.actors.append(actor)
     state.choose_actor(len(state.scene.actors) - 1)
     choose_template(state, f"actor {id(actor)}")

@@ -42,6 +42,7 @@ from viewer.autorig.pipeline import transfer
 from viewer.autorig.settings import METHODS
 from viewer.errors import RigError
 from viewer.loading import load
+from viewer.loading.placing import placed_like
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.ray_hit import surface_point
@@ -112,10 +113,11 @@ def start_adding(state: AppState, path: Path) -> None:
 
         def finish(state: AppState) -> None:
             actor.called = free_title(state.scene.actors, actor.title)
+            notes = placed_like(state.scene, actor)
             state.scene.actors.append(actor)
             state.paths = (*state.paths, path)
             state.of(Rigging).target = None  # makes the panel choose again
-            state.say(*scene.diagnostics)
+            state.say(*scene.diagnostics, *notes)
             _show_added(state, actor)
 
         return finish

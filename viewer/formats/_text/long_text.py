@@ -67,6 +67,8 @@ class LongText:
 def line_parts(text: bytes | LongText, length: int) -> Iterator[bytes]:
     """Yield a text in parts of whole lines, which end with LF or CR; only the last may not.
 
+    A line ending is never divided.
+
     Parameters
     ----------
     text : bytes or LongText
@@ -78,7 +80,8 @@ def line_parts(text: bytes | LongText, length: int) -> Iterator[bytes]:
     # Reading as much as is left over keeps the cost of a long line proportional to its length.
     while new := _between(text, offset, offset + max(length, len(rest))):
         offset += len(new)
-        end = max(new.rfind(b"\n"), new.rfind(b"\r")) + 1
+        # Carriage returns at the end may belong to a line feed that has not been read yet.
+        end = max(new.rfind(b"\n"), new.rstrip(b"\r").rfind(b"\r")) + 1
         if end:
             yield rest + new[:end]
         rest = new[end:] if end else rest + new

@@ -158,7 +158,8 @@ def placed_view(view: CameraView, placement: Floats) -> CameraView:
     turn = placement[:3, :3] / scale
     rotation = view.rotation @ turn.T
     translation = scale * view.translation - rotation @ place
-    moved = replace(view, rotation=rotation, translation=translation)
+    near, far = (None if one is None else scale * one for one in (view.near, view.far))
+    moved = replace(view, rotation=rotation, translation=translation, near=near, far=far)
     if view.motion is None:
         return moved
     rotations = view.motion.rotations @ turn.T
