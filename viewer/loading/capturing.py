@@ -13,7 +13,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.loading.body_driving import body_drive
-from viewer.loading.placing import scale_to_unit
+from viewer.loading.scaling import scale_to_unit
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.captures.capture import Capture, CapturePart

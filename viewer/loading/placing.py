@@ -8,13 +8,13 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic
 from viewer.loading.cast import Cast
+from viewer.loading.scaling import known_unit, scale_to_unit, scaling
 from viewer.rig.geometry.transform import rotation_transform, translation_matrix
 from viewer.rig.scene import Actor, Scene, scene_box, scene_unit
-from viewer.rig.units import METRES, UNIT_NAMES
+from viewer.rig.units import METRES
 
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
-    from viewer.rig.arrays import Floats
     from viewer.rig.captures.camera_view import CameraView
     from viewer.rig.figure_group import FigureGroup
 
@@ -23,7 +23,6 @@ __all__ = [
     "placed_like",
     "placed_views",
     "scale_to_one_unit",
-    "scale_to_unit",
     "stand_up",
 ]
 
@@ -62,33 +61,11 @@ def scale_to_one_unit(cast: Cast) -> None:
     of the first actor with a known unit. Actors with an unknown unit are not scaled.
     """
     order = sorted(range(len(cast.actors)), key=lambda index: not cast.placed[index])
-    unit = next((found for index in order if (found := _unit(cast.actors[index]))), "")
+    unit = next((found for index in order if (found := known_unit(cast.actors[index]))), "")
     for actor in cast.actors:
         cast.diagnostics += scale_to_unit(actor, unit)
     for builder in cast.builders:
         builder.unit = unit
-
-
-def scale_to_unit(actor: Actor, unit: str) -> list[Diagnostic]:
-    """Scale an actor to a unit; return a note if both units are known and differ."""
-    own = _unit(actor)
-    if not unit or own in ("", unit):
-        return []
-    factor = METRES[own] / METRES[unit]
-    actor.placement = _scaling(factor) @ actor.placement
-    values = {"figure": actor.name, "unit": UNIT_NAMES[own], "wanted": UNIT_NAMES[unit]}
-    return [Diagnostic("F007.unit-matched", values={**values, "factor": factor})]
-
-
-def _scaling(factor: float) -> Floats:
-    return np.diag([factor, factor, factor, 1.0])
-
-
-def _unit(actor: Actor) -> str:
-    """Return the unit of an actor; empty if it is unknown."""
-    if actor.figure.points is not None:  # captured keypoints
-        return "m"
-    return actor.figure.unit if actor.figure.unit in METRES else ""
 
 
 def place_side_by_side(cast: Cast) -> None:
@@ -130,7 +107,7 @@ def placed_views(cast: Cast) -> list[CameraView]:
     """Return the cameras of captures and figure groups, moved and scaled with their figures."""
     placed = [
         # Captures are in metres.
-        (builder.views, _scaling(1.0 / METRES[builder.unit or "m"]) @ builder.placement)
+        (builder.views, scaling(1.0 / METRES[builder.unit or "m"]) @ builder.placement)
         for builder in cast.builders
     ]
     placements = {

@@ -4,8 +4,10 @@ import threading
 
 import pytest
 
+from viewer.app.files.saving import save_in_background
 from viewer.app.posing.pose_actions import save_export
 from viewer.export import obj
+from viewer.media.saving import save_text
 from viewer.progress import report
 
 
@@ -61,6 +63,26 @@ def test_cancelled_export_keeps_the_old_file(hand, paused, tmp_path):
     hand.step(3)
     assert hand.state.job is None and not hand.state.error
     assert (tmp_path / "a.obj").read_text() == "old" and sorted(tmp_path.iterdir()) == files
+
+
+def test_export_cancelled_after_its_last_report_keeps_the_old_file(hand, tmp_path):
+    path = tmp_path / "a.obj"
+    path.write_text("old")
+    is_written, may_end = threading.Event(), threading.Event()
+
+    def act():
+        save_text(path, "new")
+        is_written.set()
+        assert may_end.wait(30.0)
+        return []
+
+    save_in_background(hand.state, act, [path])
+    job = hand.state.job
+    assert is_written.wait(30.0)
+    job.cancel()
+    may_end.set()
+    job.wait()
+    assert path.read_text() == "old" and not job.error
 
 
 def test_second_export_waits_for_the_first(hand, paused, tmp_path):

@@ -186,6 +186,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
                     notes = _write_together(scene, parts, still, path, options)
                 else:
                     notes = _write(scene, parts, key, options)
+                report(1, 1, "")  # as in save_in_background
                 return [*map(str, [*notes, *left_out])]
 
     state.job = CountedJob(title, write)

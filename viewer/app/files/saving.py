@@ -60,6 +60,7 @@ def save_in_background(
     def write(report: Report) -> list[str]:
         with receiving(lambda done, total, *_: report(done, total, "")), all_or_none(files):
             notes = act()
+            report(1, 1, "")  # the last chance to cancel, before the old files are discarded
         return [*map(str, notes), _saved(files)]
 
     state.job = CountedJob(f"Writing {printable(files[0].name, 60)}", write)
