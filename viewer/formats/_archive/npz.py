@@ -13,6 +13,7 @@ numpy's reader would evaluate it as Python code, and warns about files of Python
 
 from __future__ import annotations
 
+import contextlib
 import math
 import re
 import struct
@@ -198,40 +199,38 @@ def _parse_shape(text: bytes | None) -> tuple[int, ...] | None:
     return tuple(map(int, words))
 
 
-def _load_member(storage: StoredFile, member: zipfile.ZipInfo, header: _Header) -> NDArray[Any]:
-    key = _key(member)
+@contextlib.contextmanager
+def _opened(storage: StoredFile, member: zipfile.ZipInfo) -> Iterator[IO[bytes]]:
+    """Open a member for reading; raise FormatError if it is damaged."""
     try:
         with (
             storage.open() as file,
             zipfile.ZipFile(file) as archive,
             archive.open(member) as stream,
         ):
-            return _load(storage, key, header, stream)
+            yield stream
     except DAMAGE as problem:
-        raise _damaged(storage, key, problem) from None
+        raise _damaged(storage, _key(member), problem) from None
+
+
+def _load_member(storage: StoredFile, member: zipfile.ZipInfo, header: _Header) -> NDArray[Any]:
+    with _opened(storage, member) as stream:
+        return _load(storage, _key(member), header, stream)
 
 
 def _member_blocks(
     storage: StoredFile, member: zipfile.ZipInfo, header: _Header, count: int
 ) -> Iterator[NDArray[Any]]:
     """Yield blocks of rows, all in the same memory."""
-    key = _key(member)
     row = math.prod(header.shape[1:])
-    try:
-        with (
-            storage.open() as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(member) as stream,
-        ):
-            stream.read(header.offset)
-            flat = np.empty(min(count, header.shape[0]) * row, header.dtype)
-            for start in range(0, header.shape[0], count):
-                n_rows = min(count, header.shape[0] - start)
-                part = flat[: n_rows * row]
-                _fill(storage, key, part, stream)
-                yield part.reshape(n_rows, *header.shape[1:])
-    except DAMAGE as problem:
-        raise _damaged(storage, key, problem) from None
+    with _opened(storage, member) as stream:
+        stream.read(header.offset)
+        flat = np.empty(min(count, header.shape[0]) * row, header.dtype)
+        for start in range(0, header.shape[0], count):
+            n_rows = min(count, header.shape[0] - start)
+            part = flat[: n_rows * row]
+            _fill(storage, _key(member), part, stream)
+            yield part.reshape(n_rows, *header.shape[1:])
 
 
 def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[Any]:
@@ -244,17 +243,9 @@ def _load_file(storage: StoredFile, key: str, header: _Header) -> NDArray[Any]:
 
 def _load_objects(storage: StoredFile, member: zipfile.ZipInfo) -> bytes:
     """Return the pickle of a member that is an array of objects."""
-    key = _key(member)
-    try:
-        with (
-            storage.open() as file,
-            zipfile.ZipFile(file) as archive,
-            archive.open(member) as stream,
-        ):
-            _read_header(storage, key, stream, member.file_size)
-            return b"".join(iter(partial(stream.read, _CHUNK), b""))
-    except DAMAGE as problem:
-        raise _damaged(storage, key, problem) from None
+    with _opened(storage, member) as stream:
+        _read_header(storage, _key(member), stream, member.file_size)
+        return b"".join(iter(partial(stream.read, _CHUNK), b""))
 
 
 def _damaged(storage: StoredFile, key: str, problem: Exception) -> FormatError:
