@@ -33,10 +33,6 @@ from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
 from viewer.formats._gltf.unkept import unkept_members
-from viewer.formats._gltf_lint.findings import reporter
-from viewer.formats._gltf_lint.primitives import check_primitives
-from viewer.formats._gltf_lint.storage import check_storage
-from viewer.formats._gltf_lint.structure import check_structure
 from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, reading_materials
 from viewer.formats._gltf_materials.stored import stored_textures, stored_toon
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
@@ -69,10 +65,9 @@ def read_nodes(source: Source) -> NodeFile:
         tree = replace(tree, shape_weights=node_weights(document, tree, meshes))
         if source.diagnostics.keeps_errors:
             check_conformance(document, tree, meshes, skins)
-            report = reporter(document)
-            check_storage(document.root.values, report)
-            check_primitives(document, report)
-            check_structure(document.root.values, tree, skins, report)
+            from viewer.formats._gltf_lint.checks import check_document
+
+            check_document(document, tree, skins)
         animations = read_animations(document, Targets(tree, meshes))
         materials = finish_materials()
     if any(one.material < 0 for mesh in meshes for one in mesh.primitives):
