@@ -98,20 +98,20 @@ def lock_feet(
     places = np.full((timing.n_frames, skeleton.n_joints, 3), 0.0)
     places[frames] = world[..., :3, 3]
     size = float(base.figure_scales[0]) * extent(shaped(figure, base.shape_weights[0]))[1]
-    shifts, count, before = [], 0, 0.0
+    shifts, count, before, n_glides = [], 0, 0.0, 0
     stands = _stands(places, legs, timing, size, up, way)
-    n_glides = _drop_glides(places, legs, stands, size, up)
     for leg, (toe, ankle) in zip(legs, stands, strict=True):
-        shift, slid = _corrections(places, leg, toe, ankle, timing, up)
+        shift, slid, glides = _corrections(places, leg, (toe, ankle), timing, _FARTHEST * size, up)
         shifts.append(shift[frames])
         count, before = count + len(runs_of(toe | ankle)), before + slid
+        n_glides += glides
     upward = way * np.eye(3)[up]
     lowered = lowering(world[..., :3, 3], legs, shifts, timing.frame_rate, upward)
     drop = -lowered[:, None] * upward
     rotations = leg_rotations(clip.rotations, world, skeleton.parents, legs, drop, shifts)
-    found = replace(clip, rotations=rotations, figure_translations=base.figure_translations + drop)
-    after = _slid_again(figure, found, legs, stands, up)
-    return found, FootLock(count, before, after, float(lowered.max(initial=0.0)), n_glides)
+    locked = replace(clip, rotations=rotations, figure_translations=base.figure_translations + drop)
+    after = _slid_again(figure, locked, legs, stands, up)
+    return locked, FootLock(count, before, after, float(lowered.max(initial=0.0)), n_glides)
 
 
 def _stands(
@@ -125,32 +125,28 @@ def _stands(
     ]
 
 
-def _drop_glides(
-    places: Floats, legs: list[Leg], stands: list[tuple[Bools, Bools]], size: float, up: int
-) -> int:
-    """Remove contacts in which a foot glides too far; return their number."""
-    flat = [axis for axis in range(3) if axis != up]
-    count = 0
-    for leg, (toe, ankle) in zip(legs, stands, strict=True):
-        for start, stop in runs_of(toe | ankle):
-            shift, _ = _held(places, leg, toe, (start, stop), up)
-            if np.linalg.norm(shift[:, flat], axis=1).max() > _FARTHEST * size:
-                toe[start:stop] = ankle[start:stop] = False
-                count += 1
-    return count
-
-
 def _corrections(
-    places: Floats, leg: Leg, toe: Bools, ankle: Bools, timing: Timing, up: int
-) -> tuple[Floats, float]:
-    """Return the shifts of a foot (F, 3), and the distance that it slides without them."""
-    shift, is_held, slid = np.zeros((len(places), 3)), np.zeros(len(places), dtype=np.bool_), 0.0
+    places: Floats, leg: Leg, stands: tuple[Bools, Bools], timing: Timing, farthest: float, up: int
+) -> tuple[Floats, float, int]:
+    """Return the shifts of a foot (F, 3), how far it slides without them, and its glides.
+
+    Contacts that would need a horizontal shift of more than ``farthest`` are removed from
+    ``stands``; the last result is their number.
+    """
+    toe, ankle = stands
+    flat = [axis for axis in range(3) if axis != up]
+    shift, is_held = np.zeros((len(places), 3)), np.zeros(len(places), dtype=np.bool_)
+    slid, n_glides = 0.0, 0
     for start, stop in runs_of(toe | ankle):
-        shift[start:stop], path = _held(places, leg, toe, (start, stop), up)
-        is_held[start:stop] = True
+        held, path = _held(places, leg, toe, (start, stop), up)
+        if np.linalg.norm(held[:, flat], axis=1).max() > farthest:
+            toe[start:stop] = ankle[start:stop] = False
+            n_glides += 1
+            continue
+        shift[start:stop], is_held[start:stop] = held, True
         slid += path
     ease = round(EASE * timing.frame_rate)
-    return faded(shift, is_held, timing.present, ease), slid
+    return faded(shift, is_held, timing.present, ease), slid, n_glides
 
 
 def _held(
