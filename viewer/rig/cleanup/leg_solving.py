@@ -15,9 +15,8 @@ from viewer.rig.geometry.vectors import unit
 
 __all__ = ["hinges", "leg_rotations", "lowering"]
 
-_FLEXED = np.sin(
-    np.radians(15.0)
-)  # sine of the bend at which a leg and ``across`` determine the axis equally
+# Sine of the bend at which a leg and ``across`` determine the axis of its knee equally.
+_FLEXED = np.sin(np.radians(15.0))
 
 
 def leg_rotations(
