@@ -243,10 +243,9 @@ def _people(
     Single frames with different joints or numbers of coefficients are different people.
     """
     tracks = [_track(archive, layout) for _, archive, layout in found]
-    if any(len(track.frames) > 1 for track in tracks):
-        return _people_of_arrays(source, found, tracks)
+    are_single = all(len(track.frames) == 1 for track in tracks)
     is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
-    if is_alike and len(tracks) > 1:
+    if are_single and is_alike and len(tracks) > 1:
         kept = [(archive, layout) for _, archive, layout in found]
         return _people_of_frames(source, kept, tracks)
     return _people_of_arrays(source, found, tracks)
