@@ -112,14 +112,14 @@ def test_name_for_a_new_file_is_selected_without_its_suffix(hand, rig):
     assert _typed(hand) == ("tiny.obj", "tiny")
     hand.type("other")
     hand.key("enter")
-    hand.step(3)
+    hand.finish_job()
     assert hand.state.of(Files).dialog is None and (rig[0].parent / "other.obj").is_file()
     # A suffix typed in front of the unselected suffix is not duplicated.
     hand.menu("menu File", "Export…")
     hand.step(2)
     hand.type("third.obj")
     hand.key("enter")
-    hand.step(3)
+    hand.finish_job()
     assert (rig[0].parent / "third.obj").is_file()
     # An existing file is not replaced by Enter.
     hand.menu("menu File", "Export…")
