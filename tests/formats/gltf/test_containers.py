@@ -1,5 +1,6 @@
 """Containers of glTF: GLB chunks and lengths, JSON, and embedded and external buffers."""
 
+import gc
 import json
 import struct
 from pathlib import Path
@@ -9,6 +10,7 @@ from formats.gltf.files import File, glb, read, refused, source_of, warned
 
 from viewer.errors import FormatError
 from viewer.formats import Source
+from viewer.formats._gltf.json_text import parsed
 from viewer.formats._gltf.node_file import read_nodes
 
 TEXT = b'{"asset": {"version": "2.0"}, "nodes": [{"name": "a"}]}'
@@ -134,6 +136,31 @@ def test_deviations_from_json_are_reported_as_warnings() -> None:
     assert warned(head + b'"nodes": [{"name": "a\xff"}]}') == [("G001.text", "")]
     assert read(head + b'"nodes": [{"name": "a\xff"}]}').tree.names == ("a\ufffd",)
     assert warned(b"{}") == [("G001.no-asset", "")]
+
+
+def test_garbage_collection_is_suspended_while_json_is_parsed() -> None:
+    lists = b",".join([b"[]"] * 5000)
+    text = b'{"asset": {"version": "2.0"}, "extras": [' + lists + b"]}"
+    phases: list[str] = []
+
+    def note(phase: str, _: dict[str, int]) -> None:
+        phases.append(phase)
+
+    gc.callbacks.append(note)
+    try:
+        json.loads(text)
+        usual = phases.count("start")
+        parsed(source_of(text), text, has_lines=True)
+    finally:
+        gc.callbacks.remove(note)
+    # The first new object after parsing may start a collection.
+    assert usual > 1 and phases.count("start") <= usual + 1
+
+
+def test_garbage_collection_resumes_after_broken_json() -> None:
+    assert gc.isenabled()
+    assert refused(b'{"asset": [') == ("F002.gltf-json", "")
+    assert gc.isenabled()
 
 
 @pytest.mark.parametrize(
