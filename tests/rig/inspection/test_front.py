@@ -10,7 +10,7 @@ from rig.hand_made import matrix, mesh, turn_y, turn_z
 
 import viewer
 from viewer.loading import bundled_body
-from viewer.rig.captures.points import PointLayout
+from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.figure import Figure
 from viewer.rig.inspection.front import front_axes, guess_front, usual_front
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -160,6 +160,26 @@ def test_sides_of_captured_points_determine_the_front():
     assert guess_front(Scene([actor], world_up="z")) == "-x"
     points[0, 3] = 0.0  # not detected
     assert guess_front(Scene([actor], world_up="z")) == "-y"
+
+
+def test_travel_counts_only_frames_in_which_the_person_is_present():
+    walk = _walk((-3.0, 0.0, 0.2))
+    rows = np.array([-1, -1, *range(11), -1])
+    timing = Timing(30.0, rows, holds=False)
+    turns, places = walk.clip.rotations.copy(), walk.clip.figure_translations
+    clip = SampledClip("walk", timing, turns, figure_translations=places)
+    assert guess_front(Scene([Actor(walk.figure, clip=clip)])) == "-x"
+
+
+def test_travel_of_captured_points_determines_the_front():
+    layout = PointLayout("two", ("nose", "neck"), np.zeros((0, 2)), np.zeros(2))
+    points = np.zeros((11, 2, 4))
+    points[:, :, 1], points[:, :, 3] = np.linspace(0.0, 5.0, 11)[:, None], 0.9
+    points[4, 0] = 0.0, 99.0, 0.0, 0.0  # not detected
+    clip = PointClip("walk", Timing(30.0, np.arange(11)), points)
+    actor = Actor(Figure("points", points=layout, up="z"), clip=clip, points=points[0])
+    actor.points[1, 2] = 1.0
+    assert guess_front(Scene([actor], world_up="z")) == "+y"
 
 
 def _grid(x, y, z):

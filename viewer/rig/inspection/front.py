@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from typing import TypeAlias
 
 import numpy as np
 
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.captures.points import PointClip, sample_points
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.inspection.front_evidence import (
     from_ends,
@@ -133,20 +133,19 @@ def _places(actor: Actor) -> tuple[tuple[str, ...], Ints, Floats]:
 
 
 def _path(actor: Actor) -> Floats:
-    """Return the path of an actor's centre over its motion: (F, 3)."""
-    clip, places = actor.clip, []
+    """Return the path of an actor's centre over its motion, scene space: (F, 3)."""
+    clip = actor.clip
     if clip is None or clip.end <= clip.start:
         return np.zeros((0, 3))
-    from viewer.rig.motion.evaluation import pose_actor
+    times = np.linspace(clip.start, clip.end, _N_TIMES)
+    if isinstance(clip, PointClip):
+        found = [sample_points(clip, time) for time in times.tolist()]
+        seen = [points[points[:, 3] > 0.0, :3] for points in found if points is not None]
+        places = np.array([points.mean(axis=0) for points in seen if len(points)])
+    else:
+        from viewer.rig.motion.evaluation import frames_between, frames_of, world_frames
 
-    moved = actor.copy()
-    for time in _times(clip.start, clip.end):
-        pose_actor(moved, time + actor.offset)
-        points = _places(moved)[2]
-        if moved.is_present and len(points):
-            places.append(points.mean(axis=0))
-    return np.array(places).reshape(-1, 3)
-
-
-def _times(start: float, end: float) -> Iterable[float]:
-    return map(float, np.linspace(start, end, _N_TIMES))
+        frames = frames_of(actor.figure, clip, times, actor.pose)
+        frames = frames_between(frames, np.flatnonzero(frames.present))
+        places = world_frames(actor.figure, frames)[..., :3, 3].mean(axis=1)
+    return apply_transform(actor.placement, places.reshape(-1, 3))
