@@ -9,7 +9,7 @@ import pytest
 from viewer.rendering.gpu import mipmaps
 from viewer.rendering.gpu.mipmaps import add_mipmaps, halved_pictures
 
-SRGB8_ALPHA8 = 0x8C43
+RGBA8, SRGB8_ALPHA8 = 0x8058, 0x8C43
 
 
 def noise(height: int, width: int):
@@ -119,4 +119,16 @@ def test_shaders_see_every_level(ctx, monkeypatch, size, own):
             # llvmpipe decodes sRGB with an error of 0.0012. Steps of 8-bit sRGB are at most 0.009
             # in linear light, and the driver rounds at every level.
             np.testing.assert_allclose(seen, wanted, rtol=0, atol=2e-3 if own else 0.01 * level)
+    texture.release()
+
+
+def test_driver_makes_the_levels_of_large_textures(ctx, monkeypatch):
+    monkeypatch.setattr(mipmaps, "is_software", lambda context: True)
+    monkeypatch.setattr(mipmaps, "_MOST_PIXELS", 15)
+    monkeypatch.setattr(mipmaps, "halved_pictures", None)  # must not be called
+    pixels = np.full((4, 4, 4), 128, dtype=np.uint8)
+    texture = ctx.texture((4, 4), 4, pixels.tobytes(), internal_format=RGBA8)
+    add_mipmaps(texture, pixels, is_linear=True)
+    seen = level_as_drawn(ctx, texture, 2, (1, 1))
+    np.testing.assert_allclose(seen, 128 / 255.0, rtol=0, atol=1e-3)  # 8 bits store it exactly
     texture.release()
