@@ -6,6 +6,8 @@ C_parent^T offset. In its zero pose, the offsets are added without rotation.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from rig.retargeting.two_people import HIK
 
@@ -55,6 +57,52 @@ def truth(starts_in_t_pose: bool) -> tuple[np.ndarray, np.ndarray]:
     if starts_in_t_pose:
         local[0], path[0] = np.eye(3), 0.0
     return worlds(local), path
+
+
+def dance() -> tuple[np.ndarray, np.ndarray]:
+    """Return rotations and the path of a dancer whose mean pose is far from any rest pose: the head
+    is lowered and turned, the back bent, the forearms twisted and the hands bent.
+    """
+    rng = np.random.default_rng(2)
+    phase = np.linspace(0.0, 2.0 * np.pi, N_FRAMES, endpoint=False)
+    waves = np.stack([np.sin(phase), np.cos(phase), np.sin(2.0 * phase)], axis=1)
+    vectors = 0.1 * np.einsum("nk,jka->nja", waves, rng.uniform(-1.0, 1.0, (len(NAMES), 3, 3)))
+
+    def add(name: str, vector: object) -> None:
+        vectors[:, NAMES.index(name)] += np.asarray(vector)
+
+    for name in ("Spine", "Spine1", "Neck"):
+        add(name, 0.15 * X)
+    add("Head", 0.3 * X + 0.25 * Y)
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        beat = 0.4 * np.sin(phase)[:, None]
+        vectors[:, NAMES.index(f"{side}Leg")] = (0.6 + sign * beat) * X
+        vectors[:, NAMES.index(f"{side}ForeArm")] = -sign * (0.9 + sign * beat) * Y
+        vectors[:, NAMES.index(f"{side}ToeBase")] = 0.0
+        add(f"{side}UpLeg", -0.4 * X)
+        add(f"{side}Arm", -sign * 0.9 * Z)
+        add(f"{side}Hand", 0.6 * X + 0.3 * sign * Z)
+    return worlds(matrices(vectors)), np.stack(
+        [4.0 * waves[:, 0], waves[:, 2], 0.0 * phase], axis=1
+    )
+
+
+def crawl() -> tuple[np.ndarray, np.ndarray]:
+    """Return rotations and the path of a person on hands and knees who looks ahead."""
+    phase = np.linspace(0.0, 4.0 * np.pi, N_FRAMES, endpoint=False)
+    vectors = np.zeros((N_FRAMES, len(NAMES), 3))
+    for name, angle in (("Hips", 1.4), ("Neck", -0.5), ("Head", -0.6)):
+        vectors[:, NAMES.index(name)] = angle * X
+    for side, sign, start in (("Left", 1.0, 0.0), ("Right", -1.0, np.pi)):
+        swing = 0.3 * np.sin(phase + start)[:, None]
+        for name, bend in (("UpLeg", -1.4 - swing), ("Leg", 1.5 + swing), ("Foot", 0.8 + swing)):
+            vectors[:, NAMES.index(f"{side}{name}")] = bend * X
+        vectors[:, NAMES.index(f"{side}Arm")] = -sign * 0.2 * Z - sign * (1.4 + swing) * Y
+        vectors[:, NAMES.index(f"{side}ForeArm")] = -sign * (0.4 + swing) * Y
+        vectors[:, NAMES.index(f"{side}Hand")] = sign * 1.2 * Z
+    return worlds(matrices(vectors)), np.stack(
+        [0.0 * phase, 0.0 * phase - 50.0, 5.0 * phase], axis=1
+    )
 
 
 def worlds(local: np.ndarray) -> np.ndarray:
@@ -134,3 +182,49 @@ def along_x() -> np.ndarray:
 def arbitrary() -> np.ndarray:
     """Return arbitrary axes for every joint."""
     return matrices(np.random.default_rng(11).uniform(-2.0, 2.0, (len(NAMES), 3)))
+
+
+def lafan1() -> np.ndarray:
+    """Return the axes of LAFAN1: +x along each bone, z about knees and elbows. The axes of the feet
+    follow the slope of the bone to the toes, whose own axes are level.
+    """
+    slope = np.arctan2(7.0, 14.0)
+    foot = matrices(np.array([[slope, 0.0, 0.0]]))[0] @ np.stack([Z, Y, -X], axis=1)
+    return _by_part(
+        np.stack([Y, Z, X], axis=1),
+        np.stack([-Y, Z, -X], axis=1),
+        (foot, np.stack([Z, Y, -X], axis=1)),
+        lambda side: np.stack([side * X, -Z, side * Y], axis=1),
+    )
+
+
+def rokoko() -> np.ndarray:
+    """Return the axes of Rokoko: -y along each bone except the pelvis, level feet."""
+    foot = np.stack([X, -Z, Y], axis=1)
+    return _by_part(
+        np.stack([-X, -Y, Z], axis=1),
+        np.stack([-Z, Y, X], axis=1),
+        (foot, foot),
+        lambda side: np.stack([side * Y, -side * X, Z], axis=1),
+        pelvis=np.eye(3),
+    )
+
+
+def _by_part(
+    trunk: np.ndarray,
+    leg: np.ndarray,
+    foot: tuple[np.ndarray, np.ndarray],
+    arm: Callable[[float], np.ndarray],
+    pelvis: np.ndarray | None = None,
+) -> np.ndarray:
+    """Return axes by the part of the body: ``foot`` of ankles and toes, ``arm`` of a side."""
+    axes = np.tile(trunk, (len(NAMES), 1, 1))
+    axes[0] = trunk if pelvis is None else pelvis
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        for part in ("UpLeg", "Leg"):
+            axes[NAMES.index(f"{side}{part}")] = leg
+        for part, own in zip(("Foot", "ToeBase"), foot, strict=True):
+            axes[NAMES.index(f"{side}{part}")] = own
+        for part in ("Shoulder", "Arm", "ForeArm", "Hand"):
+            axes[NAMES.index(f"{side}{part}")] = arm(sign)
+    return axes

@@ -15,7 +15,11 @@ from rig.retargeting.rest_twins import (
     a_pose,
     along_x,
     arbitrary,
+    crawl,
+    dance,
+    lafan1,
     legs_apart,
+    rokoko,
     t_pose,
     truth,
     twin,
@@ -109,6 +113,28 @@ def test_rest_pose_of_files_without_a_t_pose_is_estimated_from_anatomy(body, con
     assert limb_error(body, found) < 0.5
     assert degrees(found, expected).max() < 5.0
     assert np.abs(found[..., :3, 3] - expected[..., :3, 3]).max() < 0.001  # m
+
+
+@pytest.mark.parametrize("convention", [lafan1, rokoko])
+@pytest.mark.parametrize("moves", [lambda: truth(True), lambda: truth(False), dance, crawl])
+def test_axes_parallel_to_the_body_determine_the_rest_pose(body, convention, moves):
+    expected, _ = posed(body, written(t_pose(), *moves()), "zero")
+    found, notes = posed(body, written(convention(), *moves()))
+    assert notes == [("F007.rest-axes", {"motion": "twin"})]
+    assert degrees(found, expected).max() < 0.01  # rounding of arc cosines near 1
+    assert np.abs(found[..., :3, 3] - expected[..., :3, 3]).max() < 0.001  # m
+
+
+def test_slope_of_feet_with_moving_toes_is_found_from_the_soles(body):
+    rotations, path = truth(starts_in_t_pose=False)
+    for side in ("Left", "Right"):
+        toes = NAMES.index(f"{side}ToeBase")
+        lifts = 0.2 * np.sin(np.arange(N_FRAMES))[:, None] * [1.0, 0.0, 0.0]
+        rotations[:, toes] = rotations[:, toes] @ matrices(lifts)
+    expected, _ = posed(body, written(t_pose(), rotations, path), "zero")
+    found, notes = posed(body, written(lafan1(), rotations, path))
+    assert notes == [("F007.rest-axes", {"motion": "twin"})]
+    assert degrees(found, expected).max() < 5.0
 
 
 def test_bend_of_the_hands_that_never_changes_is_found_in_files_with_bones_along_x(body):

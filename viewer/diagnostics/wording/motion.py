@@ -37,6 +37,8 @@ MESSAGES = {
     "F007.rest-anatomy": "rest pose of {motion:text}: estimated from its trunk, soles, knees and "
     "elbows; its zero pose is not a standing pose, and no frame is a T- or A-pose; --source-rest "
     "overrides it",
+    "F007.rest-axes": "rest pose of {motion:text}: a T-pose in which the axes of its joints are "
+    "parallel to the body's; its zero pose is not a standing pose; --source-rest overrides it",
     "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
     "{names:list}",
     "F007.rest-lying": "rest pose of {motion:text}: estimated from its trunk, knees and elbows; "

@@ -4,21 +4,24 @@ The trunk stands upright in its mean posture, the legs hang straight down with t
 sideways, the arms point straight to the sides with the elbows' axes vertical, and the soles are
 level. Hands are straight if shoulder, elbow and wrist are collinear in the zero pose. All other
 joints keep their mean rotation. A bend of the spine or a twist of the forearms that never changes
-cannot be detected and becomes part of the rest pose.
+cannot be detected and becomes part of the rest pose, unless the axes of the joints are parallel to
+the body's: see ``viewer.rig.retargeting.parallel_axes``.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.geometry.rotation import nearest_rotations, quaternion_to_matrix
 from viewer.rig.retargeting.limb_axes import LimbAxes, limb_axes
+from viewer.rig.retargeting.parallel_axes import has_parallel_axes, parallel_rest
 from viewer.rig.retargeting.postures import SIDES, Postures, unit
 from viewer.rig.retargeting.rest_poses import shortest_arc
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["anatomical_rest", "upright_frames"]
+__all__ = ["AnatomicalRest", "anatomical_rest", "upright_frames"]
 
 _TRUNK = ("pelvis", "spine", "neck", "head", "collar")
 _UPRIGHT = np.cos(np.radians(30.0))
@@ -29,6 +32,25 @@ _ALONG = np.cos(np.radians(30.0))  # between a forearm and the fingers of a stra
 _BENT = np.cos(np.radians(85.0))  # mean bend of a wrist beyond which its zero pose is not straight
 _SLOPE = np.radians(30.0)  # slope from the ankle down to the ball of a standing foot
 _STANCE = 25.0  # percentage of the frames in which a foot is lowest and its sole level
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class AnatomicalRest:
+    """A standing pose found from the anatomy.
+
+    Attributes
+    ----------
+    rotations : (J, 3, 3)
+        World rotations of the joints, in the skeleton's axes.
+    unseen : tuple of str
+        Joints of limbs whose roll is assumed, because the motion does not show it.
+    is_parallel : bool
+        Whether the axes of the joints are parallel to the body's.
+    """
+
+    rotations: Floats
+    unseen: tuple[str, ...]
+    is_parallel: bool
 
 
 def upright_frames(postures: Postures) -> Postures | None:
@@ -42,7 +64,7 @@ def upright_frames(postures: Postures) -> Postures | None:
 
 def anatomical_rest(
     postures: Postures, skeleton: Skeleton, has_stances: bool = True
-) -> tuple[Floats, list[LimbAxes]]:
+) -> AnatomicalRest:
     """Return the rotations of the joints in a standing pose.
 
     Parameters
@@ -53,24 +75,33 @@ def anatomical_rest(
         Its skeleton.
     has_stances : bool
         Whether the poses are upright and show the soles; otherwise the feet point forwards.
-
-    Returns
-    -------
-    rotations : (J, 3, 3)
-        World rotations, in the skeleton's axes.
-    limbs : list of LimbAxes
-        The limbs; if the motion does not show a limb's axis, its roll is estimated.
     """
-    parents = skeleton.parents
     body = _body_axes(postures)
     stands = _stands(postures.up)
-    fixed = _trunk(postures, skeleton, body, stands)
     limbs = limb_axes(postures)
+    fixed = _trunk(postures, skeleton, body, stands)
     for limb in limbs:
         fixed |= _limb(limb, stands, postures.joints)
     for side, limb in zip(SIDES, limbs, strict=False):
         foot = _foot(postures, side, stands) if has_stances else _toes(postures, limb, stands)
         fixed |= foot
+    result = _with_means(fixed, postures, skeleton, (body, stands))
+    if has_parallel_axes(limbs):
+        return AnatomicalRest(parallel_rest(result, postures, skeleton, stands), (), True)
+    unseen = tuple(
+        skeleton.names[postures.joints[limb.lower]] for limb in limbs if not limb.is_seen
+    )
+    return AnatomicalRest(result, unseen, False)
+
+
+def _with_means(
+    fixed: dict[int, Floats], postures: Postures, skeleton: Skeleton, axes: tuple[Floats, Floats]
+) -> Floats:
+    """Return the rotations of all joints, of which most have their mean local rotation.
+
+    ``axes``: those of the body in each frame, (F, 3, 3), and of the standing body, (3, 3).
+    """
+    parents, (body, stands) = skeleton.parents, axes
     hands = _hands(skeleton, postures.joints)
     result = np.empty((len(parents), 3, 3))
     for joint, parent in enumerate(parents):
@@ -83,7 +114,7 @@ def anatomical_rest(
             result[joint] = result[parent] @ (
                 _straight(mean, *hands[joint]) if joint in hands else mean
             )
-    return result, limbs
+    return result
 
 
 def _stands(up: Floats) -> Floats:

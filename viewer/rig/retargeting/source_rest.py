@@ -1,8 +1,9 @@
 """The rest pose of a motion whose zero pose is not a standing pose.
 
 Retargeting relates two skeletons by their rest poses. Some programs write skeletons whose zero pose
-is arbitrary, for instance with all bones along +x. The rest pose is then a frame in a T- or A-pose,
-if there is one, or estimated from the anatomy of the body in motion.
+is arbitrary, for instance with all bones along +x. The rest pose is then the T-pose in which the
+axes of the joints are parallel to the body's, if they are chosen so; otherwise a frame in a T- or
+A-pose, if there is one, or estimated from the anatomy of the body in motion.
 """
 
 from __future__ import annotations
@@ -63,8 +64,9 @@ def with_source_rest(
         Skeleton and clip.
     choice : int, "zero" or "auto"
         The frame that is the rest pose; the skeleton's own rest pose; or the latter if it is a
-        standing pose or its limbs have no known names, otherwise the best T- or A-pose among the
-        frames, otherwise an estimate from the anatomy.
+        standing pose or its limbs have no known names, otherwise the T-pose with parallel joint
+        axes, otherwise the best T- or A-pose among the frames, otherwise an estimate from the
+        anatomy.
 
     Returns
     -------
@@ -96,8 +98,9 @@ def with_source_rest(
     if postures is None:
         return motion, []
     if upright is None:
-        worlds, _ = anatomical_rest(postures.righted(), skeleton, has_stances=False)
-        return _placed(motion, skeleton, worlds), [Diagnostic("F007.rest-lying", values=called)]
+        found = anatomical_rest(postures.righted(), skeleton, has_stances=False)
+        key = "F007.rest-axes" if found.is_parallel else "F007.rest-lying"
+        return _placed(motion, skeleton, found.rotations), [Diagnostic(key, values=called)]
     return _estimated(motion, skeleton, upright)
 
 
@@ -106,6 +109,11 @@ def _estimated(
 ) -> tuple[SkeletonMotion, list[Diagnostic]]:
     """Return a motion with a rest pose estimated from its upright frames."""
     called = {"motion": motion.figure.name}
+    found = anatomical_rest(upright, skeleton)
+    if found.is_parallel:
+        # More exact than a frame, in which nobody stands perfectly.
+        note = Diagnostic("F007.rest-axes", values=called)
+        return _placed(motion, skeleton, found.rotations), [note]
     row, drop = _calibration(upright)
     if row >= 0:
         timing = motion.clip.timing
@@ -113,12 +121,11 @@ def _estimated(
         pose = Phrase("t-pose" if drop < _T_POSE else "a-pose")
         note = Diagnostic("F007.rest-frame", values={**called, "frame": frame, "pose": pose})
         return _replaced(motion, skeleton, motion.clip.rotations[row]), [note]
-    worlds, limbs = anatomical_rest(upright, skeleton)
     notes = [Diagnostic("F007.rest-anatomy", values=called)]
-    hidden = [skeleton.names[upright.joints[limb.lower]] for limb in limbs if not limb.is_seen]
-    if hidden:
-        notes.append(Diagnostic("F007.rest-straight", values={**called, "names": hidden}))
-    return _placed(motion, skeleton, worlds), notes
+    if found.unseen:
+        values = {**called, "names": list(found.unseen)}
+        notes.append(Diagnostic("F007.rest-straight", values=values))
+    return _placed(motion, skeleton, found.rotations), notes
 
 
 def _placed(motion: SkeletonMotion, skeleton: Skeleton, worlds: Floats) -> SkeletonMotion:
