@@ -53,6 +53,22 @@ def test_incomplete_line_of_a_killed_process_is_terminated_and_skipped(tmp_path,
     assert [one.item for one in read_results(path)] == [ITEM, other]
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("outputs", None), ("outputs", [1]), ("output", [1]), ("name", {}), ("time", "x")),
+        *(("key", [1]), ("files", 5), ("values", []), ("status", None)),
+    ],
+)
+def test_lines_with_values_of_other_types_are_skipped(tmp_path, name, value):
+    path = tmp_path / "report.jsonl"
+    with ReportFile(path) as file:
+        file.add(RESULT)
+    line = json.loads(path.read_text()) | {name: value}
+    path.write_text(f"{path.read_text()}{json.dumps(line)}\n")
+    assert read_results(path) == [RESULT]
+
+
 def test_several_writers_append_whole_lines(tmp_path):
     path = tmp_path / "report.jsonl"
     with ReportFile(path) as first, ReportFile(path) as second:

@@ -27,6 +27,13 @@ __all__ = ["Report", "ReportFile", "read_results"]
 
 _ITEM_NAMES = [field.name for field in fields(Item)]
 _NAMES = [field.name for field in fields(Result) if field.name != "item"]
+_KINDS: dict[str, type | tuple[type, ...]] = {
+    **dict.fromkeys(("index", "exit_code", "attempts"), int),
+    **dict.fromkeys(("seconds", "time"), (int, float)),
+    **dict.fromkeys(("output", "name", "status", "message", "text", "key"), str),
+    **dict.fromkeys(("files", "outputs", "diagnostics"), list),
+    "values": dict,
+}
 
 
 @dataclass
@@ -213,11 +220,14 @@ def read_results(path: Path) -> list[Result]:
 
 
 def _result(line: str) -> Result | None:
-    """Parse the result in a line; None if the line is incomplete."""
+    """Parse the result in a line; None if the line is incomplete or has values of other types."""
     try:
         found: dict[str, Any] = json.loads(line)
+        if not all(isinstance(found[name], kinds) for name, kinds in _KINDS.items()):
+            return None
         item = Item(found["index"], tuple(found["files"]), found["output"], found["name"])
         rest = {name: found[name] for name in _NAMES}
-    except (ValueError, KeyError, TypeError):
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
-    return Result(item, **(rest | {"outputs": tuple(rest["outputs"])}))
+    result = Result(item, **(rest | {"outputs": tuple(rest["outputs"])}))
+    return result if all(isinstance(text, str) for text in (*item.files, *result.outputs)) else None

@@ -9,6 +9,7 @@ path.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +65,10 @@ def export_animation(
     if not animation.frames.present.any():
         raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     bones = human_bones(animation.figure)
-    frames = filled(animation.frames, options.closing == "interpolate")
+    figure, frames = _unhidden(
+        animation.figure, filled(animation.frames, options.closing == "interpolate")
+    )
+    animation = replace(animation, figure=figure)
     document = Document(animation.name)
     weights = _fill(document, animation, frames, options.world_up, bones)
     data = document.glb()
@@ -82,6 +86,18 @@ def export_animation(
     if others:
         notes.append(Diagnostic("X003.vrma-joints", values={"n": others}))
     return notes
+
+
+def _unhidden(figure: Figure, frames: Frames) -> tuple[Figure, Frames]:
+    """Return joints without scales of 0, which hide them, so that they have world rotations."""
+    skeleton = figure.require_skeleton()
+    shown = replace(skeleton, rest_scales=_without_zeros(skeleton.rest_scales))
+    sizes, scales = _without_zeros(frames.figure_scales), _without_zeros(frames.scales)
+    return replace(figure, skeleton=shown), replace(frames, scales=scales, figure_scales=sizes)
+
+
+def _without_zeros(scales: Floats) -> Floats:
+    return np.where(scales == 0.0, 1.0, scales)
 
 
 def _fill(
@@ -189,6 +205,10 @@ def _add_expressions(
     """Add a node for each expression that is used; return the members of the extension."""
     shapes, weights = figure.blend_shapes, frames.shape_weights
     found: dict[str, dict[str, Any]] = {}
+    rules = None if shapes is None else shapes.rules
+    # Expressions of VRM 0.x have names of their own.
+    pairs = () if rules is None else zip(rules.rows.tolist(), rules.presets, strict=False)
+    presets = {row: preset for row, preset in pairs if preset}
     for row, name in enumerate(shapes.names if shapes is not None else ()):
         is_used = row < weights.shape[1] and weights[:, row].any()
         if shapes is None or not shapes.is_expression(row) or not is_used:
@@ -198,8 +218,10 @@ def _add_expressions(
         places = np.zeros((frames.n_frames, 3))
         places[:, 0] = np.clip(weights[:, row], 0.0, 1.0)
         keys.add(node, "translation", places, "VEC3")
-        kind = "preset" if name in PRESETS else "custom"
-        found.setdefault(kind, {})[text_of(name)] = {"node": node}
+        preset = presets.get(row, name)
+        is_preset = preset in PRESETS and preset not in found.get("preset", {})
+        kind, key = ("preset", preset) if is_preset else ("custom", text_of(name))
+        found.setdefault(kind, {})[key] = {"node": node}
     return found
 
 

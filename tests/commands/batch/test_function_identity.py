@@ -47,3 +47,14 @@ def test_bound_arguments_and_objects_are_included():
     jobs = [partial(scaled, 1), partial(scaled, 2), partial(print, 1), scaled, Job(1).run]
     assert len({identity_of(job) for job in jobs}) == len(jobs)
     assert identity_of(partial(scaled, 2)) == identity_of(jobs[1])
+
+
+def test_identity_does_not_depend_on_the_order_of_sets():
+    # Small integers that collide in a set are stored in the order in which they are added.
+    one, other = set(range(0, 17, 8)), set(range(16, -1, -8))
+    assert [*one] != [*other]
+    assert identity_of(partial(scaled, one)) == identity_of(partial(scaled, other))
+    nested = [partial(scaled, {"a": (each,)}) for each in (one, other, {0, 8})]
+    assert len({identity_of(job) for job in nested}) == 2
+    sources = (f"def job(item, kinds=set({each})): return 1" for each in ("[0, 8]", "[8, 0]"))
+    assert len({identity_of(defined(source)) for source in sources}) == 1

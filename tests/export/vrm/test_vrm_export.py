@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +19,10 @@ import viewer
 from viewer.cli import run
 from viewer.errors import RigError
 from viewer.export import VrmMeta, export
+from viewer.export._vrm.humanoid import human_bones
 from viewer.loading import load
 from viewer.rig.figure import Figure
+from viewer.rig.humanoid import Humanoid
 from viewer.rig.scene import figure_pose
 from viewer.rig.shape import shaped
 
@@ -243,6 +246,7 @@ def test_character_without_a_mesh_is_written(tmp_path: Path) -> None:
         (0, ("VRM", "blendShapeMaster", "blendShapeGroups"), 1.5),
         (0, ("VRM", "secondaryAnimation", "boneGroups"), [None, 7, {"bones": 1}]),
         (0, ("VRM", "materialProperties"), {"a": 1}),
+        (0, ("VRM", "meta", "title"), "half a pair: \ud800"),
     ],
 )
 def test_data_with_an_unexpected_structure_does_not_prevent_writing(
@@ -263,6 +267,28 @@ def body(tmp_path_factory: pytest.TempPathFactory) -> Figure:
     path = tmp_path_factory.mktemp("body") / "SMPL.npz"
     np.savez(path, **model("smpl"))
     return load(path).actors[0].figure
+
+
+def test_optional_bones_below_omitted_ones_are_omitted_in_any_order(body: Figure) -> None:
+    skeleton = body.require_skeleton()
+    joints = human_bones(body)
+    # A chest that is not below the spine, listed after the bone that needs it.
+    others = {bone: joint for bone, joint in joints.items() if "hest" not in bone}
+    odd = {"upperChest": joints["leftFoot"], **others, "chest": joints["leftLowerLeg"]}
+    figure = replace(body, skeleton=replace(skeleton, humanoid=Humanoid(odd)))
+    assert human_bones(figure) == others
+
+
+def test_flattened_figures_are_written(tmp_path: Path) -> None:
+    file = swinging(turn=False)
+    del file.root["extensions"]
+    file.root["nodes"][BONES.index("hips")]["scale"] = [0.0, 1.0, 1.0]
+    file.root["nodes"][BONES.index("leftUpperArm")]["rotation"] = [0.0, 0.0, 0.6, 0.8]
+    (tmp_path / "flat.glb").write_bytes(file.glb())
+    actor = load(tmp_path / "flat.glb").actors[0]
+    export(actor, tmp_path / "flat.vrm", meta=ME)
+    rotations = load(tmp_path / "flat.vrm").actors[0].figure.require_skeleton().rest_rotations
+    assert_allclose(np.linalg.norm(rotations, axis=1), 1.0, rtol=0, atol=1e-6)
 
 
 def test_other_humanoids_are_written_as_version_1_in_a_t_pose(body: Figure, tmp_path: Path) -> None:

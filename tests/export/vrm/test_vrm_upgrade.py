@@ -307,3 +307,17 @@ def test_numbers_that_json_cannot_store_are_omitted(tmp_path: Path) -> None:
     assert notes["X003.json-numbers"].values["n"] == 2
     kept = Written(out).root["extensions"]["VRM"]["secondaryAnimation"]["boneGroups"][0]
     assert "note" not in kept and kept["table"] == [1.0, 0.0]
+
+
+def test_numbers_that_are_invalid_or_too_large_are_reported(tmp_path: Path) -> None:
+    file = swinging(0)
+    vrm = old_vrm(file)
+    vrm["humanoid"]["armStretch"] = 10**400
+    vrm["firstPerson"]["lookAtVerticalUp"] = {"xRange": "x", "yRange": 9}
+    vrm["blendShapeMaster"]["blendShapeGroups"][0]["binds"][0]["weight"] = 10**400
+    written, notes = upgrade(file, tmp_path)
+    told = written.root["extensions"]["VRMC_vrm"]
+    assert "morphTargetBinds" not in told["expressions"]["preset"]["happy"]
+    assert told["lookAt"]["rangeMapVerticalUp"] == {"outputScale": 9}
+    lost = notes["X003.vrm-upgrade"].values["names"]
+    assert lost == ["humanoid.armStretch", "firstPerson.lookAtVerticalUp.xRange"]

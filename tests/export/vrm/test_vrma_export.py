@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.vrm.swinging import swinging
+from export.vrm.test_vrm_export import Written
+from formats.vrm.swinging import BONES, swinging
 from numpy.testing import assert_allclose
 
 import viewer
@@ -64,6 +65,30 @@ def test_motions_of_worlds_with_z_up_are_rotated(tmp_path: Path) -> None:
         )
     steps = [joints(each, 0.1)["hips"] - joints(each, 0.0)["hips"] for each in (plain, found)]
     assert_allclose(steps[1], TO_Y @ steps[0], rtol=0, atol=1e-6)
+
+
+def test_expressions_of_version_0_are_written_as_their_presets(tmp_path: Path) -> None:
+    file, path, out = swinging(0), tmp_path / "ada.vrm", tmp_path / "out.vrma"
+    groups = file.root["extensions"]["VRM"]["blendShapeMaster"]["blendShapeGroups"]
+    groups[0] |= {"name": "Smile", "presetName": "joy"}
+    path.write_bytes(file.glb())
+    assert run(["convert", str(path), "--shape", "Smile=0.5", "-o", str(out)]) == 0
+    told = Written(out).root["extensions"]["VRMC_vrm_animation"]["expressions"]
+    assert {kind: [*names] for kind, names in told.items()} == {"preset": ["happy"]}
+
+
+@pytest.mark.parametrize("scale", [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0]])
+def test_hidden_joints_have_the_rotations_of_shown_ones(tmp_path: Path, scale: list[float]) -> None:
+    outs = []
+    for name in ("shown", "hidden"):
+        file, path = swinging(), tmp_path / f"{name}.vrm"
+        if name == "hidden":
+            file.root["nodes"][BONES.index("leftHand")]["scale"] = scale
+        path.write_bytes(file.glb())
+        outs.append(path.with_suffix(".vrma"))
+        assert run(["convert", str(path), "-o", str(outs[-1])]) == 0
+    shown, hidden = (Written(out).binary for out in outs)
+    assert shown == hidden
 
 
 def test_expressions_are_written_and_other_figures_refused(

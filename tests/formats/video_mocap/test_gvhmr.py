@@ -110,6 +110,12 @@ def test_single_space_is_sufficient(tmp_path: Path) -> None:
     assert caught.value.diagnostic.key == "F002.video-space"
 
 
+def test_results_without_frames_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(FormatError) as caught:
+        open_results(Source("a.pt", torch_zip(gvhmr(0))))
+    assert caught.value.diagnostic.key == "F002.video-people"
+
+
 @pytest.mark.parametrize(
     ("change", "key"),
     [

@@ -119,6 +119,15 @@ def test_tram_cameras_with_too_few_frames_are_refused(tmp_path: Path) -> None:
     assert caught.value.diagnostic.key == "F002.video-camera"
 
 
+def test_tram_folders_whose_people_are_a_file_are_not_recognised(tmp_path: Path) -> None:
+    (tmp_path / "hps").write_bytes(b"")
+    (tmp_path / "camera.npy").write_bytes(object_npy(tram_camera()))
+    with pytest.raises(FormatError) as caught:
+        open_results(Source.open(tmp_path))
+    assert caught.value.diagnostic is not None
+    assert caught.value.diagnostic.key == "F002.unknown-folder"
+
+
 def prompthmr_file(folder: Path, given: dict[str, Any] | None = None) -> Path:
     path = folder / "results.pkl"
     path.write_bytes(joblib_file(prompthmr() if given is None else given))
@@ -252,3 +261,11 @@ def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path: Path) -> None:
     assert_allclose(body.translations, slahmr()["trans"][0])
     keys = [one.key for one in source.diagnostics.warnings]
     assert keys == ["F007.video-last", "F007.video-no-rate"]
+
+
+def test_slahmr_folder_whose_result_lacks_the_axis_of_people_is_refused(tmp_path: Path) -> None:
+    slahmr_file(tmp_path, trans=np.zeros(3))
+    with pytest.raises(FormatError) as caught:
+        open_results(Source.open(tmp_path))
+    assert caught.value.diagnostic is not None
+    assert caught.value.diagnostic.key == "F002.value"

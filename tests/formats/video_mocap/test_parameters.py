@@ -13,6 +13,7 @@ from formats.torch.torch_bytes import torch_zip
 from formats.video_mocap.tool_files import matrices, six_of
 from numpy.testing import assert_allclose
 
+from viewer.errors import FormatError
 from viewer.formats import Source, detect
 from viewer.formats.video_mocap import open_results
 
@@ -95,6 +96,15 @@ def test_single_frames_are_sorted_by_their_numbers() -> None:
     (body,) = bodies(frames).values()
     assert (body.timing.first_frame, body.timing.rows.tolist()) == (5, [0, -1, 1])
     assert_allclose(body.translations, PLACES[[1, 0]], atol=1e-12)
+
+
+def test_distant_places_of_single_frames_are_refused() -> None:
+    far = np.array([1e30, 0.0, 0.0])
+    given = [{"pose": VECTORS[row].ravel(), "trans": far, "frame": row} for row in range(2)]
+    with pytest.raises(FormatError) as caught:
+        bodies(given)
+    assert caught.value.diagnostic is not None
+    assert caught.value.diagnostic.key == "F003.motion-reach"
 
 
 @pytest.mark.parametrize("key", ["", "track_id", "id"])

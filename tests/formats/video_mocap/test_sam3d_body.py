@@ -139,6 +139,7 @@ def test_arrays_with_an_axis_of_frames_are_read(tmp_path: Path) -> None:
         (["a_subj00.npz", "a_subj01.npz"], {0: 1, 1: 1}),
         (["f1.npz", "f2.npz", "f10.npz"], {0: 3}),
         (["000001_0.npz", "000001_1.npz", "000002_0.npz"], {0: 2, 1: 1}),
+        (["²1.npz", "²2.npz"], {0: 2}),
     ],
 )
 def test_folders_of_results_are_read(
@@ -149,6 +150,22 @@ def test_folders_of_results_are_read(
     assert detect(Source.open(tmp_path)) == "video_mocap"
     counts = {number: len(clip.points) for number, clip in points_of(tmp_path).items()}
     assert counts == wanted
+
+
+def test_files_of_several_frames_in_a_folder_follow_one_another(tmp_path: Path) -> None:
+    given = {f"{frame:04}.jpg": person() for frame in range(3)}
+    for name in ("a.pkl", "b.pkl"):
+        (tmp_path / name).write_bytes(joblib_file(given))
+    stacked = {key: np.stack([value] * 2) for key, value in person().items() if value is not None}
+    np.savez(tmp_path / "c.npz", **stacked)
+    (clip,) = points_of(tmp_path).values()
+    assert (len(clip.points), clip.timing.rows.tolist()) == (8, [*range(8)])
+
+
+def test_files_of_several_people_in_a_folder_are_different_people(tmp_path: Path) -> None:
+    for name in ("a_person0.pkl", "a_person1.pkl"):
+        (tmp_path / name).write_bytes(joblib_file([person(), person()]))
+    assert [*points_of(tmp_path)] == [0, 1, 2, 3]
 
 
 def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:

@@ -79,6 +79,7 @@ def test_cycles_are_refused(constraints: tuple[dict[str, Any] | None, ...]) -> N
         ({"rotation": {"source": 9}}, "the index of another node as source"),
         ({"roll": {"source": 0, "rollAxis": "W"}}, "rollAxis X, Y, Z"),
         ({"rotation": {"source": 0, "weight": "1"}}, "a weight from 0 to 1"),
+        ({"rotation": {"source": 0, "weight": 10**400}}, "a weight from 0 to 1"),
     ],
 )
 def test_invalid_constraints_are_ignored(constraint: dict[str, Any], expected: str) -> None:

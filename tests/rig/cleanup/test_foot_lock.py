@@ -35,7 +35,9 @@ def places(clip) -> np.ndarray:
     return world_frames(FIGURE, frames_of(FIGURE, clip, times))[..., :3, 3]
 
 
-@pytest.mark.parametrize("target", [(0, 0, 0), (0.1, 0.05, 0.2), (-0.2, 0.3, -0.1), (0, 0.01, 0)])
+@pytest.mark.parametrize(
+    "target", [(0, 0, 0), (0.1, 0.05, 0.2), (-0.2, 0.3, -0.1), (0, 0.01, 0), (0, 1.6, 0)]
+)
 def test_ankle_reaches_its_target_and_bones_keep_their_lengths(target) -> None:
     knee, ankle = bent(target)
     assert_allclose(ankle, target, atol=1e-12)

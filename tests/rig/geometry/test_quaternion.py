@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion, slerp
+from viewer.rig.geometry.quaternion import (
+    between,
+    multiply,
+    rotation_vector_to_quaternion,
+    slerp,
+)
 from viewer.rig.geometry.rotation import quaternion_to_matrix, rotation_vector_to_matrix
 
 RANDOM = np.random.default_rng(5)
@@ -26,6 +31,22 @@ def test_quaternions_rotate_vectors_like_their_matrices(size):
     assert_allclose(
         quaternion_to_matrix(found), rotation_vector_to_matrix(vectors), atol=3e-15 * (1 + size)
     )
+
+
+def test_smallest_rotation_points_one_vector_at_another():
+    starts = np.vstack([RANDOM.normal(size=(20, 3)), np.eye(3), np.eye(3)])
+    ends = np.vstack([RANDOM.normal(size=(20, 3)), -2.0 * np.eye(3), 3.0 * np.eye(3)])
+    found = between(starts, ends)
+    assert_allclose(np.linalg.norm(found, axis=1), 1.0, atol=1e-15)
+    turned = np.einsum("nab,nb->na", quaternion_to_matrix(found), starts)
+    sizes = np.linalg.norm(ends, axis=1) / np.linalg.norm(starts, axis=1)
+    assert_allclose(turned * sizes[:, None], ends, atol=1e-14)
+    # The smallest rotation has the angle between the vectors: cos = 2 w^2 - 1.
+    cosines = np.einsum("na,na->n", starts, ends) / np.prod(
+        [np.linalg.norm(each, axis=1) for each in (starts, ends)], axis=0
+    )
+    assert_allclose(2.0 * found[:, 3] ** 2 - 1.0, cosines, atol=1e-14)
+    assert_allclose(between(np.zeros(3), np.ones(3)), [0.0, 0.0, 0.0, 1.0], atol=0)
 
 
 def test_product_is_the_product_of_matrices():
@@ -68,13 +89,13 @@ def test_slerp_agrees_with_the_power_of_the_relative_rotation():
     # An independent formula: R(u) = R0 exp(u log(R0^T R1)), with the angle from the trace.
     for _ in range(20):
         a, b = rotation_vector_to_matrix(RANDOM.uniform(-1.2, 1.2, (2, 3)))
-        between = a.T @ b
-        angle = np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1))
+        relative = a.T @ b
+        angle = np.arccos(np.clip((np.trace(relative) - 1) / 2, -1, 1))
         axis = np.array(
             [
-                between[2, 1] - between[1, 2],
-                between[0, 2] - between[2, 0],
-                between[1, 0] - between[0, 1],
+                relative[2, 1] - relative[1, 2],
+                relative[0, 2] - relative[2, 0],
+                relative[1, 0] - relative[0, 1],
             ]
         )
         axis /= np.linalg.norm(axis)

@@ -56,6 +56,13 @@ def test_no_canonical_name_occurs_twice() -> None:
     assert found == ("pelvis", "left_knee", "", "head", "")
 
 
+@pytest.mark.parametrize("word", ["leg", "index", "foot", "shoulder"])
+def test_numbers_of_thousands_of_digits_are_no_error(word: str) -> None:
+    names = ["hips", f"{word}_l", f"{word}{'1' * 5000}_l"]
+    meanings = canonical_names(names, np.array([-1, 0, 1], dtype=np.int32))
+    assert meanings[2] == ""
+
+
 def test_unknown_names_have_no_canonical_name() -> None:
     names = ["", "bone1", "bone2", "left", "tail_01", "wing_02_r", "123", "é"]
     assert canonical_names(names, np.arange(8) - 1) == ("",) * 8

@@ -71,6 +71,17 @@ def _is_set(cell: CellType) -> bool:
 def _pickled(value: Any) -> bytes:
     """Return a pickle, or the name of the type if pickling fails."""
     try:
-        return pickle.dumps(value)
-    except (pickle.PicklingError, AttributeError, TypeError):
+        return pickle.dumps(_without_sets(value))
+    except (pickle.PicklingError, AttributeError, TypeError, RecursionError):
         return f"{type(value).__module__}.{type(value).__qualname__}".encode()
+
+
+def _without_sets(value: Any) -> Any:
+    """Return data whose sets are sorted lists: their order varies between processes."""
+    if isinstance(value, set | frozenset):
+        return [type(value).__name__, *sorted(map(_pickled, value))]
+    if type(value) in (list, tuple):
+        return type(value)(map(_without_sets, value))
+    if type(value) is dict:
+        return {key: _without_sets(one) for key, one in value.items()}
+    return value

@@ -198,9 +198,12 @@ class Document:
 
 
 def _text(value: Any) -> bytes:
-    """Return JSON; raise ValueError if a number is infinite or NaN."""
+    """Return JSON; raise ValueError if a number is infinite or NaN.
+
+    Text that is copied from a file may have surrogates without a partner, which become ``?``.
+    """
     text = json.dumps(value, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    return text.encode()
+    return text.encode("utf-8", "replace")
 
 
 def _finite(value: Any) -> tuple[Any, int]:

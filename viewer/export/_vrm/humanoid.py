@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
@@ -40,10 +42,9 @@ def human_bones(figure: Figure) -> dict[str, int]:
     """
     skeleton = figure.require_skeleton()
     found = dict(skeleton.humanoid.joints) if skeleton.humanoid is not None else _named(skeleton)
-    for bone in [*found]:
-        above = bone_above(bone)
-        needed = above in found or above in _REQUIRED
-        if above and not (needed and _is_below(skeleton, found[bone], found.get(above, -1))):
+    # Bones below an omitted bone are omitted, too, in whatever order the file lists them.
+    while misplaced := [bone for bone in found if not _is_allowed(skeleton, found, bone)]:
+        for bone in misplaced:
             del found[bone]
     missing = [bone for bone in _REQUIRED if bone not in found]
     if missing:
@@ -78,6 +79,13 @@ def bone_above(bone: str) -> str:
             return f"{side}{above}" if above == "Hand" else f"{side}{finger}{above}"
     found = _ABOVE.get(name, "")
     return f"{side}{found}" if found[:1].isupper() else found
+
+
+def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:
+    """Return whether a bone is below its required ancestor."""
+    above = bone_above(bone)
+    is_known = above in bones or above in _REQUIRED
+    return not above or (is_known and _is_below(skeleton, bones[bone], bones.get(above, -1)))
 
 
 def _is_below(skeleton: Skeleton, joint: int, above: int) -> bool:

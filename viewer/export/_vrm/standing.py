@@ -11,7 +11,11 @@ from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply
-from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    nearest_rotations,
+    quaternion_to_matrix,
+)
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.humanoid import Humanoid
@@ -191,7 +195,9 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
 def unit_rotation(matrix: Floats) -> Floats:
     """Return the rotation of a matrix without shear: (3, 3)."""
     linear = matrix[:3, :3]
-    found: Floats = linear / np.linalg.norm(linear, axis=0)
+    lengths = np.linalg.norm(linear, axis=0)
+    # A scale of 0 flattens or hides what is below a joint.
+    found: Floats = linear / lengths if lengths.all() else nearest_rotations(linear)[0]
     return found
 
 

@@ -18,7 +18,7 @@ from viewer.export._vrm.upgraded_springs import upgraded_springs, with_ends
 from viewer.export._vrm.upgraded_toon import upgraded_toon
 from viewer.formats._vrm.bones import modern_bone
 from viewer.formats._vrm.json_parts import listed, part
-from viewer.formats._vrm.numbers import rows_of
+from viewer.formats._vrm.numbers import rows_of, value_of
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 
@@ -77,7 +77,8 @@ def _humanoid(data: Any, lost: list[str]) -> dict[str, Any]:
                 lost.append(f"humanoid.{bone}")
     for name, default in _MUSCLES.items():
         value = part(data, "humanoid", name)
-        if isinstance(value, int | float) and abs(value - default) > _SAME:
+        # Not a difference: an integer may be too large for a float.
+        if isinstance(value, int | float) and not default - _SAME <= value <= default + _SAME:
             lost.append(f"humanoid.{name}")
     return {"humanBones": bones}
 
@@ -110,8 +111,7 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
         given = first.get(f"lookAt{name}")
         if not isinstance(given, dict):
             continue
-        scale = {"inputMaxValue": given.get("xRange"), "outputScale": given.get("yRange")}
-        gaze[f"rangeMap{name}"] = {key: value for key, value in scale.items() if value is not None}
+        gaze[f"rangeMap{name}"] = _range(given, f"firstPerson.lookAt{name}", lost)
         if given.get("curve") not in (None, _STRAIGHT):
             lost.append(f"firstPerson.lookAt{name}.curve")
     bones = listed(data, "humanoid", "humanBones")
@@ -119,3 +119,15 @@ def _gaze(data: Any, lost: list[str]) -> dict[str, Any]:
     if first.get("firstPersonBone", -1) not in (-1, *heads):
         lost.append("firstPerson.firstPersonBone")
     return {"lookAt": gaze}
+
+
+def _range(told: dict[str, Any], name: str, lost: list[str]) -> dict[str, float]:
+    """Return the range of a direction of the gaze; numbers that are missing keep their default."""
+    found = {}
+    for old, new in (("xRange", "inputMaxValue"), ("yRange", "outputScale")):
+        value = value_of(told.get(old), 0.0)
+        if value is None:
+            lost.append(f"{name}.{old}")
+        elif told.get(old) is not None:
+            found[new] = value
+    return found

@@ -12,6 +12,7 @@ from typing import Any
 
 from viewer.formats._vrm.json_parts import listed, part
 from viewer.formats._vrm.material_values import old_binds
+from viewer.formats._vrm.numbers import value_of
 from viewer.rig.expressions import OLD_PRESETS
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.materials.material_binds import TRANSFORM
@@ -56,9 +57,9 @@ def _free(name: str, found: dict[str, dict[str, Any]]) -> str:
 def _binds(told: dict[str, Any], record: VrmRecord) -> list[Any]:
     """Return the binds of nodes from those of meshes."""
     return [
-        {"node": node, "index": part(each, "index"), "weight": float(weight) / _PERCENT}
+        {"node": node, "index": part(each, "index"), "weight": weight / _PERCENT}
         for each in listed(told, "binds")
-        if isinstance(weight := part(each, "weight"), int | float)
+        if (weight := value_of(part(each, "weight"), 0.0)) is not None
         for node, mesh in record.meshes.items()
         if mesh == part(each, "mesh")
     ]

@@ -47,7 +47,8 @@ def read(source: Source, archive: Archive) -> Results:
     people = {space: {_PERSON: _track(part)} for space, part in _parts(archive, tool).items()}
     cameras, frames = {}, np.arange(len(next(iter(people.values()))[_PERSON].frames))
     intrinsics = None
-    if shape_of(archive, "K_fullimg"):  # None if there was no video
+    # None if there was no video.
+    if len(frames) and shape_of(archive, "K_fullimg"):
         intrinsics = rows(archive, "K_fullimg", (len(frames), 3, 3))
         cameras["camera"] = Cameras(
             frames, intrinsics, np.eye(3)[None], np.zeros((1, 3)), _size(intrinsics)

@@ -34,6 +34,7 @@ from viewer.formats._video_mocap.numbers import (
     places,
     rows,
     shape_of,
+    within_reach,
 )
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
@@ -338,8 +339,11 @@ def _track(archive: Archive, layout: _Layout) -> Track:
     placed = np.zeros((count, 3))
     if layout.place:
         shape = shape_of(archive, layout.place)
-        single = rows(archive, layout.place, shape)[None] if shape == (3,) else None
-        placed = places(archive, layout.place, count) if single is None else single
+        if shape == (3,):
+            single = rows(archive, layout.place, shape)[None]
+            placed = within_reach(archive, layout.place, single)
+        else:
+            placed = places(archive, layout.place, count)
     frames = np.arange(count)
     number = _number(archive, layout.frames) if count == 1 else None
     if number is not None:

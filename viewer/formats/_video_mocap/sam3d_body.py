@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator
+from itertools import accumulate
 from typing import NamedTuple
 
 import numpy as np
@@ -95,8 +96,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
         If a shape differs from the tool's, or a number is not finite.
     """
     place = shape_of(archive, _PLACE)
-    lead = place[:1] if len(place) == 2 else ()
-    count = lead[0] if lead else 1
+    lead, count = place[:1] if len(place) == 2 else (), _length(archive)
     found = {
         key: _positions(archive, key, lead)
         for key in (_KEYPOINTS, _JOINTS, _VERTICES)
@@ -186,13 +186,34 @@ def claims_folder(source: Source, names: set[str]) -> bool:
 
 
 def read_folder(source: Source, names: set[str]) -> Results:
-    """Read all files of a folder."""
+    """Read all files of a folder; files with several frames or people follow one another."""
     files = [name for name in names if name.lower().endswith(_SUFFIXES)]
-    found: list[tuple[int, int, Archive]] = []
-    for name, (frame, person) in frames_and_people(files).items():
-        people = _people(archive_of(source.inside(name)))
-        found += [(frame, person + other, each) for _, other, each in people]
-    return _results(source, found)
+    read = [
+        (frame, person, [*_people(archive_of(source.inside(name)))])
+        for name, (frame, person) in frames_and_people(files).items()
+    ]
+    lengths: dict[int, int] = defaultdict(int)
+    for file, _, people in read:
+        lengths[file] = max(lengths[file], *(row + _length(each) for row, _, each in people), 0)
+    order = sorted(lengths)
+    starts = dict(
+        zip(order, accumulate([lengths[file] for file in order], initial=0), strict=False)
+    )
+    most = max((1 + other for _, _, people in read for _, other, _ in people), default=1)
+    return _results(
+        source,
+        [
+            (starts[file] + row, most * person + other, each)
+            for file, person, people in read
+            for row, other, each in people
+        ],
+    )
+
+
+def _length(archive: Archive) -> int:
+    """Return the number of frames of a person's arrays."""
+    place = shape_of(archive, _PLACE)
+    return place[0] if len(place) == 2 else 1
 
 
 def read(source: Source, archive: Archive) -> Results:

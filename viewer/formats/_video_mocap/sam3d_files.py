@@ -42,5 +42,5 @@ def frames_and_people(names: list[str]) -> dict[str, tuple[int, int]]:
 def _natural(name: str) -> list[tuple[int, str]]:
     """Return a sort key that orders numbers in names by their values."""
     return [
-        (int(part[:9]), "") if part.isdigit() else (-1, part) for part in re.split(r"(\d+)", name)
+        (int(part[:9]), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", name)
     ]

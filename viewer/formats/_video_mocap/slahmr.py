@@ -67,7 +67,7 @@ def read_folder(source: Source, names: set[str]) -> Results:
 
 def read(source: Source, archive: Archive) -> Results:
     """Read all people, in the world and in the camera's space."""
-    n_people, n_frames = archive.array("trans").shape[:2]
+    n_people, n_frames, _ = archive.array("trans", ("B", "T", 3)).shape
     RowBudget(archive).spend(n_people * n_frames)
     bodies = _bodies(archive, n_people, n_frames)
     ids, seen, notes = _tracks(source, n_people, n_frames)

@@ -52,7 +52,8 @@ def recognises(archive: Archive) -> bool:
 
 def claims_folder(source: Source, names: set[str]) -> bool:
     """Return whether a folder contains results of this tool, or the files of people."""
-    return {_FOLDER, _CAMERA} <= names or any(map(_TRACK.fullmatch, names))
+    has_folder = {_FOLDER, _CAMERA} <= names and (source.path / _FOLDER).is_dir()
+    return has_folder or any(map(_TRACK.fullmatch, names))
 
 
 def read(source: Source, archive: Archive) -> Results:
@@ -64,7 +65,8 @@ def read(source: Source, archive: Archive) -> Results:
 
 def read_folder(source: Source, names: set[str]) -> Results:
     """Read all people of a folder, and its camera."""
-    folder = source.inside(_FOLDER) if _FOLDER in names else source
+    is_above = _FOLDER in names and (source.path / _FOLDER).is_dir()
+    folder = source.inside(_FOLDER) if is_above else source
     found = {path.name for path in folder.path.iterdir()}
     tracks = {int(match[1]): name for name in found if (match := _TRACK.fullmatch(name))}
     people = {track: archive_of(folder.inside(tracks[track])) for track in sorted(tracks)}

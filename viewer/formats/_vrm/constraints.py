@@ -10,13 +10,13 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from viewer.formats._nodes.ancestors import path_to_root
 from viewer.formats._nodes.content import NodeTree
 from viewer.formats._source import Source
 from viewer.formats._vrm.json_parts import is_index, part
+from viewer.formats._vrm.numbers import value_of
 from viewer.rig.constraints.constraint import Constraint, ConstraintKind
 
 __all__ = ["read_constraints"]
@@ -83,12 +83,10 @@ def _constraint(tree: NodeTree, node: int, told: Any) -> Constraint | str:
         if not isinstance(name, str) or name not in axes:
             return f"{member} {', '.join(axes)}"
         axis = axes[name]
-    weight = part(told, kind, "weight")
-    weight = 1.0 if weight is None else weight
-    is_number = isinstance(weight, int | float) and not isinstance(weight, bool)
-    if not is_number or not math.isfinite(weight):
+    weight = value_of(part(told, kind, "weight"), 1.0)
+    if weight is None:
         return "a weight from 0 to 1"
-    return Constraint(node, given, kind, axis, min(max(float(weight), 0.0), 1.0))
+    return Constraint(node, given, kind, axis, min(max(weight, 0.0), 1.0))
 
 
 def _ordered(

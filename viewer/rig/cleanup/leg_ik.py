@@ -6,7 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import between, multiply
 from viewer.rig.geometry.vectors import unit
 
 __all__ = ["Leg", "bend", "reach"]
@@ -75,19 +75,10 @@ def bend(
     cosine = (a * a + distance * distance - b * b) / np.maximum(2.0 * a * distance, 1e-30)
     cosine = np.clip(cosine, -1.0, 1.0)[:, None]
     knee = a[:, None] * (cosine * line + np.sqrt(1.0 - cosine * cosine) * ahead)
-    turn = _between(line, targets - hips)
-    thigh, shin = _between(upper, knee), _between(lower, distance[:, None] * line - knee)
+    turn = between(line, targets - hips)
+    thigh, shin = between(upper, knee), between(lower, distance[:, None] * line - knee)
     return multiply(turn, thigh), multiply(turn, shin)
 
 
 def _dot(a: Floats, b: Floats) -> Floats:
     return np.einsum("fa,fa->f", a, b)
-
-
-def _between(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotations from one direction to another: (F, 4)."""
-    a = start / np.maximum(np.linalg.norm(start, axis=1, keepdims=True), 1e-30)
-    b = end / np.maximum(np.linalg.norm(end, axis=1, keepdims=True), 1e-30)
-    real = 1.0 + np.einsum("fa,fa->f", a, b)
-    found = np.concatenate([np.cross(a, b), real[:, None]], axis=1)
-    return found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-30)

@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.rig.arrays import Floats
-from viewer.rig.geometry.quaternion import conjugate, multiply, slerp
+from viewer.rig.geometry.quaternion import between, conjugate, multiply, slerp
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.skeleton import Skeleton
 
@@ -100,7 +100,7 @@ def _aimed(
     there = _world(skeleton, each.source, local)[2]
     direction, length = _unit(there - place)
     start = quaternion_to_matrix(multiply(parent, own)) @ np.array(each.axis)
-    arc = np.where(length > _SHORT, _arc(start, direction), _NONE)
+    arc = np.where(length > _SHORT, between(start, direction), _NONE)
     return multiply(multiply(multiply(conjugate(parent), arc), parent), own)
 
 
@@ -128,17 +128,6 @@ def _twist(rotation: Floats, axis: Floats) -> Floats:
     along = (rotation[..., :3] @ axis)[..., None] * axis
     found, length = _unit(np.concatenate([along, rotation[..., 3:]], axis=-1))
     return np.where(length > _SHORT, found, _NONE)
-
-
-def _arc(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotation from one unit vector to another: (..., 4)."""
-    across = np.cross(start, end)
-    # Opposite vectors: rotate by 180 degrees about any perpendicular axis.
-    other = np.cross(start, np.eye(3)[np.abs(start).argmin(axis=-1)])
-    scalar = 1.0 + np.einsum("...a,...a->...", start, end)[..., None]
-    found, _ = _unit(np.concatenate([across, scalar], axis=-1))
-    half = np.concatenate([_unit(other)[0], np.zeros_like(scalar)], axis=-1)
-    return np.where(scalar > _SHORT, found, half)
 
 
 def _unit(vectors: Floats) -> tuple[Floats, Floats]:

@@ -5,9 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import unit
 
-__all__ = ["align_signs", "conjugate", "multiply", "rotation_vector_to_quaternion", "slerp"]
+__all__ = [
+    "align_signs",
+    "between",
+    "conjugate",
+    "multiply",
+    "rotation_vector_to_quaternion",
+    "slerp",
+]
 
+_OPPOSITE = 1e-12  # 1 plus the cosine of the angle between vectors that are treated as opposite
 _PARALLEL = 1e-6  # sine of the angle t below which sin(u t) / sin(t) equals u to the last digit
 
 
@@ -31,6 +40,31 @@ def rotation_vector_to_quaternion(vectors: Floats) -> Floats:
     half = 0.5 * np.sqrt(np.einsum("...a,...a->...", vectors, vectors))[..., None]
     # sinc is defined at 0: np.sinc(x) = sin(pi x) / (pi x).
     return np.concatenate([0.5 * np.sinc(half / np.pi) * vectors, np.cos(half)], axis=-1)
+
+
+def between(start: Floats, end: Floats) -> Floats:
+    """Return the smallest rotations from one direction to another: q = (a x b, 1 + a . b) / |q|.
+
+    Parameters
+    ----------
+    start, end : (..., 3)
+        Vectors a and b, of any length here; if one is 0, the result is the identity.
+
+    Returns
+    -------
+    (..., 4)
+        Unit quaternions (x, y, z, w). For opposite vectors, a rotation by 180 degrees about any
+        perpendicular axis.
+
+    >>> between(np.array([0.0, 2.0, 0.0]), np.array([0.0, -1.0, 0.0])).tolist()
+    [0.0, 0.0, -1.0, 0.0]
+    """
+    start, end = unit(start), unit(end)
+    real = 1.0 + np.einsum("...a,...a->...", start, end)[..., None]
+    found = np.concatenate([np.cross(start, end), real], axis=-1)
+    across = np.cross(start, np.eye(3)[np.abs(start).argmin(axis=-1)])
+    half = np.concatenate([across, np.zeros_like(real)], axis=-1)
+    return unit(np.where(real > _OPPOSITE, found, half))
 
 
 def align_signs(quaternions: Floats) -> None:

@@ -53,7 +53,9 @@ _FINGERS = {
     **{"mid": "middle", "little": "pinky"},
 }
 _PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
-_FINGER = re.compile(rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d*)")
+_FINGER = re.compile(
+    rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
+)
 _BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
@@ -364,7 +366,9 @@ def _role(key: _Key) -> str:
         role = "pelvis"
     if role in _CHAINS:
         return role if not side else ""
-    if not role or (number and role != "foot" and int(number) > 1):
+    # Not int(number): names may have thousands of digits.
+    is_first = number.lstrip("0") in ("", "1")
+    if not role or not (is_first or role == "foot"):
         return ""
     if role in _SIDED:
         # Hands without a body (MANO) have no sides.

@@ -19,7 +19,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import between, multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.skeleton import Skeleton
@@ -32,7 +32,6 @@ STEPS_PER_SECOND = 60
 
 _STEP = 1.0 / STEPS_PER_SECOND
 _SHORT = 1e-12
-_OPPOSITE = 1e-9
 _FLAT = 1e-30  # determinant below which a matrix is treated as singular
 
 
@@ -192,12 +191,7 @@ class Simulation:
         away = (points - heads[:, :3, 3])[..., None]
         local = np.linalg.solve(_regular(heads[:, :3, :3]), away)[..., 0]
         start, end = self._axes[rows], unit(local / np.where(factors == 0.0, 1.0, factors))
-        scalar = 1.0 + np.einsum("na,na->n", start, end)[:, None]
-        arcs = np.concatenate([np.cross(start, end), scalar], axis=-1)
-        # Opposite directions: rotate by 180 degrees about any perpendicular axis.
-        other = np.cross(start, np.eye(3)[np.abs(start).argmin(axis=-1)])
-        half = np.concatenate([other, np.zeros_like(scalar)], axis=-1)
-        return unit(np.where(scalar > _OPPOSITE, arcs, half))
+        return between(start, end)
 
 
 def _levels(skeleton: Skeleton, springs: Springs) -> list[_Level]:
