@@ -41,7 +41,7 @@ def cancel(state: AppState) -> None:
         files.loader.cancel()
         files.loader = None
         state.say_status("Opening cancelled")
-    elif state.job is not None and state.job.can_cancel:
+    elif state.job is not None and not state.job.is_cancelled:
         state.job.cancel()
         state.say_status("Cancelled")
     elif recording.settings is not None:

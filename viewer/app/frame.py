@@ -173,8 +173,9 @@ class Frame:
         job.step()
         if job.is_done:
             state.job = None
-            state.say(*job.lines)
-            state.error = job.error or state.error
+            if job.output or not job.is_cancelled:
+                state.say(*job.lines)
+                state.error = job.error or state.error
 
     def _take_streamed(self) -> None:
         """Add the parts of captures read since the last frame."""
@@ -373,7 +374,7 @@ class Frame:
 
         renderer = self.renderer
         steps = recording_steps(state, renderer.programs, replace(settings), path, renderer.ghost)
-        state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
+        state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps, "recording")
         state.clock.playing, recording.settings = False, None
 
     def scene_picture(self) -> Bytes:

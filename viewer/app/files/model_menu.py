@@ -94,4 +94,4 @@ def _start_adding(state: AppState, kind: str) -> None:
         path = add_model(kind)
         return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
 
-    state.job = CountedJob(f"Downloading {title}", add)
+    state.job = CountedJob(f"Downloading {title}", add, output="download")

@@ -94,7 +94,8 @@ def finish_work(state: AppState) -> None:
     if running is None or running.job is state.job:
         return
     rigging.running = None
-    if running.finish is not None and running.source is state.scene:
+    is_wanted = running.source is state.scene and not (running.job and running.job.is_cancelled)
+    if running.finish is not None and is_wanted:
         running.finish(state)
 
 
