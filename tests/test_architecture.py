@@ -89,6 +89,7 @@ ALLOWED_IN_APP = {
     "retargeting": {"core", "files", "retargeting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
+    "closing": {"core", "files", "curves", "playback", "retargeting", "rigging", "closing"},
 }
 # Third-party modules that only one part may import.
 HOMES = {

@@ -132,10 +132,7 @@ def test_window_shows_progress_until_the_files_are_open(window, tmp_path):
 @pytest.mark.parametrize("key", ["Escape", ""])
 def test_opening_is_cancelled_in_the_window(window, display, key):
     app = window(program=("-c", SLOW))
-    if key:
-        app.key(key)
-    else:
-        _ask_to_close(display, int(app.id))
+    app.key(key) if key else _ask_to_close(display, int(app.id))
     app.finish()
 
 
@@ -270,8 +267,14 @@ def test_text_is_typed_copied_and_pasted_as_in_other_programs(window, places):
     app.key("ctrl+q")
 
 
-def test_window_closes_at_the_request_of_window_managers(window):
+def test_window_asks_before_edits_are_lost_and_closes_at_the_second_request(window):
     app = window()
+    app.key("ctrl+p")
+    app.tell("type", "New clip")
+    app.key("Return")
+    edited = app.wait_until_quiet()
+    _ask_to_close(app.display, int(app.id))
+    app.wait_until_changed(edited)
     _ask_to_close(app.display, int(app.id))
     app.finish()
 

@@ -148,7 +148,7 @@ def test_texture_can_be_toggled_if_present(drive):
 
 def test_recording_waits_for_other_work(hand, tooltips):
     hand.state.job = SimpleNamespace(
-        title="Writing walk.bvh", progress=(0, 0), can_cancel=False, is_done=False,
+        title="Writing walk.bvh", progress=(0, 0), is_cancelled=False, output="", is_done=False,
         error="", lines=[], step=lambda: None, cancel=lambda: None,
     )  # fmt: skip
     hand.click("menu File")

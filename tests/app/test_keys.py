@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 import viewer.app
+from viewer.app.closing.state import Closing
 from viewer.app.features import KEYS
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -158,7 +159,7 @@ def test_escape_closes_the_topmost_item_and_never_quits(hand):
         (False, False, False, -1),
         (False, False, False, -1),
     ]
-    assert "quit" not in state.wants and (hand.dofs() == before).all()
+    assert not state.of(Closing).is_over and (hand.dofs() == before).all()
 
 
 def test_letters_have_no_effect_under_a_dialog_or_message(hand):
@@ -223,7 +224,7 @@ def test_f12_without_a_current_folder_shows_a_message(hand, tmp_path, monkeypatc
 
 def test_ctrl_q_asks_to_quit(hand):
     hand.key("q", "ctrl")
-    assert "quit" in hand.state.wants
+    assert hand.state.of(Closing).is_over
 
 
 def test_ctrl_o_opens_the_file_dialog_in_the_figures_folder(hand, tmp_path):
@@ -287,7 +288,7 @@ def test_menu_entries_run_their_actions(hand):
     hand.menu("menu Help", "Keys")
     assert hand.state.of(Keyboard).is_listed
     hand.menu("menu File", "Quit")
-    assert "quit" in hand.state.wants
+    assert hand.state.of(Closing).is_over
 
 
 @pytest.mark.parametrize("key", ["q", "w"])
@@ -298,7 +299,7 @@ def test_modifier_released_in_the_same_frame_is_used(hand, key):
     hand.io.add_key_event(imgui.Key.mod_ctrl, False)
     hand.io.add_key_event(getattr(imgui.Key, key), False)
     hand.step(4)
-    assert ("quit" in hand.state.wants) is (key == "q")
+    assert hand.state.of(Closing).is_over is (key == "q")
     assert not hand.state.options.wireframe
     hand.key("w")
     assert hand.state.options.wireframe

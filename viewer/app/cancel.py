@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from viewer.app.closing.questions import keep_open, question_of
+from viewer.app.closing.state import Closing
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.keys import Keyboard
@@ -31,6 +33,8 @@ def cancel(state: AppState) -> None:
         state.error = ""
     elif files.dialog is not None:
         files.dialog = None
+    elif question_of(state) is not None:
+        keep_open(state)
     elif state.messages.is_open:
         state.messages.is_open = False
     elif state.of(Appearance).is_open:
@@ -41,8 +45,9 @@ def cancel(state: AppState) -> None:
         files.loader.cancel()
         files.loader = None
         state.say_status("Opening cancelled")
-    elif state.job is not None and state.job.can_cancel:
+    elif state.job is not None and not state.job.is_cancelled:
         state.job.cancel()
+        state.of(Closing).withdraw()
         state.say_status("Cancelled")
     elif recording.settings is not None:
         recording.settings = None

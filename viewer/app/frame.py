@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import moderngl
 from imgui_bundle import imgui
 
 from viewer.app.actors.following import follow_actor, stop_following
+from viewer.app.closing.question_window import draw_question
+from viewer.app.closing.questions import advance_closing, may_replace_scene, request_quit
+from viewer.app.closing.state import Closing
 from viewer.app.context.context_menu import answer_right_click, draw_context_menu
 from viewer.app.core.fitting import keep_fitting
-from viewer.app.core.jobs import FrameJob
+from viewer.app.core.job_steps import advance_job
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
 from viewer.app.files.file_dialog import draw_file_dialog
@@ -36,7 +39,7 @@ from viewer.app.preferences.applying import follow_preferences
 from viewer.app.preferences.state import Preferences
 from viewer.app.recording.preview import Preview
 from viewer.app.recording.record_dialog import draw_record_dialog
-from viewer.app.recording.state import Recording
+from viewer.app.recording.starting import start_recording
 from viewer.app.rigging.tools import draw_rig_tools, show_rig
 from viewer.app.screenshot import save_screenshot
 from viewer.app.view.axis_gizmo import draw_axis_gizmo
@@ -133,6 +136,7 @@ class Frame:
         draw_context_menu(state)
         draw_palette(state)
         draw_file_dialog(state)
+        draw_question(state)
         files = state.of(Files)
         self.open(files.wants_open)
         files.wants_open = []
@@ -142,7 +146,9 @@ class Frame:
         state.limit_camera()
         self._do_wanted()
         self._take_loaded()
-        self._work()
+        if advance_job(state):
+            state.of(Closing).withdraw()  # the user may want to export again
+        advance_closing(state)
         # Edits are recorded before the clock poses the scene, which is not an edit.
         state.history.observe(state.scene, state.options, is_held(state))
         self._take_streamed()
@@ -164,17 +170,6 @@ class Frame:
         self.context.viewport = (0, 0, *size)
         framebuffer.clear(*imgui.get_style_color_vec4(imgui.Col_.title_bg))
         imgui.backends.opengl3_render_draw_data(imgui.get_draw_data())
-
-    def _work(self) -> None:
-        """Advance jobs that take longer than a frame, and report how they ended."""
-        state, job = self.state, self.state.job
-        if job is None:
-            return
-        job.step()
-        if job.is_done:
-            state.job = None
-            state.say(*job.lines)
-            state.error = job.error or state.error
 
     def _take_streamed(self) -> None:
         """Add the parts of captures read since the last frame."""
@@ -200,6 +195,7 @@ class Frame:
         """Add actors and longer clips as captures are read."""
         state = self.state
         state.scene.actors += actors
+        state.of(SavedWork).add_actors(actors)
         state.clock.pose(state.actor, again=True)
         state.history.add_actors(state.scene, state.options)
         state.history.follow(state.clock.time)
@@ -302,6 +298,8 @@ class Frame:
         state, loader = self.state, self.state.of(Files).loader
         if loader is None or not loader.is_done:
             return
+        if loader.scene is not None and not may_replace_scene(state):
+            return
         state.of(Files).loader = None
         if loader.addition is not None:
             self._add(loader.addition)
@@ -314,6 +312,7 @@ class Frame:
         self, scene: Scene, paths: tuple[Path, ...], builders: Sequence[Builder] = ()
     ) -> None:
         state = self.state
+        state.of(Closing).discards = False  # the agreement to lose edits concerned these files
         try:
             self.renderer.prepare(scene)
         except RenderError as problem:
@@ -360,21 +359,10 @@ class Frame:
             self.open([bundled_body()])
         if "screenshot" in state.wants:
             save_screenshot(state, self.scene_picture)
-        self._start_recording()
-        state.wants -= {"open dialog", "open bundled", "open body", "screenshot"}
-
-    def _start_recording(self) -> None:
-        """Start a requested recording unless another job is running."""
-        state, recording = self.state, self.state.of(Recording)
-        path, settings, recording.wanted = recording.wanted, recording.settings, None
-        if path is None or settings is None or state.job is not None:
-            return
-        from viewer.app.recording.recording_steps import recording_steps
-
-        renderer = self.renderer
-        steps = recording_steps(state, renderer.programs, replace(settings), path, renderer.ghost)
-        state.job = FrameJob(f"Recording {printable(path.name, 60)}", steps)
-        state.clock.playing, recording.settings = False, None
+        if "quit" in state.wants:
+            request_quit(state)
+        start_recording(state, self.renderer)
+        state.wants.clear()
 
     def scene_picture(self) -> Bytes:
         """Return the last image of the scene, without panels: (H, W, 4) uint8."""

@@ -7,6 +7,7 @@ from dataclasses import field
 
 from imgui_bundle import imgui
 
+from viewer.app.closing.questions import question_of
 from viewer.app.core.state import AppState
 from viewer.app.features import KEYS, Shortcut
 from viewer.app.files.state import Files
@@ -86,6 +87,7 @@ def handle_keys(state: AppState) -> None:
         appearance.captured = "" if appearance.captured == CAPTURED else appearance.captured
         return
     is_covered = bool(state.error) or state.of(Files).dialog is not None
+    is_covered |= question_of(state) is not None
     chosen = state.of(Preferences).keys
     for key, repeats, shortcut in keyboard.of(chosen, int(held)):
         if is_covered and shortcut.label not in _ALWAYS:

@@ -92,7 +92,7 @@ def _progress(state: AppState) -> _Progress | None:
     """Return the progress of the current job, if there is one."""
     files, job = state.of(Files), state.job
     loader, stream = files.loader, files.stream
-    if loader is not None and loader.seconds >= _SHOW_PROGRESS_AFTER:
+    if loader is not None and not loader.is_done and loader.seconds >= _SHOW_PROGRESS_AFTER:
         title = f"Opening {printable(loader.paths[-1].name, 60)}"
         done, total, unit = loader.progress
         if total:
@@ -110,7 +110,9 @@ def _progress(state: AppState) -> _Progress | None:
         return _Progress(title, read / max(total, 1), text, "Cancel reading", is_aside=True)
     if job is not None:
         done, total = job.progress
-        label = "Cancel" if job.can_cancel else ""
+        if job.is_cancelled:
+            return _Progress(f"Cancelling: {job.title}", -imgui.get_time(), "", "")
+        label = "Cancel"
         if total:
             # Jobs without countable steps report percentages.
             text = f"{done} %" if total == 100 else f"{done:,} of {total:,}"

@@ -15,6 +15,8 @@ glfw = import_glfw()
 
 from imgui_bundle import imgui  # noqa: E402  after glfw, whose library imgui-bundle chooses
 
+from viewer.app.closing.questions import request_quit  # noqa: E402
+from viewer.app.closing.state import Closing  # noqa: E402
 from viewer.app.core.jobs import FrameJob  # noqa: E402
 from viewer.app.core.state import AppState  # noqa: E402
 from viewer.app.display_loss import stop_watching  # noqa: E402
@@ -158,17 +160,25 @@ class _Window:
     def run(self) -> None:
         """Draw frames until the window is closed; sleep while nothing happens."""
         rest = Rest()
-        while not glfw.window_should_close(self.handle):
+        while not self.state.of(Closing).is_over:
             poll()
-            happened = self._wait(rest.left > 0)
+            happened = self._wait(rest.left > 0) | self._is_asked_to_close()
             rest.count(happened, self._awaits())
             if self.shell.dropped:
                 self.frame.open(self.shell.dropped)
                 self.shell.dropped = []
-            if rest.left < 0 or not self._draw():
-                continue
-            if "quit" in self.state.wants:
-                glfw.set_window_should_close(self.handle, True)
+            if rest.left >= 0:
+                self._draw()
+
+    def _is_asked_to_close(self) -> bool:
+        """Pass on a click of the close button; return whether there was one."""
+        if not glfw.window_should_close(self.handle):
+            return False
+        glfw.set_window_should_close(self.handle, False)
+        request_quit(self.state)
+        if glfw.get_window_attrib(self.handle, glfw.ICONIFIED):
+            glfw.restore_window(self.handle)  # a question must be seen
+        return True
 
     def _wait(self, is_settling: bool) -> bool:
         """Process events; wait for one unless frames are left to draw.
@@ -196,16 +206,18 @@ class _Window:
         """Return whether a change is expected without an event: of files, extent or hover text."""
         state = self.state
         files = state.of(Files)
-        is_read = files.loader is not None or files.stream is not None
+        loader = files.loader
+        # Files that have been read may wait for an answer of the user.
+        is_read = (loader is not None and not loader.is_done) or files.stream is not None
         is_read |= not state.framing.is_settled
         is_waiting = state.of(Weights).is_waiting or state.of(Hovered).is_waiting
         return is_read or is_waiting or awaits_tooltip(self.shell.imgui)
 
-    def _draw(self) -> bool:
-        """Draw one frame; return False if the window currently has no pixels."""
+    def _draw(self) -> None:
+        """Draw one frame unless the window currently has no pixels."""
         size = glfw.get_framebuffer_size(self.handle)
         if min(size) < 1:
-            return False
+            return
         shell = self.shell
         shell.set_title(_title(self.state))
         self._n_drawn += 1
@@ -215,7 +227,6 @@ class _Window:
         shell.begin_frame()
         self.frame.draw(shell.context.screen, size, shell.pixels_per_point())
         glfw.swap_buffers(self.handle)
-        return True
 
     def release(self) -> None:
         """Save the layout, close the window, and release everything."""

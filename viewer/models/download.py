@@ -12,11 +12,14 @@ from viewer.errors import OutputError, ViewerError
 from viewer.formats import Source, detect
 from viewer.models import data_folder
 from viewer.phrases import printable
+from viewer.progress import report
 
 __all__ = ["ADDABLE", "add_model", "pip_command"]
 
 ADDABLE = {"anny": "anny==0.6.2"}
 """Models that can be added, and the Python package of each, in a tested version."""
+
+_EVERY = 0.2  # seconds between two looks at whether the download is cancelled
 
 
 def pip_command(name: str, folder: str | Path) -> list[str]:
@@ -58,10 +61,10 @@ def add_model(name: str) -> Path:
 def _downloaded(name: str, folder: Path) -> Path:
     """Run pip and return the wheel."""
     command = pip_command(name, folder)
-    result = subprocess.run(command, capture_output=True, text=True, check=False)
+    code, output = _run(command)
     wheels = sorted(folder.glob("*.whl"))
-    if result.returncode or not wheels:
-        lines = (result.stderr or result.stdout).strip().splitlines() or ["no message"]
+    if code or not wheels:
+        lines = output.strip().splitlines() or ["no message"]
         shown = subprocess.list2cmdline(pip_command(name, data_folder())[1:])
         raise ViewerError(
             f"models: pip could not download {ADDABLE[name]}: {printable(lines[-1], 200)}; run "
@@ -69,3 +72,20 @@ def _downloaded(name: str, folder: Path) -> Path:
             "the model folder"
         )
     return wheels[0]
+
+
+def _run(command: list[str]) -> tuple[int, str]:
+    """Run a program that is ended if the work is cancelled; return its exit code and messages."""
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as program:
+        try:
+            while True:
+                report(0, 0, "")
+                try:
+                    output, messages = program.communicate(timeout=_EVERY)
+                except subprocess.TimeoutExpired:
+                    continue
+                return program.returncode, messages or output
+        except BaseException:
+            program.kill()
+            raise

@@ -35,7 +35,7 @@ def test_counted_job_keeps_its_title_if_no_step_is_named() -> None:
     assert job.title == "Checking"
 
 
-def test_cancelled_job_is_done_immediately_and_ends_before_its_next_step() -> None:
+def test_cancelled_job_ends_before_its_next_step_and_is_done_once_its_thread_has_ended() -> None:
     reached, go, after = threading.Event(), threading.Event(), []
 
     def act(report: Report) -> list[str]:
@@ -49,9 +49,10 @@ def test_cancelled_job_is_done_immediately_and_ends_before_its_next_step() -> No
     job = CountedJob("Checking", act)
     reached.wait(10)
     job.cancel()
-    assert job.is_done
+    assert job.is_cancelled and not job.is_done
     go.set()
     job.wait()
+    assert job.is_done
     assert not after and job.lines == [] and job.error == "" and job.title == "first"
 
 

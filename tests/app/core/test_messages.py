@@ -166,8 +166,8 @@ def test_more_than_eight_messages_are_counted(drive, rig, texts):
 
 def _job():
     return SimpleNamespace(
-        title="Writing walk.bvh and 3 more", progress=(3, 9), can_cancel=True, is_done=False,
-        error="", lines=[], step=lambda: None, cancel=lambda: None,
+        title="Writing walk.bvh and 3 more", progress=(3, 9), is_cancelled=False, is_done=False,
+        output="export", error="", lines=[], step=lambda: None, cancel=lambda: None,
     )  # fmt: skip
 
 

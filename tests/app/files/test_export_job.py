@@ -65,6 +65,35 @@ def test_cancelled_export_keeps_the_old_file(hand, paused, tmp_path):
     assert (tmp_path / "a.obj").read_text() == "old" and sorted(tmp_path.iterdir()) == files
 
 
+def test_second_export_waits_until_a_cancelled_one_has_restored_its_file(hand, tmp_path):
+    path = tmp_path / "a.obj"
+    is_written, may_end = threading.Event(), threading.Event()
+
+    def act():
+        save_text(path, "first")
+        is_written.set()
+        assert may_end.wait(30.0)
+        report(1, 2, "lines")
+        return []
+
+    save_in_background(hand.state, act, [path])
+    assert is_written.wait(30.0)
+    hand.step(2)
+    hand.key("escape")
+    hand.step(2)
+    # Written now, the second file would be removed when the first export restores the folder.
+    save_in_background(hand.state, lambda: [save_text(path, "second")], [path])
+    assert hand.state.error == "wait for: Writing a.obj"
+    assert "Cancel" not in hand.state.item_rects
+    hand.state.error = ""
+    may_end.set()
+    hand.finish_job()
+    assert not path.exists() and not hand.state.error
+    save_in_background(hand.state, lambda: [save_text(path, "second")], [path])
+    hand.finish_job()
+    assert path.read_text() == "second"
+
+
 def test_export_cancelled_after_its_last_report_keeps_the_old_file(hand, tmp_path):
     path = tmp_path / "a.obj"
     path.write_text("old")

@@ -17,6 +17,7 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 import viewer
+from viewer.app.closing.unsaved import unsaved_edits
 from viewer.app.files.state import Files
 from viewer.app.rigging.placing import placing_now
 from viewer.app.rigging.sources import target_mesh, template_texts
@@ -265,13 +266,14 @@ def test_result_is_saved_and_opens_again(rigging, tmp_path):
     hand = rigging()
     hand.click("Run")
     hand.finish_job()
+    assert [edit.text for edit in unsaved_edits(hand.state)] == ["scan: rig"]
     hand.click("Save rigged…")
     hand.state.of(Files).dialog.enter(tmp_path)
     hand.step()
     assert hand.state.of(Files).dialog.name == "scan_rigged.npz"
     hand.click("Save###Save")
     hand.finish_job()
-    assert hand.says("Saved") and hand.state.error == ""
+    assert hand.says("Saved") and hand.state.error == "" and unsaved_edits(hand.state) == []
     again = viewer.load(tmp_path / "scan_rigged.npz").actors[0].figure
     assert again.is_attached and again.fields[0].name == "confidence"
     hand.click("Save rigged…")

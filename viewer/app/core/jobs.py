@@ -26,14 +26,18 @@ class Job(Protocol):
         Reason why the job failed; empty if it did not.
     lines : list of str
         Messages when the job ends.
-    can_cancel : bool
-        Whether it can be cancelled.
+    output : str
+        The kind of output that is lost if the job does not end, such as ``"export"``; empty if it
+        has none.
+    is_cancelled : bool
+        Whether it was cancelled; its thread may need a moment to end.
     """
 
     title: str
     error: str
     lines: list[str]
-    can_cancel: bool
+    output: str
+    is_cancelled: bool
 
     @property
     def is_done(self) -> bool:
@@ -70,11 +74,13 @@ class CountedJob:
         Gets a ``Report`` and returns messages about the result; may raise ViewerError.
     finish : callable, optional
         Applies the result of a successful job; called in the frame loop.
+    output : str
+        The kind of files that the job writes, such as ``"export"``; empty if it writes none.
 
     Attributes
     ----------
     is_change : bool
-        Whether the job has a result to apply, which changes the scene.
+        Whether the job has a result to apply that changes the scene.
     """
 
     def __init__(
@@ -82,12 +88,13 @@ class CountedJob:
         title: str,
         act: Callable[[Report], list[str]],
         finish: Callable[[], None] | None = None,
+        output: str = "",
     ) -> None:
-        self.title, self.error, self.can_cancel = title, "", True
+        self.title, self.error, self.output, self.is_cancelled = title, "", output, False
         self.lines: list[str] = []
-        self._act, self._finish, self.is_change = act, finish, finish is not None
+        self._act, self._finish = act, finish
+        self.is_change = finish is not None and not output
         self._progress = (0, 0)
-        self._is_cancelled = False
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
 
@@ -105,15 +112,17 @@ class CountedJob:
             raise
 
     def _report(self, done: int, total: int, what: str) -> None:
-        if self._is_cancelled:
+        if self.is_cancelled:
             raise _EndedError(self.title)
         self._progress, self.title = (done, total), what or self.title
 
     @property
     def is_done(self) -> bool:
-        """Whether it has ended or was cancelled, and its result has been applied."""
-        has_ended = not self._thread.is_alive() and self._finish is None
-        return self._is_cancelled or has_ended
+        """Whether its thread has ended, and its result has been applied unless it was cancelled.
+
+        A cancelled job may still restore the files that it was about to replace.
+        """
+        return not self._thread.is_alive() and (self.is_cancelled or self._finish is None)
 
     @property
     def progress(self) -> tuple[int, int]:
@@ -122,7 +131,7 @@ class CountedJob:
 
     def step(self) -> None:
         """Apply the result of a thread that has ended."""
-        if self._finish is None or self._is_cancelled or self._thread.is_alive():
+        if self._finish is None or self.is_cancelled or self._thread.is_alive():
             return
         finish, self._finish = self._finish, None
         if not self.error:
@@ -130,7 +139,7 @@ class CountedJob:
 
     def cancel(self) -> None:
         """End the job before its next step, and discard its result."""
-        self._is_cancelled = True
+        self.is_cancelled = True
 
     def wait(self) -> None:
         """Wait until the thread has ended."""
@@ -146,10 +155,14 @@ class FrameJob:
         Description of the job.
     steps : generator
         Yields (done, total) after each step and returns messages; closing it cleans up.
+    output : str
+        The kind of files that the job writes, such as ``"recording"``.
     """
 
-    def __init__(self, title: str, steps: Generator[tuple[int, int], None, list[str]]) -> None:
-        self.title, self.error, self.can_cancel = title, "", True
+    def __init__(
+        self, title: str, steps: Generator[tuple[int, int], None, list[str]], output: str
+    ) -> None:
+        self.title, self.error, self.output, self.is_cancelled = title, "", output, False
         self.lines: list[str] = []
         self._steps = steps
         self._progress = (0, 1)
@@ -179,4 +192,4 @@ class FrameJob:
     def cancel(self) -> None:
         """Cancel the job; the generator removes partial output."""
         self._steps.close()
-        self._is_done = True
+        self.is_cancelled = self._is_done = True

@@ -99,7 +99,8 @@ def no_job_room(state: AppState) -> str:
 
 def no_undo(state: AppState) -> str:
     """Return the reason why there is nothing to undo."""
-    is_changing = isinstance(state.job, CountedJob) and state.job.is_change
+    job = state.job
+    is_changing = isinstance(job, CountedJob) and job.is_change and not job.is_cancelled
     return "" if is_changing or state.history.can_undo else "nothing to undo"
 
 

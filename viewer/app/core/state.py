@@ -14,6 +14,7 @@ from viewer.app.core.clock import Clock
 from viewer.app.core.framing import Framing
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.stats import Stats
 from viewer.app.core.undo_history import History
 from viewer.data_classes import dataclass
@@ -181,6 +182,7 @@ class AppState:
         """Go to the start of the scene's motion, with an empty history."""
         self.clock.show(self.scene)
         self.history.start(self.scene, self.options)
+        self.put(SavedWork()).add_actors(self.scene.actors)
         self.say(*self.scene.diagnostics)
 
     def set_front(self, front: Front) -> None:

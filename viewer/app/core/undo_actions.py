@@ -40,7 +40,7 @@ def _cancels_change(state: AppState) -> bool:
     undone meanwhile.
     """
     job = state.job
-    if not isinstance(job, CountedJob) or not job.is_change or job.is_done:
+    if not isinstance(job, CountedJob) or not job.is_change or job.is_cancelled:
         return False
     job.cancel()
     return True

@@ -70,4 +70,4 @@ def save_clip(state: AppState, path: Path) -> None:
     """Write the chosen actor's clip if it is keyed."""
     clip = state.actor.clip
     if isinstance(clip, Clip):
-        save_files(state, lambda: write(clip, path), [path])
+        save_files(state, lambda: write(clip, path), [path], saved=clip)

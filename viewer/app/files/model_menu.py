@@ -17,6 +17,7 @@ from viewer.models import found_models, load_model_folder
 from viewer.models.catalog import CATALOG, Publication
 from viewer.models.download import ADDABLE, add_model
 from viewer.phrases import printable
+from viewer.progress import receiving
 
 __all__ = ["draw_model_menu"]
 
@@ -90,8 +91,9 @@ def _start_adding(state: AppState, kind: str) -> None:
     """Download a model in a thread."""
     title = CATALOG[kind].title
 
-    def add(_report: Report) -> list[str]:
-        path = add_model(kind)
+    def add(report: Report) -> list[str]:
+        with receiving(lambda *_: report(0, 0, "")):
+            path = add_model(kind)
         return [f"{title} was added: open it with File > Models > {kind} ({path.name})"]
 
-    state.job = CountedJob(f"Downloading {title}", add)
+    state.job = CountedJob(f"Downloading {title}", add, output="download")

@@ -33,8 +33,16 @@ class _Selection:
     everyone: bool
 
 
-def ask_for_motion(state: AppState) -> None:
-    """Open the dialog; all actors are preselected if there are several."""
+def ask_for_motion(state: AppState, suffix: str = "") -> None:
+    """Open the dialog; all actors are preselected if there are several.
+
+    Parameters
+    ----------
+    state : AppState
+        Receives the dialog.
+    suffix : str
+        Suffix of the suggested name; that of the first format if empty.
+    """
     moving = moving_actors(state)
     asks = len(moving) > 1 or state.actor not in moving
     selection = _Selection(asks)
@@ -48,7 +56,7 @@ def ask_for_motion(state: AppState) -> None:
         "save",
         "Export motion",
         suffixes,
-        f"{stem}{suffixes[0]}",
+        f"{stem}{suffix or suffixes[0]}",
         more=lambda state, dialog: _draw_more(state, dialog, selection),
         more_rows=N_ROWS + (1.5 if asks else 0.0),
         written=lambda path: motion_files(state, path, selection.everyone),

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from viewer.app.core.edited_animations import edited_aside, with_edited_keys
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
 from viewer.data_classes import dataclass
@@ -42,6 +44,7 @@ from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
 _MANY = (".obj",)  # one file per frame: exported by the command line only
+_ALL_ANIMATIONS = (".gltf", ".glb")  # these contain all animations of a figure, not only one
 _FRAMES = "smpl"  # folder of the frames within a capture's folder
 
 __all__ = [
@@ -126,13 +129,17 @@ def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Part:
-    """One actor to export: its state at the start of the export, target file and frames."""
+    """One actor to export: its state at the start of the export, target file and frames.
+
+    ``saved``: the edited clips that the file will contain.
+    """
 
     actor: Actor
     path: Path
     frames: tuple[int, int] | None
     rate: float | None
     number: int
+    saved: tuple[object, ...]
 
 
 def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
@@ -169,6 +176,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         return
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
     still = [each.copy() for each in state.scene.actors if everyone and each.clip is None]
+    known, clips = state.of(SavedWork), [clip for part in parts for clip in part.saved]
     options = MotionOptions(skinning=replace(state.options.skinning))
     n_paths = len({part.path for part in parts})
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
@@ -189,7 +197,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
                 report(1, 1, "")  # as in save_in_background
                 return [*map(str, [*notes, *left_out])]
 
-    state.job = CountedJob(title, write)
+    state.job = CountedJob(title, write, lambda: known.add(*clips), "export")
 
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
@@ -205,6 +213,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change the written motion.
         copied = actor.copy()
+        copied.figure = with_edited_keys(state, actor)
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None
             release_springs(copied)
@@ -214,7 +223,8 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             notes.append(Diagnostic("X003.springs", values=values))
         is_keyed = isinstance(actor.clip, Clip | TransformClip)
         rate = state.clock.frame_rate if is_keyed else None
-        parts.append(_Part(copied, file, frames, rate, number))
+        saved = () if frames is not None else _written_keys(state, actor, file)
+        parts.append(_Part(copied, file, frames, rate, number, saved))
     if not parts:
         raise RigError("all actors are absent in the playback range: nothing to export")
     points = [a for a in state.scene.actors if isinstance(a.clip, PointClip)]
@@ -222,6 +232,12 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
         names = [actor.name for actor in points]
         notes.append(Diagnostic("X003.points", values={"names": names}))
     return parts, notes
+
+
+def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:
+    """Return the edited clips of an actor that a file contains."""
+    has_all = file.suffix.lower() in _ALL_ANIMATIONS and keeps_keys(state.scene, actor)
+    return (actor.clip, *(edited_aside(state, actor).values() if has_all else ()))
 
 
 def _write(

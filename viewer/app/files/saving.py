@@ -7,6 +7,7 @@ from pathlib import Path
 
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.errors import ViewerError
 from viewer.formats import all_or_none, check_targets
@@ -16,12 +17,27 @@ from viewer.progress import receiving
 __all__ = ["save_files", "save_in_background"]
 
 
-def save_files(state: AppState, act: Callable[[], object], files: list[Path]) -> None:
-    """Write files unless the scene was read from one of them, and show the result."""
+def save_files(
+    state: AppState, act: Callable[[], object], files: list[Path], saved: object = None
+) -> None:
+    """Write files unless the scene was read from one of them, and show the result.
+
+    Parameters
+    ----------
+    state : AppState
+        Receives the message.
+    act : callable
+        Writes the files.
+    files : list of Path
+        The files.
+    saved : object, optional
+        The edited object that the files contain.
+    """
     try:
         # The dialog has already asked whether to replace existing files.
         check_targets(files, state.inputs, force=True)
         act()
+        state.of(SavedWork).add(saved)
         state.say(_saved(files))
     except ViewerError as problem:
         state.error = str(problem)
@@ -32,6 +48,7 @@ def save_in_background(
     act: Callable[[], Iterable[object]],
     files: Sequence[Path],
     inputs: Sequence[Path] = (),
+    saved: object = None,
 ) -> None:
     """Write files in a job that reports its progress; cancelling it leaves all files unchanged.
 
@@ -46,6 +63,8 @@ def save_in_background(
         The files; the job is named after the first.
     inputs : sequence of Path
         Further files that must not be replaced.
+    saved : object, optional
+        The edited object that the files contain.
     """
     if why := no_job_room(state):
         state.error = why
@@ -63,7 +82,8 @@ def save_in_background(
             report(1, 1, "")  # the last chance to cancel, before the old files are discarded
         return [*map(str, notes), _saved(files)]
 
-    state.job = CountedJob(f"Writing {printable(files[0].name, 60)}", write)
+    title, known = f"Writing {printable(files[0].name, 60)}", state.of(SavedWork)
+    state.job = CountedJob(title, write, lambda: known.add(saved), "export")
 
 
 def _saved(files: Sequence[Path]) -> str:

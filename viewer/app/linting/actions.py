@@ -89,8 +89,10 @@ def take_findings(state: AppState) -> None:
     if running is not None and running.job is not state.job:
         view.running = None
         # The result of a cancelled check, or of a scene that was replaced, is not shown.
-        if running.result is not None and running.result.source is state.scene:
-            view.checked, view.chosen = running.result, -1
+        was_cancelled = running.job is not None and running.job.is_cancelled
+        result = None if was_cancelled else running.result
+        if result is not None and result.source is state.scene:
+            view.checked, view.chosen = result, -1
             view.is_edited, view.seen = False, _moving(state)
     if view.checked is not None and view.checked.source is not state.scene:
         view.checked, view.chosen = None, -1

@@ -161,7 +161,7 @@ def _draw_progress(state: AppState) -> None:
     done, total = job.progress
     fraction = done / total if total else -imgui.get_time()
     imgui.progress_bar(fraction, (-1.0, 0.0), f"{done} of {total}" if total else "")
-    if button(state, "Cancel check"):
+    if button(state, "Cancel check", "it is being cancelled" if job.is_cancelled else ""):
         job.cancel()
         state.say_status("Cancelled")
 

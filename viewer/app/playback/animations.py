@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import field
-
+from viewer.app.core.edited_animations import Animations
 from viewer.app.core.state import AppState
-from viewer.data_classes import dataclass
 from viewer.errors import FormatError
 from viewer.phrases import printable
 from viewer.rig.motion.animation_choice import (
@@ -20,7 +18,6 @@ from viewer.rig.scene import Actor
 
 __all__ = [
     "NOT_ONE",
-    "Animations",
     "animation_texts",
     "choose_animation",
     "no_animations",
@@ -32,19 +29,6 @@ NOT_ONE = -2
 """Index of a motion that is not one of the figure's animations."""
 
 _LONGEST = 48  # maximum length of a name in characters
-
-
-@dataclass(slots=True)
-class Animations:
-    """Edited keys of animations that are not being played.
-
-    Attributes
-    ----------
-    edited : dict
-        Clips by actor and index of the animation; clips without edits are omitted.
-    """
-
-    edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
 
 
 def no_animations(state: AppState) -> str:

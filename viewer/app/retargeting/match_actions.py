@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from viewer.app.core.reasons import no_drive
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files
@@ -96,6 +97,7 @@ def _load(state: AppState, paths: list[Path]) -> None:
     except ViewerError as problem:
         state.error = str(problem)
         return
+    state.of(SavedWork).add(joint_map)
     text = f"Joints matched by {printable(paths[0], 200)}"
     _apply(state, joint_map, lambda: state.say_status(text))
 
@@ -112,7 +114,7 @@ def _save(state: AppState, paths: list[Path]) -> None:
     def act() -> None:
         write_joint_map(full_map(drive, actor.figure), paths[0], titles)
 
-    save_files(state, act, paths)
+    save_files(state, act, paths, saved=drive.joint_map)
 
 
 def _apply(state: AppState, joint_map: JointMap | None, tell: Callable[[], None]) -> None:

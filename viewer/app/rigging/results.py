@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.saving import save_in_background
 from viewer.app.rigging.placing import target_place
@@ -239,6 +240,7 @@ def set_trial(state: AppState, result: Result, plays: bool) -> None:
     skeleton = result.rigged.figure.skeleton
     if plays and skeleton is not None:
         result.actor.clip = trial_clip(skeleton, result.rigged.pose)
+        state.of(SavedWork).add(result.actor.clip)
         result.actor.offset = 0.0
 
 
@@ -263,6 +265,7 @@ def set_motion(state: AppState, result: Result, plays: bool) -> None:
         return
     try:
         actor.clip = clip_for(rigged, clip)
+        state.of(SavedWork).add(actor.clip if isinstance(clip, Clip) else None)
     except RigError as problem:
         state.error = str(problem)
         return
@@ -290,4 +293,4 @@ def save_rigged(state: AppState, result: Result, path: Path) -> None:
         state.error = str(problem)
         return
     inputs = result.template.paths
-    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs)
+    save_in_background(state, lambda: write_rigged(result.rigged, path), files, inputs, result)

@@ -35,7 +35,7 @@ from viewer.export._rigged_files import RIGGED_SUFFIXES, files_of
 from viewer.formats import file_stem
 from viewer.phrases import printable
 
-__all__ = ["draw_results"]
+__all__ = ["ask_where_to_save_rig", "draw_results"]
 
 _LINES_HEIGHT = 9.0  # number of visible lines of the report
 
@@ -63,7 +63,7 @@ def draw_results(state: AppState) -> None:
         set_trial(state, result, chosen)
     _draw_table(state)
     if button(state, "Save rigged…", no_job_room(state)):
-        _ask_where(state, result)
+        ask_where_to_save_rig(state, result)
     same_line_if_room("Copy report")
     if button(state, "Copy report"):
         imgui.set_clipboard_text("\n".join(line.labelled for line in result.rigged.lines))
@@ -156,7 +156,8 @@ def _draw_lines(state: AppState, result: Result) -> None:
     note_item(state, "report")
 
 
-def _ask_where(state: AppState, result: Result) -> None:
+def ask_where_to_save_rig(state: AppState, result: Result) -> None:
+    """Ask where to save a rigged mesh."""
     name = f"{file_stem(result.target.name)}_rigged.npz"
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths),

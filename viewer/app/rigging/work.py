@@ -72,7 +72,7 @@ _STEPS = {
 _CALLED = {"robust": "rigged", "nearest": "rigged (nearest)"}  # appended to the mesh's name
 
 
-def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> None:
+def _begin(state: AppState, title: str, act: Callable[[Report], _Finish], output: str = "") -> None:
     """Start a job in a thread; the frame loop later calls the function that the job returns."""
     if no_job_room(state):
         state.say_status(no_job_room(state))
@@ -83,7 +83,7 @@ def _begin(state: AppState, title: str, act: Callable[[Report], _Finish]) -> Non
         running.finish = act(report)
         return []
 
-    running.job = state.job = CountedJob(title, work)
+    running.job = state.job = CountedJob(title, work, output=output)
     state.of(Rigging).running = running
 
 
@@ -94,7 +94,8 @@ def finish_work(state: AppState) -> None:
     if running is None or running.job is state.job:
         return
     rigging.running = None
-    if running.finish is not None and running.source is state.scene:
+    is_wanted = running.source is state.scene and not (running.job and running.job.is_cancelled)
+    if running.finish is not None and is_wanted:
         running.finish(state)
 
 
@@ -329,7 +330,7 @@ def start_run(state: AppState, methods: tuple[str, ...]) -> None:
             results.append(Result(method, rigged, actor, target, template))
         return lambda state: _put(state, results, found)
 
-    _begin(state, f"Rigging {printable(name, 40)}", act)
+    _begin(state, f"Rigging {printable(name, 40)}", act, "rigging")
 
 
 def _put(state: AppState, results: list[Result], placing: Placing | None) -> None:

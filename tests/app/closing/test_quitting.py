@@ -1,0 +1,276 @@
+"""Questions before quitting or opening files loses a running job or unsaved edits."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import pytest
+from app.curves.plotted import _center
+from app.retargeting.driven import driven_scene
+from rig.animated import animated_leg
+
+import viewer
+from viewer.app.closing.state import Closing
+from viewer.app.closing.unsaved import unsaved_edits
+from viewer.app.core.undo_actions import redo, undo
+from viewer.app.files.motion_export import save_motion
+from viewer.app.files.saving import save_in_background
+from viewer.app.files.state import Files
+from viewer.app.playback.animations import choose_animation
+from viewer.app.recording.state import Recording, RecordSettings
+from viewer.app.retargeting.match_actions import match_automatically, match_joint
+from viewer.formats import Source, read
+from viewer.media.saving import save_text
+from viewer.progress import report
+from viewer.rig.scene import Actor, Scene
+
+WAIT, CANCEL, GO_ON = "Finish first", "Cancel export and quit", "Keep working"
+SAVE, DISCARD, STAY = "Save…", "Discard", "Cancel##closing"
+
+
+def is_over(hand):
+    return hand.state.of(Closing).is_over
+
+
+def asks(hand, label):
+    """Return whether a button of a question was drawn in the next frame."""
+    hand.state.item_rects.clear()
+    hand.step(3)
+    return label in hand.state.item_rects
+
+
+def texts_of(hand):
+    return [edit.text for edit in unsaved_edits(hand.state)]
+
+
+def close_dialog(hand):
+    """Press Escape, which may first leave the name field."""
+    for _ in range(2):
+        if hand.state.of(Files).dialog is not None:
+            hand.key("escape")
+    assert hand.state.of(Files).dialog is None
+
+
+@pytest.fixture
+def exporting(hand, tmp_path):
+    """A test driver on a running export of ``a.obj``, which waits for an event before it ends."""
+    is_begun, may_end = threading.Event(), threading.Event()
+
+    def act():
+        save_text(tmp_path / "a.obj", "new")
+        is_begun.set()
+        assert may_end.wait(30.0)
+        report(1, 2, "lines")
+        return []
+
+    save_in_background(hand.state, act, [tmp_path / "a.obj"])
+    assert is_begun.wait(30.0)
+    hand.step(2)
+    yield hand, may_end
+    may_end.set()
+
+
+def test_quitting_without_work_needs_no_question(hand):
+    hand.drag("arm.x", 0.9)  # a pose is not an edit of a file
+    hand.key("q", "ctrl")
+    assert is_over(hand)
+
+
+def test_quitting_finishes_the_export_first(exporting, tmp_path):
+    hand, may_end = exporting
+    hand.key("q", "ctrl")
+    assert not is_over(hand) and asks(hand, WAIT)
+    hand.click(WAIT)
+    assert not asks(hand, WAIT) and not is_over(hand)
+    may_end.set()
+    hand.finish_job()
+    assert is_over(hand) and (tmp_path / "a.obj").read_text() == "new"
+
+
+def test_quitting_cancels_the_export_and_leaves_no_file(exporting, tmp_path):
+    hand, may_end = exporting
+    files = sorted(tmp_path.iterdir())
+    hand.menu("menu File", "Quit")
+    hand.click(CANCEL)
+    assert not is_over(hand)  # its file is being removed
+    may_end.set()
+    hand.finish_job()
+    assert is_over(hand) and sorted({*files} - {*tmp_path.iterdir()}) == [tmp_path / "a.obj"]
+
+
+@pytest.mark.parametrize("key", ["", "escape"])
+def test_quitting_is_withdrawn_and_the_export_goes_on(exporting, tmp_path, key):
+    hand, may_end = exporting
+    hand.key("q", "ctrl")
+    hand.step(2)
+    hand.key(key) if key else hand.click(GO_ON)
+    assert not asks(hand, WAIT)
+    may_end.set()
+    hand.finish_job()
+    assert not is_over(hand) and (tmp_path / "a.obj").read_text() == "new"
+
+
+def test_second_request_quits_at_once(exporting):
+    hand, _ = exporting
+    hand.key("q", "ctrl")
+    assert not is_over(hand)
+    hand.key("q", "ctrl")
+    assert is_over(hand)
+
+
+def test_window_stays_open_if_the_export_is_cancelled_or_fails(exporting, tmp_path):
+    hand, may_end = exporting
+    hand.key("q", "ctrl")
+    hand.click(WAIT)
+    hand.key("escape")
+    may_end.set()
+    hand.finish_job()
+    assert not is_over(hand) and not (tmp_path / "a.obj").exists()
+
+    def refuse():
+        raise viewer.ViewerError("disk full")
+
+    save_in_background(hand.state, refuse, [tmp_path / "a.obj"])
+    hand.state.of(Closing).is_requested = hand.state.of(Closing).waits = True
+    hand.finish_job()
+    hand.key("escape")
+    assert not is_over(hand) and not asks(hand, WAIT)
+
+
+def test_quitting_during_a_recording_asks_too(curves, tmp_path):
+    curves.state.of(Recording).settings = RecordSettings(kind=".gif", size="own", own_size=(16, 16))
+    curves.state.of(Recording).wanted = tmp_path / "a.gif"
+    curves.step()
+    curves.key("q", "ctrl")
+    assert asks(curves, "Cancel recording and quit") and not is_over(curves)
+    curves.click("Cancel recording and quit")
+    curves.step(2)
+    assert is_over(curves) and not (tmp_path / "a.gif").exists()
+
+
+def delete_key(hand):
+    hand.click(_center(hand, "key arm.x 1"))
+    hand.click("Delete")
+    hand.step(2)
+
+
+def test_edited_keys_are_saved_before_quitting(curves, tmp_path, texts):
+    delete_key(curves)
+    curves.key("q", "ctrl")
+    texts.clear()
+    assert asks(curves, SAVE) and not is_over(curves)
+    assert {"Save changes before quitting?", "tiny: keys of wave"} <= {*texts}
+    curves.click(SAVE)
+    assert curves.state.of(Files).dialog.name == "tiny_edited.anim"
+    close_dialog(curves)
+    assert asks(curves, SAVE)
+    curves.click(SAVE)
+    curves.step(2)
+    curves.click("Save###Save")
+    curves.step(3)
+    assert is_over(curves)
+    assert read(Source.open(tmp_path / "tiny_edited.anim")).channels[6].times.tolist() == [0, 2]
+
+
+@pytest.mark.parametrize("answer", [DISCARD, STAY])
+def test_edited_keys_are_discarded_or_kept(curves, answer):
+    delete_key(curves)
+    clip = curves.state.actor.clip
+    curves.key("q", "ctrl")
+    curves.step(2)
+    curves.click(answer)
+    curves.step(2)
+    assert is_over(curves) is (answer == DISCARD)
+    assert not asks(curves, SAVE) and curves.state.actor.clip is clip
+
+
+def test_undone_edits_are_not_unsaved(curves, tmp_path):
+    assert texts_of(curves) == []
+    delete_key(curves)
+    assert texts_of(curves) == ["tiny: keys of wave"]
+    undo(curves.state)
+    assert texts_of(curves) == []
+    redo(curves.state)
+    save_motion(curves.state, tmp_path / "edited.bvh")
+    curves.finish_job()
+    assert texts_of(curves) == []
+    undo(curves.state)  # as in the file that was opened
+    assert texts_of(curves) == []
+    redo(curves.state)
+    assert texts_of(curves) == []
+    delete_key(curves)
+    assert texts_of(curves) == ["tiny: keys of wave"]
+
+
+def test_part_of_a_motion_does_not_save_its_keys(curves, tmp_path):
+    delete_key(curves)
+    curves.state.clock.set_range(0.5, 1.0)
+    save_motion(curves.state, tmp_path / "part.bvh")
+    curves.finish_job()
+    assert (tmp_path / "part.bvh").exists() and texts_of(curves) == ["tiny: keys of wave"]
+
+
+def test_opened_files_wait_for_the_answer(curves, tmp_path, texts):
+    delete_key(curves)
+    clip, scene = curves.state.actor.clip, curves.state.scene
+    other = tmp_path / "tiny.skel"
+    curves.open(other)
+    texts.clear()
+    assert asks(curves, SAVE) and curves.state.scene is scene
+    assert "Save changes before opening tiny.skel?" in texts
+    curves.click(STAY)
+    assert not asks(curves, SAVE)
+    assert curves.state.scene is scene and curves.state.actor.clip is clip
+    curves.open(other)
+    curves.click(DISCARD)
+    curves.step(3)
+    assert curves.state.scene is not scene and not curves.state.of(Closing).discards
+    assert not asks(curves, SAVE)
+
+
+def test_poses_and_files_that_fail_need_no_question(curves, tmp_path):
+    delete_key(curves)
+    (tmp_path / "a.skel").write_text("balljoint")
+    curves.open(tmp_path / "a.skel")
+    assert curves.state.error
+    curves.key("escape")
+    assert not asks(curves, SAVE)
+
+
+def test_edits_of_animations_that_do_not_play_are_saved(drive, tmp_path):
+    hand = drive(scene=Scene([Actor(animated_leg())]), size=(1180, 760))
+    choose_animation(hand.state, 0)
+    actor = hand.state.actor
+    actor.clip = replace(actor.clip, end=2.0)
+    hand.step(2)
+    choose_animation(hand.state, 1)
+    hand.step(2)
+    assert len(texts_of(hand)) == 1 and texts_of(hand)[0].endswith(": keys of wave")
+    save_motion(hand.state, tmp_path / "a.glb")
+    hand.finish_job()
+    assert not hand.state.error and texts_of(hand) == []
+    written = viewer.load(tmp_path / "a.glb").actors[0].figure
+    found = {one.name: one.clip().channels[0].times[-1] for one in written.animations}
+    assert found["wave"] == pytest.approx(actor.figure.animations[0].clip().channels[0].times[-1])
+    hand.key("q", "ctrl")
+    assert is_over(hand)
+
+
+def test_joint_match_by_hand_is_unsaved_until_it_is_automatic_again(drive):
+    hand = drive(scene=driven_scene(), size=(1000, 900))
+    assert texts_of(hand) == []
+    match_joint(hand.state, 0, -1)
+    hand.finish_job()
+    assert texts_of(hand) == ["body: joint match"]
+    hand.key("q", "ctrl")
+    hand.step(2)
+    hand.click(SAVE)
+    hand.step(2)
+    assert hand.state.of(Files).dialog.title == "Save joint map"
+    close_dialog(hand)
+    hand.step(2)
+    hand.click(STAY)
+    match_automatically(hand.state)
+    hand.finish_job()
+    assert texts_of(hand) == []

@@ -1,0 +1,1 @@
+"""Questions before running jobs or unsaved edits are lost."""

@@ -1,0 +1,51 @@
+"""Edited keys of the animations of a file that are not being played."""
+
+from __future__ import annotations
+
+from dataclasses import field, replace
+from functools import partial
+
+from viewer.app.core.state import AppState
+from viewer.data_classes import dataclass
+from viewer.rig.figure import Figure
+from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.scene import Actor
+
+__all__ = ["Animations", "edited_aside", "with_edited_keys"]
+
+
+@dataclass(slots=True)
+class Animations:
+    """Edited keys of animations that are not being played.
+
+    Attributes
+    ----------
+    edited : dict
+        Clips by actor and index of the animation; clips without edits are omitted.
+    """
+
+    edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
+
+
+def edited_aside(state: AppState, actor: Actor) -> dict[int, TransformClip]:
+    """Return the edited keys of the animations that an actor does not play now, by index."""
+    playing = actor.animation if isinstance(actor.clip, TransformClip) else -1
+    found = state.of(Animations).edited.items()
+    return {index: clip for (owner, index), clip in found if owner is actor and index != playing}
+
+
+def with_edited_keys(state: AppState, actor: Actor) -> Figure:
+    """Return an actor's figure whose animations have the keys edited before another was played."""
+    aside = edited_aside(state, actor)
+    if not aside:
+        return actor.figure
+    animations = list(actor.figure.animations)
+    for index, clip in aside.items():
+        old, read = animations[index], partial(_same, clip)
+        animations[index] = Animation(old.name, clip.start, clip.end, read, old.place)
+    return replace(actor.figure, animations=tuple(animations))
+
+
+def _same(clip: TransformClip) -> TransformClip:
+    return clip

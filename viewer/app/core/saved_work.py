@@ -1,0 +1,39 @@
+"""Record of the edited objects that files contain, by identity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import field
+
+from viewer.data_classes import dataclass
+from viewer.rig.motion.clip import Clip
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.scene import Actor
+
+__all__ = ["SavedWork"]
+
+
+@dataclass(slots=True)
+class SavedWork:
+    """Clips, joint maps and rigs that were read from a file or saved.
+
+    Edits replace such an object by a new one, and undo restores the old one, so an object that is
+    not recorded contains unsaved edits.
+    """
+
+    _objects: list[object] = field(default_factory=list)
+
+    def add(self, *objects: object) -> None:
+        """Record objects whose content is saved."""
+        self._objects += [one for one in objects if one is not None and one not in self]
+
+    def add_actors(self, actors: Iterable[Actor]) -> None:
+        """Record the keys and the joint maps of actors that were read from files."""
+        for actor in actors:
+            if isinstance(actor.clip, Clip | TransformClip):
+                self.add(actor.clip)
+            if actor.drive is not None:
+                self.add(actor.drive.joint_map)
+
+    def __contains__(self, one: object) -> bool:
+        return any(one is other for other in self._objects)
