@@ -70,6 +70,16 @@ def test_linear_pixels_are_rounded_averages():
     assert third.shape == (1, 1, 4)
 
 
+@pytest.mark.parametrize("height", [1, 2, 3, 4, 5, 6, 7, 12])
+@pytest.mark.parametrize("is_linear", [False, True])
+def test_levels_do_not_depend_on_the_size_of_blocks(monkeypatch, height, is_linear):
+    pixels = noise(height, 3)
+    whole = halved_pictures(pixels, is_linear)
+    monkeypatch.setattr(mipmaps, "_BLOCK", 12)  # four rows
+    parts = halved_pictures(pixels, is_linear)
+    assert [part.tolist() for part in parts] == [level.tolist() for level in whole]
+
+
 SHOW_LEVEL = """#version 330
 uniform sampler2D u_texture;
 uniform float u_level;

@@ -102,16 +102,16 @@ def _plain_channels(
     This function takes less time than parsing the JSON.
     """
     try:
-        moved = {(item["target"]["node"], item["target"]["path"]) for item in channels}
+        ends = [item["target"] for item in channels]
+        if not targets.moves_all(ends):
+            return None
         used = {item["sampler"] for item in channels}
         if set(map(type, used)) - {int} or min(used, default=0) < 0:
             return None
         inputs = {samplers[index]["input"] for index in used}
     except (KeyError, TypeError, IndexError):
         return None
-    if not targets.moves_all(moved):
-        return None
-    return {node for node, _ in moved}, inputs
+    return {end["node"] for end in ends}, inputs
 
 
 def _any_channels(

@@ -70,15 +70,16 @@ class Targets:
             return False
         return node in self._with_shapes if path == "weights" else path in TRANSFORM_PATHS
 
-    def moves_all(self, moved: set[tuple[Any, Any]]) -> bool:
-        """Return whether all channels with these nodes and paths have a visible effect.
+    def moves_all(self, ends: list[Any]) -> bool:
+        """Return whether all channels with these targets, as in the file, have a visible effect.
 
-        Files have tens of thousands of them, most of which are transforms.
+        Files have tens of thousands of them, most of which are transforms. A target that is not an
+        object, or lacks a member, raises a ``TypeError`` or ``KeyError``.
         """
-        nodes, paths = {node for node, _ in moved}, {path for _, path in moved}
+        nodes, paths = {end["node"] for end in ends}, {end["path"] for end in ends}
         if set(map(type, nodes)) == {int} and paths.issubset(_OF_NODES):
             return min(nodes) >= 0 and max(nodes) < self._tree.n_nodes
-        return all(self.moves(node, path) for node, path in moved)
+        return all(self.moves(end["node"], end["path"]) for end in ends)
 
     def of(self, channel: Element) -> Moved:
         """Return the target of a channel.

@@ -19,6 +19,7 @@ from viewer.rendering.gpu.surfaces import PLAIN, Surface
 from viewer.rendering.gpu.upload import buffer
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import bounding_box
 
 __all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
 
@@ -133,8 +134,10 @@ def index_set(
         run = np.zeros(len(triangles), dtype=np.int64)
         run[edges] = 1
         # The sum of the corners is three times the centre; a mean over an axis takes longer.
-        one, two, three = (positions[corners] for corners in triangles.T)
-        places = curve_places(one + two + three)
+        one, two, three = triangles.T
+        centers = positions.take(one, axis=0) + positions.take(two, axis=0)
+        centers += positions.take(three, axis=0)
+        places = curve_places(centers)
         along = (np.cumsum(run) << 3 * _CURVE_BITS) + places
         order = np.argsort(along, kind="stable").astype(np.int32)
     return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order)
@@ -156,8 +159,8 @@ def curve_places(points: Floats) -> NDArray[np.int64]:
     >>> curve_places(np.array([[0.0, 0, 0], [1023, 0, 0], [0, 1, 0], [1, 1, 1]])).tolist()
     [0, 153391689, 2, 7]
     """
-    low = points.min(axis=0)
-    size = float((points.max(axis=0) - low).max()) or 1.0
+    low, high = bounding_box(points)
+    size = float((high - low).max()) or 1.0
     cells = ((points - low) * ((2**_CURVE_BITS - 1) / size)).astype(np.int64)
     # Each step spreads groups of bits, until there are two zeros between any two bits.
     for shift, mask in ((16, 0x30000FF), (8, 0x300F00F), (4, 0x30C30C3), (2, 0x9249249)):

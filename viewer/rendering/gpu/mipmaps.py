@@ -2,7 +2,7 @@
 
 Mesa compiles two programs for ``glGenerateMipmap``, which takes 60 ms: a fifth of the time from
 start-up to the first image. Only for large textures does the driver save more than that: one of
-4096 x 4096 pixels takes it 60 ms, and numpy 200 ms.
+4096 x 4096 pixels takes it 60 ms, and numpy 170 ms.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ _RGBA, _UNSIGNED_BYTE, _TEXTURE_2D = 0x1908, 0x1401, 0x0DE1
 _STEPS = 1 << 14  # number of steps of linear light; the sum of four values still fits into 16 bits
 _SHIFT = np.uint16(6)  # linear bytes are multiplied by 64, which uses nearly all steps
 _HALF = np.uint16(1 << 5)
+_BLOCK = 1 << 16  # number of pixels that are converted together
 _MOST_PIXELS = 1 << 22  # maximum size of a texture for which numpy takes less time than compiling
 _LANES = np.uint64(0x3FFF_3FFF_3FFF_3FFF)  # the bits of a step in each of four channels
 
@@ -71,17 +72,29 @@ def halved_pictures(pixels: Bytes, is_linear: bool = False) -> list[Bytes]:
     list of (H >> n, W >> n, 4) uint8
         No side is shorter than 1; an odd last row or column is dropped.
     """
-    texels = _decoded(np.ascontiguousarray(pixels), is_linear)
-    pictures = []
+    pixels = np.ascontiguousarray(pixels)
+    height, width = pixels.shape[:2]
+    if height == width == 1:
+        return []
+    # Blocks of rows fit into the processor's caches. An odd last row never forms a block alone.
+    count = 2 * max(_BLOCK // (2 * width), 1)
+    blocks = (pixels[first : first + count] for first in range(0, max(height - 1, 1), count))
+    texels = np.concatenate([_halved(_decoded(block, is_linear)) for block in blocks])
+    pictures = [_encoded(texels, is_linear)]
     while max(texels.shape) > 1:
-        rows, columns = (side // 2 for side in texels.shape)
-        texels = texels[: 2 * rows : 2] + texels[1 : 2 * rows : 2] if rows else 2 * texels
-        texels = (
-            texels[:, : 2 * columns : 2] + texels[:, 1 : 2 * columns : 2] if columns else 2 * texels
-        )
-        texels = (texels >> np.uint64(2)) & _LANES
+        texels = _halved(texels)
         pictures.append(_encoded(texels, is_linear))
     return pictures
+
+
+def _halved(texels: NDArray[np.uint64]) -> NDArray[np.uint64]:
+    """Return the averages of squares of four texels, or of pairs if one side is 1."""
+    rows, columns = (side // 2 for side in texels.shape)
+    texels = texels[: 2 * rows : 2] + texels[1 : 2 * rows : 2] if rows else 2 * texels
+    texels = (
+        texels[:, : 2 * columns : 2] + texels[:, 1 : 2 * columns : 2] if columns else 2 * texels
+    )
+    return (texels >> np.uint64(2)) & _LANES
 
 
 def _decoded(pixels: Bytes, is_linear: bool) -> NDArray[np.uint64]:
