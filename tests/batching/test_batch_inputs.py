@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import io
 import sys
 
@@ -29,6 +30,18 @@ def test_folder_is_searched_in_natural_order(data):
     assert found.folders == {"data/take"}  # a recording is a single input
     assert found.base == str(data)
     assert len(found.notes) == 1 and found.notes[0].startswith("1 file ")
+
+
+def test_search_is_not_recursive(tmp_path):
+    file = tmp_path / "/".join("d" * 200) / "a.skel"
+    file.parent.mkdir(parents=True)
+    file.touch()
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(len(inspect.stack()) + 100)
+    try:
+        assert find_inputs([str(tmp_path)]).paths == (str(file),)
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def test_pattern_finds_files_in_all_folders(data):

@@ -143,7 +143,7 @@ class _Search:
             return
         self.roots.append(os.path.abspath(path))
         before = self._n_seen
-        for each, is_folder in self._inside(path, set()):
+        for each, is_folder in self._inside(path):
             if not self._is_output(each):
                 self._add(each, is_folder)
         if self._n_seen == before:
@@ -211,31 +211,42 @@ class _Search:
             if is_folder:
                 self._folders.add(path)
 
-    def _inside(self, folder: str, visited: set[str]) -> Iterator[tuple[str, bool]]:
+    def _inside(self, top: str) -> Iterator[tuple[str, bool]]:
         """Yield files and recordings in a folder and its subfolders, except hidden ones.
 
         Each path is paired with whether it is a folder.
         """
-        real = os.path.realpath(folder)
-        if real in visited:
-            return
-        visited.add(real)
-        try:
-            entries = sorted(os.scandir(folder), key=lambda entry: entry.name)
-        except OSError as problem:
-            raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
-        for entry in entries:
-            if entry.name.startswith("."):
+        visited, left = set[tuple[int, int]](), [top]
+        while left:  # not recursive: folders may be thousands of levels deep
+            folder = left.pop()
+            identity, entries = _listing(folder)
+            if identity in visited:
                 continue
-            if entry.is_dir():
-                if is_recording(entry.path):
-                    yield entry.path, True
+            visited.add(identity)
+            inner = []
+            for entry in entries:
+                if entry.is_dir():
+                    if is_recording(entry.path):
+                        yield entry.path, True
+                    else:
+                        inner.append(entry.path)
+                elif os.path.splitext(entry.name)[1].lower() in self.suffixes:
+                    yield entry.path, False
                 else:
-                    yield from self._inside(entry.path, visited)
-            elif os.path.splitext(entry.name)[1].lower() in self.suffixes:
-                yield entry.path, False
-            else:
-                self._n_skipped += 1
+                    self._n_skipped += 1
+            # If two links lead to the same folder, the first one is followed.
+            left += reversed(inner)
+
+
+def _listing(folder: str) -> tuple[tuple[int, int], list[os.DirEntry[str]]]:
+    """Return device and inode of a folder, and its entries that are not hidden, by name."""
+    try:
+        status = os.stat(folder)
+        with os.scandir(folder) as entries:
+            shown = [entry for entry in entries if not entry.name.startswith(".")]
+    except OSError as problem:
+        raise ViewerError(f"{printable(folder, 300)}: {problem.strerror}") from None
+    return (status.st_dev, status.st_ino), sorted(shown, key=lambda entry: entry.name)
 
 
 def _listed(name: str) -> list[str]:

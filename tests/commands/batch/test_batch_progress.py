@@ -69,3 +69,11 @@ def test_rate_is_that_of_the_last_minute(monkeypatch) -> None:
         clock.now += 2.0
         fast = rate.at(count)
     assert fast == 0.5
+
+
+def test_results_are_counted_although_standard_output_is_closed(monkeypatch):
+    monkeypatch.setattr(sys, "stdout", None)
+    with Display("lint", ITEMS[:2], prints=True) as batch:
+        for item in ITEMS[:2]:
+            batch.show(Result(item, "done", text="no findings"))
+        assert batch._n_done == 2

@@ -48,7 +48,8 @@ class Display:
         self._n_failed += result.status not in ("done", "unchanged")
         rate = self._rate.at(self._n_done - self._n_unchanged)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
-        if not (self._order and sys.stdout.isatty()):  # printed text would break the bar
+        # Printed text would break the bar; standard output may be closed.
+        if not (self._order and sys.stdout is not None and sys.stdout.isatty()):
             # A new title would start a new bar, which could not estimate the time left.
             self._progress.unit = f"{rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
