@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from collections import Counter
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 
@@ -124,7 +125,16 @@ def tree(path: Path) -> ast.Module:
 def nodes(path: Path) -> tuple[ast.AST, ...]:
     """Return the nodes that are checked in a whole file: imports, functions and conditions."""
     kinds = (ast.Import, ast.ImportFrom, ast.FunctionDef, ast.If)
-    return tuple(node for node in ast.walk(tree(path)) if isinstance(node, kinds))
+    return tuple(node for node in statements(tree(path)) if isinstance(node, kinds))
+
+
+def statements(block: ast.AST) -> Iterator[ast.AST]:
+    """Yield the statements of a block and of the blocks in it, without their expressions."""
+    for name in ("body", "orelse", "finalbody", "handlers", "cases"):
+        inner = getattr(block, name, ())
+        for node in inner if isinstance(inner, list) else ():
+            yield node
+            yield from statements(node)
 
 
 @cache
@@ -134,7 +144,7 @@ def imports(path: Path, with_types: bool = False) -> frozenset[str]:
         id(inner)
         for node in nodes(path)
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
-        for inner in ast.walk(node)
+        for inner in statements(node)
         if not with_types
     }
     names: set[str] = set()

@@ -345,7 +345,7 @@ def test_vertex_text_is_complete_wherever_the_mouse_is(window, places, surface):
     app.tell("mousemove", *beside)
     _wait_for(app.is_asleep, "messages to go")
     empty = app.screen()[part]
-    for place in seen[:: max(len(seen) // 5, 1)][:5]:
+    for place in seen[:: max(len(seen) // 3, 1)][:3]:
         app.tell("mousemove", *beside)
         time.sleep(0.5)
         app.tell("mousemove", place[0] - 3, place[1])

@@ -45,7 +45,7 @@ class Driver:
     size, scale
         As for ``HeadlessApp``.
     pixels_per_point : float
-        As for ``HeadlessApp``; by default pictures have a quarter of the pixels.
+        As for ``HeadlessApp``; by default pictures have a sixteenth of the pixels.
     samples : int
         Samples per pixel; 4, as in the window, takes ten times as long without a graphics card.
     scene : Scene, optional
@@ -59,7 +59,7 @@ class Driver:
         *paths,
         size=(1000, 640),
         scale=1.0,
-        pixels_per_point=0.5,
+        pixels_per_point=0.25,
         samples=1,
         scene=None,
         layout="",

@@ -192,8 +192,9 @@ def test_f12_saves_the_view_without_overwriting_files(hand, tmp_path, monkeypatc
     assert hand.undo_steps == 1  # only the wireframe differs
 
 
-def test_f12_reports_that_the_legend_is_not_in_the_image(hand, tmp_path, monkeypatch):
+def test_f12_reports_that_the_legend_is_not_in_the_image(drive, rig, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    hand = drive(*rig, pixels_per_point=0.5)
     text = 'Saved without the legend: turn on "Legend in pictures" in the Weights panel'
     hand.key("f12")
     assert not hand.says(text)

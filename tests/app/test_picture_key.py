@@ -14,15 +14,20 @@ from viewer.app.picture_key import PictureKeys
 from viewer.rendering.options import DisplayOptions, Light, Lights
 from viewer.rendering.overlay.marks import Marks
 from viewer.rig.motion.clip_edit import clip_from_pose
-from viewer.rig.scene import Actor
+from viewer.rig.scene import Actor, Scene, figure_pose
 from viewer.rig.skinning import Skinning
 
 SIZE = (64, 48)
 
 
+@pytest.fixture(scope="module")
+def figure():
+    return viewer.load().actors[0].figure
+
+
 @pytest.fixture
-def state():
-    state = make_state(viewer.load())
+def state(figure):
+    state = make_state(Scene([Actor(figure, figure_pose(figure))], (), figure.up))
     state.actor.points = np.zeros((2, 4))
     state.actor.pose.shape_weights = np.zeros(3)
     return state

@@ -26,7 +26,7 @@ from viewer.rig.skinning import deform
 pytestmark = pytest.mark.slow
 
 # With an eighth of the usual number of points, the search is much faster.
-QUICK = TransferSettings(alignment=AlignmentSettings(samples=250))
+QUICK = TransferSettings(alignment=AlignmentSettings(samples=125))
 ROTATION = turn([0.1, 1, 0.2], 2.0)
 MOVE = np.array([3.0, -4.0, 5.0])
 

@@ -22,7 +22,7 @@ from viewer.rig.skinning import Skinning, deform, joint_matrices
 @pytest.fixture
 def pinned(drive, rig):
     """A driver on a column with vertex 4 pinned, which has equal weights for root and arm."""
-    hand = drive(*rig, size=(1280, 1000), samples=1)
+    hand = drive(*rig, size=(1280, 1000), pixels_per_point=0.5)
     hand.state.actor.pose.dofs[hand.dof_index("arm.z")] = 0.9
     hand.state.history.start(hand.state.scene, hand.state.options)
     pin_vertex(hand.state, 0, 4)

@@ -20,8 +20,8 @@ from viewer.rig.skinning import deform, joint_matrices
 
 pytestmark = pytest.mark.slow
 
-# With an eighth of the usual number of points, a fit is much faster and nearly as good.
-SAMPLES = 250
+# With a sixteenth of the usual number of points, a fit is much faster and nearly as good.
+SAMPLES = 125
 LANDMARKS = np.array([[[0, 0, 0]] * 2, [[1, 0, 0]] * 2, [[0, 0, 1]] * 2], dtype=float)
 
 
@@ -124,7 +124,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
         whose, cure = "its own", "fit proportions"
         rotation = turn([0, 1, 0], 0.5)
         target = mesh_of(target.positions @ rotation.T, target.triangles)
-    found, pose = aligned(figure, target)
+    found, pose = aligned(figure, target, samples=250)
     assert found.alignment.how == "fit" and found.pose is pose
     wanted = rotation @ np.diag([1.3, 1.0, 0.8])
     assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
@@ -132,7 +132,7 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
         f"proportions: template stretched by N, N, N along {whose} x, y and z, pose kept",
         "result: a fitting error of N % of the size, N % before",
     ]
-    unfitted, _ = aligned(figure, target, fits=False)
+    unfitted, _ = aligned(figure, target, fits=False, samples=250)
     (line,) = unfitted.lines
     found = re.fullmatch(
         rf"warning: the template fits much better when stretched by (.+) along {whose} x, y and z, "
@@ -190,7 +190,7 @@ def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):
     figure, _, mesh = bent(target)
     half = bent(reached)[1]
     monkeypatch.setattr(posed_alignment, "fit_pose", lambda *_: fit_of(figure, half, reached))
-    found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False)
+    found, own = aligned(figure, mesh, landmarks=LANDMARKS, refines=False, samples=250)
     assert tuple(re.sub(r"\d+\.\d+", "G", line.labelled) for line in found.lines) == lines
     assert (found.pose is own) == ("not fitted" in lines[0])
 

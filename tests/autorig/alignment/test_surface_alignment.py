@@ -23,7 +23,7 @@ pytestmark = pytest.mark.slow
 
 POSITIONS, TRIANGLES = tube()
 # With an eighth of the usual number of points, a search is much faster.
-SAMPLES = 250
+SAMPLES = 125
 TEMPLATE = Posed(POSITIONS, TRIANGLES)
 
 

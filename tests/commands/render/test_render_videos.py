@@ -177,10 +177,13 @@ def wait_for(condition) -> None:
 
 
 @pytest.mark.parametrize(
-    ("number", "code", "word"),
-    [(signal.SIGINT, 130, b"interrupted"), (signal.SIGTERM, 143, b"terminated")],
+    ("name", "number", "code", "word"),
+    [
+        ("x.mp4", signal.SIGINT, 130, b"interrupted"),
+        ("x.webm", signal.SIGTERM, 143, b"terminated"),
+        ("x.gif", signal.SIGINT, 130, b"interrupted"),
+    ],
 )
-@pytest.mark.parametrize("name", ["x.mp4", "x.webm", "x.gif"])
 def test_interrupted_video_leaves_no_file(walk, tmp_path, name, number, code, word):
     (tmp_path / name).write_bytes(b"precious")
     process = start(walk, tmp_path, name)
