@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from app.retargeting.driven import driven_scene
+from formats.vrm.swinging import swinging
 from PIL import Image, ImageFilter
 from stored_pictures import GOLDEN, is_redrawn
 
@@ -181,6 +182,19 @@ def test_body_panels_match_golden_images(drive_body, name):
     hand.state.of(ShownPanels).closed.add("stats")  # the displayed times differ between runs
     hand.step(2)
     _compare(_shown(hand, prepare), name)
+
+
+@pytest.mark.golden("app_facts")
+def test_facts_of_a_file_match_their_golden_image(drive, tmp_path):
+    (tmp_path / "ada.vrm").write_bytes(swinging().glb())
+    hand = drive(tmp_path / "ada.vrm", size=BODY_SIZE, samples=4, pixels_per_point=1.0)
+    hand.state.of(ShownPanels).closed |= {"display", "skinning", "weights", "camera", "lights"}
+    hand.state.of(ShownPanels).closed |= {"joints", "shape", "parts", "timeline", "curves"}
+
+    def prepare(hand):
+        hand.state.stats.frame_ms = 0.0
+
+    _compare(_shown(hand, prepare), "facts")
 
 
 @pytest.mark.golden("app_joint_match")

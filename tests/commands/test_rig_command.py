@@ -185,6 +185,23 @@ def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
 
 
+def test_mesh_of_a_gltf_file_without_a_skin_has_no_rig(tmp_path, monkeypatch, capsys):
+    seen = {}
+
+    def instead(figure, pose, target, settings, report, name):
+        seen.update(target=target)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig, "transfer", instead)
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    mesh = Mesh(corners, vertex_normals(corners, triangles), triangles)
+    export(Actor(Figure("scan", mesh)), tmp_path / "scan.glb")
+    assert run(["rig", str(tmp_path / "scan.glb")]) == 130
+    assert_allclose(np.unique(seen["target"].positions, axis=0), np.unique(corners, axis=0))
+    assert "already has a rig" not in capsys.readouterr().err
+
+
 def test_rigged_target_is_used_in_its_pose(tmp_path, monkeypatch, capsys):
     seen = {}
 

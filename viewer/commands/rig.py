@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import TextIO
 
@@ -37,8 +36,8 @@ from viewer.models import resolve
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rig.figure import Figure
+from viewer.rig.posing.posed_mesh import posed_mesh
 from viewer.rig.scene import Actor, Scene
-from viewer.rig.skinning import deform
 from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
@@ -226,9 +225,9 @@ def _target(arguments: argparse.Namespace, inputs: list[Path]) -> Figure:
     figure = actor.figure
     if not figure.is_attached:
         return figure
-    print_warnings([f"{printable(figure.name, 60)} already has a rig, which is ignored"])
-    positions, normals = deform(figure, actor.pose)
-    return Figure(figure.name, replace(figure.require_mesh(), positions=positions, normals=normals))
+    if figure.is_rigged:
+        print_warnings([f"{printable(figure.name, 60)} already has a rig, which is ignored"])
+    return Figure(figure.name, posed_mesh(figure, actor.pose))
 
 
 def _template(arguments: argparse.Namespace, inputs: list[Path]) -> Actor:

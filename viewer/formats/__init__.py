@@ -108,21 +108,23 @@ FORMATS = {
         (".obj",),
         rb"(?:^|[\r\n])[ \t]*v[ \t]+[-+.\d]\S*[ \t]+[-+.\d]\S*[ \t]+[-+.\d]",
         writes=False,
-        is_bare_mesh=True,
+        meshes=(".obj",),
     ),
-    "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False, is_bare_mesh=True),
+    "ply": Format("mesh (PLY)", (".ply",), rb"\Aply[ \t]*[\r\n]", writes=False, meshes=(".ply",)),
     "bvh": Format("BVH motion", (".bvh",), rb"(?i:\A\s*HIERARCHY\b)", writes=False),
     "gltf": Format(
         "glTF 2.0, VRM",
         (".glb", ".gltf", ".vrm", ".vrma"),
         rb"\AglTF|\A\{(?s:.*?)\"asset\"\s*:\s*\{",
         writes=False,
+        meshes=(".glb", ".gltf"),
     ),
     "fbx": Format(
         "FBX",
         (".fbx",),
         rb"\AKaydara FBX Binary|\A;\s*FBX|\A(?s:.{0,2000}?)FBXHeaderExtension\s*:",
         writes=False,
+        meshes=(".fbx",),
     ),
     "smpl": Format(
         "SMPL family",
@@ -251,8 +253,8 @@ SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in
 KNOWN = " or ".join(SUFFIXES)
 """All suffixes as text for messages."""
 
-MESHES = tuple(s for kind in FORMATS.values() if kind.is_bare_mesh for s in kind.suffixes)
-"""Suffixes of meshes without a rig."""
+MESHES = tuple(suffix for kind in FORMATS.values() for suffix in kind.meshes)
+"""Suffixes of files that may contain a mesh without a rig."""
 
 
 def claims(suffix: str) -> bool:

@@ -23,8 +23,8 @@ class Format:
         Files that identify a folder of this format: any one is sufficient.
     writes : bool
         Whether there is a writer.
-    is_bare_mesh : bool
-        Whether files of this format contain only a mesh, without skeleton and skin.
+    meshes : tuple of str
+        Suffixes of files that may contain only a mesh, without a rig.
     """
 
     title: str
@@ -33,4 +33,4 @@ class Format:
     keys: tuple[str, ...] = ()
     files: tuple[str, ...] = ()
     writes: bool = True
-    is_bare_mesh: bool = False
+    meshes: tuple[str, ...] = ()

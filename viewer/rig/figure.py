@@ -173,6 +173,12 @@ class Figure:
         """Whether the mesh follows the skeleton."""
         return self.mesh is not None and self.skin is not None and self.skeleton is not None
 
+    @property
+    def is_rigged(self) -> bool:
+        """Whether it has a mesh that is more than rigid parts at the nodes of its file."""
+        is_posed = bool(self.animations) or self.record is None or self.record.has_skin
+        return self.is_attached and is_posed
+
     def require_mesh(self) -> Mesh:
         """Return the mesh of a figure that must have one.
 

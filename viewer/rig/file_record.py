@@ -106,6 +106,8 @@ class FileRecord:
         Returns the members of the file that are not stored, such as ``images.extras``.
     vrm : VrmRecord or None
         Properties of a VRM character.
+    has_skin : bool
+        Whether the file skins the meshes; otherwise each follows its node.
     """
 
     copyright: str = ""
@@ -120,3 +122,4 @@ class FileRecord:
     tangents: Callable[[], Floats | None] = lambda: None
     unkept: Callable[[], tuple[str, ...]] = tuple
     vrm: VrmRecord | None = None
+    has_skin: bool = True

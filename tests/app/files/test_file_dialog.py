@@ -63,6 +63,13 @@ def test_dialog_click_replaces_the_selection_and_ctrl_click_deselects(dialog):
     assert not dialog.state.of(Files).dialog.chosen
 
 
+def test_dialog_for_one_file_never_chooses_several(dialog):
+    dialog.state.of(Files).dialog.is_single = True
+    dialog.click("file tiny.skel")
+    dialog.click("file tiny.skin", held="ctrl")
+    assert {path.name for path in dialog.state.of(Files).dialog.chosen} == {"tiny.skin"}
+
+
 def test_dialog_goes_to_the_parent_folder(dialog, tmp_path):
     dialog.click("Up")
     assert dialog.state.of(Files).dialog.folder == tmp_path.resolve().parent

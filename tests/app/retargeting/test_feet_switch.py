@@ -81,7 +81,7 @@ def test_long_motions_are_retargeted_in_the_background(walker, monkeypatch):
     toggle_feet(hand.state)
     job = hand.state.job
     assert job.title.startswith("Retargeting ")
-    assert actor.clip is before
+    assert actor.clip is before and not plants_feet(hand.state)
     toggle_feet(hand.state)  # refused while the job runs
     assert hand.state.job is job and hand.says("wait for: Retargeting")
     hand.finish_job()
@@ -102,6 +102,7 @@ def test_cancelled_retargeting_changes_nothing(walker, monkeypatch):
     hand.finish_job()
     hand.step(3)
     assert (actor.clip, actor.drive) == before and hand.state.job is None
+    assert plants_feet(hand.state)
 
 
 def test_undo_cancels_a_change_that_is_being_computed(walker, monkeypatch):
@@ -212,6 +213,7 @@ def test_unexpected_errors_of_retargeting_are_shown(walker, monkeypatch, frames)
         hand.finish_job()
         assert "Singular matrix" in hand.state.error
     assert (actor.clip, actor.drive) == before and hand.state.job is None
+    assert plants_feet(hand.state)
 
 
 @pytest.mark.parametrize("fails", (False, True))

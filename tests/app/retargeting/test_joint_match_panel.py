@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from imgui_bundle import imgui
 from viewer.app.core.reasons import no_panel
 from viewer.app.core.undo_actions import redo, undo
 from viewer.app.files.state import Files
+from viewer.app.retargeting import drive_changes
 from viewer.app.retargeting.drive_changes import no_edit
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
@@ -113,6 +115,27 @@ def test_hovering_highlights_the_pair_in_table_and_drawing(panel):
     assert panel.state.selected_joint == head
 
 
+def test_rows_show_a_change_while_its_motion_is_computed(panel, monkeypatch):
+    state, go = panel.state, threading.Event()
+    monkeypatch.setattr(drive_changes, "_SHORT", 0)
+    compute = drive_changes.driven_clip
+    monkeypatch.setattr(
+        drive_changes, "driven_clip", lambda *given: (go.wait(30.0), compute(*given))[1]
+    )
+    shown = shown_match(state)
+    elbow, source = shown.target.labels.index("right_elbow"), shown.source.labels
+    match_joint(state, elbow, source.index("rEllbogen_x"))
+    assert partner(panel, "right_elbow") == ("rEllbogen_x", "map")
+    undo(state)  # cancels the change
+    assert partner(panel, "right_elbow") == ("", "")
+    go.set()
+    panel.finish_job()
+    assert partner(panel, "right_elbow") == ("", "")
+    match_joint(state, elbow, source.index("rEllbogen_x"))
+    panel.finish_job()
+    assert partner(panel, "right_elbow") == ("rEllbogen_x", "map")
+
+
 def test_saved_maps_can_be_loaded(panel, tmp_path):
     state = panel.state
     shown = shown_match(state)
@@ -131,6 +154,7 @@ def test_saved_maps_can_be_loaded(panel, tmp_path):
     panel.step(2)
     assert "Cancel" in state.item_rects and "several files" not in state.item_rects
     dialog = state.of(Files).dialog
+    assert dialog.is_single  # the command line takes one map, too
     dialog.done(state, [path])
     assert np.array_equal(state.actor.clip.rotations, edited.rotations)
     assert panel.says("Joints matched by")

@@ -20,7 +20,7 @@ import viewer
 from viewer.app.closing.unsaved import unsaved_edits
 from viewer.app.files.state import Files
 from viewer.app.rigging.placing import placing_now
-from viewer.app.rigging.sources import target_mesh, template_texts
+from viewer.app.rigging.sources import target_mesh, targets, template_texts, templates
 from viewer.app.rigging.state import Rigging
 from viewer.app.rigging.steps import align_template
 from viewer.app.rigging.work import start_adding, start_reading
@@ -233,6 +233,25 @@ def test_target_that_is_already_rigged_is_refused(drive, tmp_path):
     assert hand.state.error == (
         f"{tmp_path / 'whole.npz'}: expected a mesh without a rig, found a rigged mesh"
     )
+
+
+def test_mesh_of_a_gltf_file_without_a_skin_is_rigged_in_its_current_pose(drive, tmp_path):
+    figure, pose = rig_scene.bent()
+    export(Actor(rig_scene.scan(figure, pose)), tmp_path / "scan.glb")
+    hand = drive(scene=Scene([Actor(figure, pose)]), size=SIZE, samples=1)
+    start_adding(hand.state, tmp_path / "scan.glb")
+    hand.finish_job()
+    assert hand.state.error == ""
+    hand.menu("menu Window", "Rig")
+    hand.step(2)
+    added, arm = hand.state.scene.actors[1], hand.state.scene.actors[0]
+    assert targets(hand.state) == [added] and templates(hand.state) == [arm]
+    rest = target_mesh(hand.state)
+    assert target_mesh(hand.state) is rest
+    # A quarter turn of its node about z, which is at the origin: (x, y) becomes (-y, x).
+    added.pose.dofs[2] = np.pi / 2
+    turned = np.column_stack((-rest.positions[:, 1], rest.positions[:, 0]))
+    assert_allclose(target_mesh(hand.state).positions[:, :2], turned, atol=1e-12)
 
 
 def test_mesh_and_template_are_added_in_the_unit_and_up_axis_of_the_scene(drive, tmp_path):

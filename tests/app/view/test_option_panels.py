@@ -230,6 +230,26 @@ def test_stats_follow_added_removed_and_changed_actors(tall, texts):
     assert vertices() == "12"
 
 
+def test_stats_list_the_facts_in_the_file_of_the_chosen_figure(tall, texts):
+    tall.step()
+    assert "Licence" not in texts
+    facts = ("generator", "by hand"), ("licence", "CC-BY 4.0\n"), ("violent use", "not allowed")
+    told = replace(tall.state.actor.figure, facts=facts)
+    tall.state.scene.actors.append(Actor(told))
+    tall.state.choose_actor(1)
+    texts.clear()
+    tall.step()
+    found = texts[texts.index("Generator") :][:6]
+    assert found == [
+        "Generator",
+        "by hand",
+        "Licence",
+        "CC-BY 4.0\\n",
+        "Violent use",
+        "not allowed",
+    ]
+
+
 def test_check_box_of_vertex_colours_is_shown_with_vertex_colours(drive, tmp_path):
     rows = "0 0 0 255 0 0\n1 0 0 255 0 0\n0 1 0 255 0 0\n3 0 1 2\n"
     names = [f"float {name}" for name in "xyz"] + [

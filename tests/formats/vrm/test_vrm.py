@@ -149,6 +149,57 @@ def test_permissions_are_listed_in_the_facts(tmp_path: Path) -> None:
     assert facts["redistribution"] == "not allowed"
 
 
+# All properties of the specifications except pictures: the value in the file, and the text shown.
+_MODERN_META = {
+    "name": ("Ada", "title"),
+    "version": ("2", "model version"),
+    "authors": (["A", "B"], "authors"),
+    "copyrightInformation": ("(c) A", "copyright"),
+    "contactInformation": ("a@example.org", "contact"),
+    "references": (["x", "y"], "references"),
+    "thirdPartyLicenses": ("hat: CC0", "licences of others"),
+    "licenseUrl": ("https://vrm.dev/licenses/1.0/", "licence"),
+    "avatarPermission": ("everyone", "may be used by"),
+    "allowExcessivelyViolentUsage": (False, "violent use"),
+    "allowExcessivelySexualUsage": (True, "sexual use"),
+    "commercialUsage": ("personalProfit", "commercial use"),
+    "allowPoliticalOrReligiousUsage": (False, "political or religious use"),
+    "allowAntisocialOrHateUsage": (False, "antisocial use"),
+    "creditNotation": ("required", "credit"),
+    "allowRedistribution": (False, "redistribution"),
+    "modification": ("prohibited", "modification"),
+    "otherLicenseUrl": ("https://example.org/l", "other licence"),
+}
+_OLD_META = {
+    "title": ("Ada", "title"),
+    "version": ("2", "model version"),
+    "author": ("A", "authors"),
+    "contactInformation": ("a@example.org", "contact"),
+    "reference": ("x", "references"),
+    "allowedUserName": ("OnlyAuthor", "may be used by"),
+    "violentUssageName": ("Disallow", "violent use"),
+    "sexualUssageName": ("Allow", "sexual use"),
+    "commercialUssageName": ("Disallow", "commercial use"),
+    "otherPermissionUrl": ("https://example.org/p", "other permissions"),
+    "licenseName": ("CC_BY", "licence"),
+    "otherLicenseUrl": ("https://example.org/l", "other licence"),
+}
+
+
+@pytest.mark.parametrize(
+    ("key", "meta"), [("VRMC_vrm", _MODERN_META), ("VRM", _OLD_META)], ids=["1.0", "0.x"]
+)
+def test_every_property_of_author_licence_and_permissions_is_a_fact(
+    key: str, meta: dict[str, Any], tmp_path: Path
+) -> None:
+    told = {"meta": {name: value for name, (value, _) in meta.items()}}
+    _, figure = _loaded(_file(**{key: told}), tmp_path)
+    facts, shown = dict(figure.facts), {True: "allowed", False: "not allowed"}
+    for value, heading in meta.values():
+        text = ", ".join(value) if isinstance(value, list) else value
+        assert facts[heading] == (shown[value] if isinstance(value, bool) else text)
+
+
 def test_invalid_bones_and_binds_are_ignored_and_reported(tmp_path: Path) -> None:
     told = _modern({"happy": {"morphTargetBinds": [{"node": 6, "index": 9, "weight": 1.0}]}})
     told["humanoid"]["humanBones"] |= {"head": {"node": 99}, "tail": {"node": 1}}

@@ -41,6 +41,8 @@ class FileDialog:
         Height of these options in lines of text.
     written : callable, optional
         Returns all files that are written for a name; if omitted, only the named file is written.
+    is_single : bool
+        Whether only one file can be chosen.
     """
 
     def __init__(
@@ -54,7 +56,9 @@ class FileDialog:
         more: Callable[[AppState, FileDialog], None] | None = None,
         more_rows: float = 0.0,
         written: Callable[[Path], list[Path]] | None = None,
+        is_single: bool = False,
     ) -> None:
+        self.is_single = is_single
         self.more, self.more_rows, self.written = more, more_rows, written
         self.done, self.purpose, self.title, self.name = done, purpose, title, name
         self.suffixes = set(suffixes or opened_suffixes())

@@ -59,7 +59,7 @@ def draw_file_list(state: AppState, dialog: FileDialog, below: float) -> list[Pa
                 continue
             elif imgui.is_mouse_double_clicked(imgui.MouseButton_.left):
                 result = [path]
-            elif imgui.get_io().key_ctrl:
+            elif imgui.get_io().key_ctrl and not dialog.is_single:
                 dialog.chosen ^= {path}
             else:
                 dialog.chosen = {path}

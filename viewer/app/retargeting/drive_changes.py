@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_drive, no_job_room
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
+from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.progress import Receiver, receiving
@@ -18,7 +20,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
-__all__ = ["change_drive", "no_edit"]
+__all__ = ["change_drive", "no_edit", "shown_drive"]
 
 _SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 
@@ -29,6 +31,23 @@ def no_edit(state: AppState) -> str:
     if not why and state.of(Files).stream is not None:
         why = "wait until the capture has been read"
     return why
+
+
+@dataclass(slots=True)
+class _Change:
+    """The drives that a job is computing."""
+
+    job: CountedJob | None = None
+    drives: dict[Actor, Drive] = field(default_factory=dict)
+
+
+def shown_drive(state: AppState, actor: Actor) -> Drive | None:
+    """Return an actor's drive, or the changed one whose motion is being computed."""
+    change = state.of(_Change)
+    is_computed = change.job is not None and change.job is state.job
+    if is_computed and change.job is not None and not change.job.is_cancelled:
+        return change.drives.get(actor, actor.drive)
+    return actor.drive
 
 
 def change_drive(
@@ -76,7 +95,8 @@ def change_drive(
         tell()
 
     if sum(drive.motion.clip.n_rows for _, drive in work) > _SHORT:
-        state.job = CountedJob(f"Retargeting {printable(first.title, 60)}", act, finish)
+        job = state.job = CountedJob(f"Retargeting {printable(first.title, 60)}", act, finish)
+        state.put(_Change(job, dict(work)))
         return
     try:
         act(lambda *_: None)

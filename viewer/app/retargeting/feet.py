@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from viewer.app.core.state import AppState
-from viewer.app.retargeting.drive_changes import change_drive, no_edit
+from viewer.app.retargeting.drive_changes import change_drive, no_edit, shown_drive
 
 __all__ = ["plants_feet", "toggle_feet"]
 
 
 def plants_feet(state: AppState) -> bool:
-    """Return whether the feet of the chosen actor are planted."""
-    drive = state.actor.drive
+    """Return whether the feet of the chosen actor are planted, or will be after retargeting."""
+    drive = shown_drive(state, state.actor)
     return drive is not None and drive.plants_feet
 
 

@@ -75,7 +75,7 @@ def match_automatically(state: AppState) -> None:
 def ask_for_map(state: AppState) -> None:
     """Open the dialog that loads a joint map."""
     state.of(Files).dialog = FileDialog(
-        folder_of(state.paths), _load, "open", "Load joint map", _SUFFIXES
+        folder_of(state.paths), _load, "open", "Load joint map", _SUFFIXES, is_single=True
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import field
 import numpy as np
 
 from viewer.app.core.state import AppState
+from viewer.app.retargeting.drive_changes import shown_drive
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
@@ -115,9 +116,12 @@ class JointMatch:
 
 
 def shown_match(state: AppState) -> Shown | None:
-    """Return the match of the chosen actor's joints; None if no motion drives it."""
+    """Return the match of the chosen actor's joints; None if no motion drives it.
+
+    A change is shown at once, even while the motion is still retargeted.
+    """
     view, actor = state.of(JointMatch), state.actor
-    drive, figure = actor.drive, actor.figure
+    drive, figure = shown_drive(state, actor), actor.figure
     if drive is None:
         return None
     shown = view.shown

@@ -96,7 +96,7 @@ def _draw_sources(state: AppState) -> None:
     if found and chosen in names:
         choose_target(state, found[int(chosen)])
     if button(state, "Add mesh…", why):
-        _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES)
+        _ask(state, _add_mesh, f"Add a mesh to rig: {', '.join(MESHES)}", MESHES, is_single=True)
     if not why:
         explain("add a mesh without a rig to this scene")
     with disabled(state, why):
@@ -134,9 +134,13 @@ def _template_text(template: Template | None) -> str:
     return f"{skeleton.n_joints} joints, {mesh.n_vertices:,} vertices, {pose}"
 
 
-def _ask(state: AppState, done: object, title: str, suffixes: tuple[str, ...]) -> None:
+def _ask(
+    state: AppState, done: object, title: str, suffixes: tuple[str, ...], is_single: bool = False
+) -> None:
     assert callable(done)
-    state.of(Files).dialog = FileDialog(folder_of(state.paths), done, "open", title, suffixes)
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths), done, "open", title, suffixes, is_single=is_single
+    )
 
 
 def _add_mesh(state: AppState, paths: list[Path]) -> None:

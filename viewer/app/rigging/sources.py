@@ -10,8 +10,12 @@ from viewer.errors import RigError
 from viewer.formats import MESHES
 from viewer.loading import bundled_body, bundled_files, load
 from viewer.phrases import one_of, printable
+from viewer.rig.memo import Memo
 from viewer.rig.mesh import Mesh
+from viewer.rig.pose import pose_key
+from viewer.rig.posing.posed_mesh import posed_mesh
 from viewer.rig.scene import Actor
+from viewer.rig.skin import Skin
 
 __all__ = [
     "choose_target",
@@ -25,10 +29,12 @@ __all__ = [
     "targets",
     "template_files",
     "template_texts",
+    "templates",
 ]
 
 _BUNDLED = {"body": "Bundled body", "fox": "Bundled fox"}
 _FILE = "file"
+_posed: Memo[Skin, Mesh] = Memo()
 
 
 def targets(state: AppState) -> list[Actor]:
@@ -36,7 +42,7 @@ def targets(state: AppState) -> list[Actor]:
     return [
         actor
         for actor in state.scene.actors
-        if not actor.figure.is_attached
+        if not actor.figure.is_rigged
         and actor.figure.mesh is not None
         and actor.figure.mesh.n_triangles > 0
     ]
@@ -45,7 +51,7 @@ def targets(state: AppState) -> list[Actor]:
 def templates(state: AppState) -> list[Actor]:
     """Return the actors of the scene that are already rigged."""
     made = {id(result.actor) for result in state.of(Rigging).results.values()}
-    return [a for a in state.scene.actors if a.figure.is_attached and id(a) not in made]
+    return [a for a in state.scene.actors if a.figure.is_rigged and id(a) not in made]
 
 
 def refresh(state: AppState) -> None:
@@ -63,10 +69,15 @@ def refresh(state: AppState) -> None:
 
 
 def target_mesh(state: AppState) -> Mesh:
-    """Return the mesh of the target, which must exist."""
+    """Return the mesh of the target, which must exist, in its current pose."""
     target = state.of(Rigging).target
-    assert target is not None and target.figure.mesh is not None  # targets have meshes
-    return target.figure.mesh
+    assert target is not None  # checked by the callers
+    figure, pose = target.figure, target.pose
+    if pose is None or figure.skin is None:
+        return figure.require_mesh()
+    # Placements are valid for one mesh, so the same pose must return the same object.
+    key = id(figure.mesh), pose_key(pose)
+    return _posed.get(figure.skin, key, lambda: posed_mesh(figure, pose))
 
 
 def choose_target(state: AppState, target: Actor | None) -> None:

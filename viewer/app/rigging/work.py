@@ -106,10 +106,11 @@ def start_adding(state: AppState, path: Path) -> None:
         report(0, 0, f"Reading {printable(path.name, 60)}")
         scene = load(path)
         found = [actor for actor in scene.actors if actor.figure.mesh is not None]
-        if not found:
-            raise RigError(f"{printable(path)}: expected a mesh to rig, found none")
+        if len(found) != 1:
+            count = len(found) or "none"
+            raise RigError(f"{printable(path)}: expected one mesh to rig, found {count}")
         actor = found[0]
-        if actor.figure.is_attached:
+        if actor.figure.is_rigged:
             raise RigError(f"{printable(path)}: expected a mesh without a rig, found a rigged mesh")
 
         def finish(state: AppState) -> None:

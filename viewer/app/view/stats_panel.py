@@ -1,4 +1,4 @@
-"""Stats panel: size of the scene, duration of a frame, and renderer."""
+"""Stats panel: size of the scene, frames, renderer, and the facts in the file of the figure."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from viewer.rig.skin import influence_counts
 
 __all__ = ["draw"]
 
+_LONGEST = 400  # maximum length of a text in characters
 _known: Memo[Scene, tuple[tuple[str, str], ...]] = Memo()
 
 
@@ -30,6 +31,28 @@ def draw(state: AppState) -> None:
         imgui.text_disabled(name)
         imgui.same_line(imgui.get_font_size() * 6)
         imgui.text_wrapped(value)
+    _draw_facts(state.actor.figure)
+
+
+def _draw_facts(figure: Figure) -> None:
+    """Draw what the chosen figure's file says about it, such as author, licence and permissions."""
+    if not figure.facts:
+        return
+    imgui.separator_text("File")
+    if not imgui.begin_table("facts", 2):
+        return
+    imgui.table_setup_column("heading", imgui.TableColumnFlags_.width_stretch, 0.4)
+    imgui.table_setup_column("text", imgui.TableColumnFlags_.width_stretch, 0.6)
+    faint = imgui.get_style_color_vec4(imgui.Col_.text_disabled)
+    for heading, text in figure.facts:
+        imgui.table_next_row()
+        imgui.table_next_column()
+        imgui.push_style_color(imgui.Col_.text, faint)
+        imgui.text_wrapped(f"{heading[:1].upper()}{heading[1:]}")
+        imgui.pop_style_color()
+        imgui.table_next_column()
+        imgui.text_wrapped(printable(text, _LONGEST))
+    imgui.end_table()
 
 
 def _counts(figures: tuple[Figure, ...]) -> tuple[tuple[str, str], ...]:

@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from viewer.formats._nodes.content import NodeFile
+from viewer.formats._nodes.grouping import is_skinned
 from viewer.formats._nodes.joints import Joints
 from viewer.formats._nodes.surfaces import Piece, tangents_of, used_materials
 from viewer.rig.arrays import Ints
@@ -60,6 +61,10 @@ def record_of(
         tangents=partial(tangents_of, pieces),
         unkept=file.unkept,
         vrm=_vrm_record(file, joints, nodes, pieces),
+        has_skin=any(
+            is_skinned(mesh, int(file.tree.skins[node]))
+            for mesh, node in zip(meshes, nodes, strict=True)
+        ),
     )
 
 
