@@ -44,7 +44,7 @@ def test_leader_line_starts_half_a_margin_from_the_point_and_ends_a_pixel_before
     assert pixels[8, are_part[8]].tolist() == [[x, 100] for x in range(154, 173)]
 
 
-@pytest.fixture(params=[60, 300, 1100], scope="module")
+@pytest.fixture(params=[60, 300, 1500], scope="module")
 def scene(request):
     """Return points at least a quarter of a pixel apart, label candidates, and dots."""
     rng = np.random.default_rng(2)
@@ -69,13 +69,18 @@ def by_hand(points, places):
         anchor = places.anchors[rows[0]]
         others = points[np.abs(points - anchor).max(axis=1) >= 1.0]
         nearest = np.clip(others, places.low[rows, None], places.high[rows, None])
-        clear[rows] = np.linalg.norm(others - nearest, axis=2).min(axis=1)
+        clear[rows] = shortest(others - nearest)
         rows = rows[places.has_line[rows]]
         along = places.ends[rows] - anchor
         fractions = (along @ (others - anchor).T) / places.own[rows, None] ** 2
         on_line = anchor + np.clip(fractions, 0, 1)[..., None] * along[:, None]
-        beside[rows] = np.linalg.norm(others - on_line, axis=2).min(axis=1)
+        beside[rows] = shortest(others - on_line)
     return clear, beside
+
+
+def shortest(vectors):
+    """Return the length of the shortest vector in each row, (M,); ``vectors``: (M, N, 2)."""
+    return np.sqrt((vectors[..., 0] ** 2 + vectors[..., 1] ** 2).min(axis=1))
 
 
 def test_positions_are_sorted_by_distance_from_other_points(scene, room):
@@ -102,7 +107,7 @@ def test_crowding_test_has_no_false_positives_and_few_misses(scene, room):
     lines = crowded_lines(places, pixels, are_part, dots, GAP)
     assert not (lines & (beside >= 0.75 * GAP)).any()
     if len(points) > 1000:
-        assert found.mean() > 0.9 and lines[places.has_line].mean() > 0.8
+        assert found.mean() > 0.9 and lines[places.has_line].mean() > 0.9
 
 
 def test_cells_larger_than_the_space_next_to_a_line_are_inconclusive(scene):
