@@ -18,7 +18,6 @@ from formats.pickle_bytes import (
     fake_class,
     finished,
     mapping,
-    matrix,
     named,
     opened,
     payload,
@@ -36,7 +35,7 @@ from numpy.testing import assert_array_equal
 from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.opening import open_archive
-from viewer.formats._archive.values import Opaque, Sparse
+from viewer.formats._archive.values import Opaque
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, frozen
 
@@ -214,30 +213,6 @@ def test_pickled_values_are_read_once() -> None:
     assert isinstance(later, Deferred)
     assert not later.is_loaded
     assert later.values() is archive.array("v").values()
-
-
-@pytest.mark.parametrize(
-    ("module", "name"),
-    [
-        ("scipy.sparse.csc", "csc_matrix"),
-        ("scipy.sparse._csc", "csc_matrix"),
-        ("scipy.sparse._csc", "csc_array"),
-    ],
-)
-@pytest.mark.parametrize("shape_key", ["_shape", "shape"])
-def test_sparse_columns_are_read(module: str, name: str, shape_key: str) -> None:
-    found = opened(saved(v=matrix(module=module, name=name, shape_key=shape_key))).get("v")
-    assert isinstance(found, Sparse)
-    assert (found.shape, found.layout) == ((2, 3), "csc")
-    assert [part.tolist() for part in found.entries()] == [[0, 1, 0], [0, 2, 2], [1, 2, 3]]
-
-
-@pytest.mark.parametrize("module", ["scipy.sparse.csr", "scipy.sparse._csr"])
-def test_sparse_rows_are_read(module: str) -> None:
-    built = matrix(sides=(3, 2), module=module, name="csr_matrix")
-    found = opened(saved(v=built)).sparse("v", ("J", "V"))
-    assert (found.shape, found.layout) == ((3, 2), "csr")
-    assert [part.tolist() for part in found.entries()] == [[0, 2, 2], [0, 1, 0], [1, 2, 3]]
 
 
 @pytest.mark.parametrize("protocol", [0, 2, 4])

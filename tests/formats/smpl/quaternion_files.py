@@ -1,8 +1,12 @@
-"""Tiny STAR and SUPR models with the published keys, and their forward passes, joint by joint."""
+"""Tiny STAR, SUPR and SMAL models with the published keys, and their forward passes."""
 
 import numpy as np
 
 SMPL_PARENTS = (-1, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 9, 9, 12, 13, 14, 16, 17, 18, 19, 20, 21)
+SMAL_PARENTS = (
+    *(-1, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 6, 11, 12, 13, 6, 15, 0, 17, 18, 19, 0, 21, 22, 23),
+    *(0, 25, 26, 27, 28, 29, 30, 16, 16, 16),
+)
 N_VERTICES, N_SHAPES = 30, 6
 
 
@@ -35,6 +39,13 @@ def supr(n_joints=7, seed=5):
     return arrays | {"J_regressor": regressor, "posedirs": directions}
 
 
+def smal(seed=6):
+    """Return the arrays of SMAL, whose rotation matrices drive the correctives, as in SMPL."""
+    generator = np.random.default_rng(seed)
+    directions = generator.normal(size=(N_VERTICES, 3, 9 * (len(SMAL_PARENTS) - 1)))
+    return star(SMAL_PARENTS, seed) | {"posedirs": directions}
+
+
 def turned(vector):
     """Return the rotation by a vector, by Rodrigues' formula."""
     angle = np.linalg.norm(vector)
@@ -61,6 +72,9 @@ def forward(arrays, vectors, betas, place):
     if is_supr:
         joints = (regressor @ np.append(shaped.ravel(), 1.0)).reshape(-1, 3)
         feature = np.concatenate([quaternion(vector) for vector in vectors])
+    elif arrays["posedirs"].shape[2] == 9 * (len(vectors) - 1):
+        joints = regressor @ shaped
+        feature = np.concatenate([(turned(vector) - np.eye(3)).ravel() for vector in vectors[1:]])
     else:
         joints = regressor @ shaped
         feature = np.append(np.concatenate([quaternion(v) for v in vectors[1:]]), betas[1])

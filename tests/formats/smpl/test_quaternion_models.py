@@ -1,8 +1,8 @@
-"""STAR and SUPR, compared with their published equations, and animals recognised by joint tree."""
+"""STAR, SUPR and SMAL, compared with their published equations; animals have known joints."""
 
 import numpy as np
 import pytest
-from formats.smpl.quaternion_files import N_SHAPES, forward, star, supr
+from formats.smpl.quaternion_files import N_SHAPES, SMAL_PARENTS, forward, smal, star, supr
 from numpy.testing import assert_allclose
 
 import viewer
@@ -23,7 +23,7 @@ def load(tmp_path, arrays):
     return viewer.load(path).actors[0].figure
 
 
-@pytest.mark.parametrize("make", [star, supr])
+@pytest.mark.parametrize("make", [star, supr, smal])
 def test_vertices_and_joints_match_the_published_equations(tmp_path, make):
     arrays = make()
     figure = load(tmp_path, arrays)
@@ -70,12 +70,6 @@ def test_wrong_number_of_corrective_columns_is_refused(tmp_path):
     arrays = star() | {"posedirs": np.zeros((30, 3, 94))}
     with pytest.raises(FormatError, match="207"):
         load(tmp_path, arrays)
-
-
-SMAL_PARENTS = (
-    *(-1, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 6, 11, 12, 13, 6, 15, 0, 17, 18, 19, 0, 21, 22, 23),
-    *(0, 25, 26, 27, 28, 29, 30, 16, 16, 16),
-)
 
 
 def test_animals_have_their_joint_names_and_z_up(tmp_path):

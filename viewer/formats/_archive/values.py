@@ -53,18 +53,18 @@ class Opaque:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sparse:
-    """A checked sparse matrix in compressed columns ("csc") or rows ("csr").
+    """A checked sparse matrix in compressed columns ("csc"), rows ("csr") or as entries ("coo").
 
     Attributes
     ----------
     shape : (2,)
         Rows and columns as declared by the file, to be checked before a dense matrix is created.
     data, indices : (N,)
-        Stored values, and the row (csc) or column (csr) of each.
-    indptr : (columns + 1,) or (rows + 1,)
-        Start of each column (csc) or row (csr) in ``data``.
+        Stored values, and the row (csc, coo) or column (csr) of each.
+    indptr : (columns + 1,), (rows + 1,) or (N,)
+        Start of each column (csc) or row (csr) in ``data``; the column of each value (coo).
     layout : str
-        ``"csc"`` or ``"csr"``.
+        ``"csc"``, ``"csr"`` or ``"coo"``.
 
     Raises
     ------
@@ -86,7 +86,11 @@ class Sparse:
             raise MisfitError(Phrase("sparse-indices"))
         if not all(0 <= side <= _MAX_SIDE for side in self.shape):
             raise MisfitError(Phrase("sparse-size", most=_MAX_SIDE, shape=self.shape))
-        self._check_counts()
+        if self.layout == "coo":
+            self._check_indices(self.indices, self.shape[0])
+            self._check_indices(self.indptr, self.shape[1])
+        else:
+            self._check_counts()
 
     def _check_counts(self) -> None:
         across, along = self.shape if self.layout == "csc" else self.shape[::-1]
@@ -104,11 +108,16 @@ class Sparse:
         ordered = bool((self.indptr[1:] >= self.indptr[:-1]).all())
         if not ordered or int(self.indptr[0]) != 0 or int(self.indptr[-1]) != count:
             raise MisfitError(Phrase("sparse-order", count=count))
-        if len(self.indices) != count:
-            raise MisfitError(Phrase("sparse-count", expected=count, found=len(self.indices)))
+        self._check_indices(self.indices, across)
+
+    def _check_indices(self, indices: NDArray[Any], across: int) -> None:
+        """Check the rows or columns of all stored values."""
+        count = len(self.data)
+        if len(indices) != count:
+            raise MisfitError(Phrase("sparse-count", expected=count, found=len(indices)))
         if count == 0:
             return
-        low, high = int(self.indices.min()), int(self.indices.max())
+        low, high = int(indices.min()), int(indices.max())
         if low < 0 or high >= across:
             raise MisfitError(Phrase("sparse-range", last=across - 1, low=low, high=high))
 
@@ -125,6 +134,8 @@ class Sparse:
         [[0, 1], [0, 1], [1.0, 1.0]]
         """
         starts = self.indptr.astype(np.intp)
+        if self.layout == "coo":
+            return self.indices.astype(np.intp), starts, self.data
         lengths = starts[1:] - starts[:-1]
         outer = np.repeat(np.arange(len(lengths)), lengths)
         inner = self.indices.astype(np.intp)

@@ -18,7 +18,7 @@ from viewer.formats._pickle.tensors import ROLES as TORCH_ROLES
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes, noun
 from viewer.phrases import printable
 
-__all__ = ["as_key", "build", "call", "create", "find"]
+__all__ = ["SPARSE", "as_key", "build", "call", "create", "find"]
 
 # Numpy 2 and scipy 1.8 renamed modules; files keep the old names. A rule for prefixes would be
 # unsafe: numpy.testing.runstring executes any string.
@@ -38,6 +38,9 @@ _ROLES = {
     ("scipy.sparse.csr", "csr_matrix"): "csr",
     ("scipy.sparse._csr", "csr_matrix"): "csr",
     ("scipy.sparse._csr", "csr_array"): "csr",
+    ("scipy.sparse.coo", "coo_matrix"): "coo",
+    ("scipy.sparse._coo", "coo_matrix"): "coo",
+    ("scipy.sparse._coo", "coo_array"): "coo",
     ("chumpy.ch", "Ch"): "Ch",
     ("chumpy.ch", "ChHandle"): "Ch",
     ("chumpy.ch", "MatVecMult"): "expression",
@@ -65,7 +68,9 @@ _ROLES = {
 }
 # Wrappers of joblib before 0.10, which store each array in a separate file.
 _OLD_WRAPPERS = ("NDArrayWrapper", "ZNDArrayWrapper")
-_CLASSES = {"csc", "csr", "Ch", "Select", "expression", "joblib"}
+SPARSE = ("csc", "csr", "coo")
+"""Roles of sparse matrices."""
+_CLASSES = {*SPARSE, "Ch", "Select", "expression", "joblib"}
 _ORDERS = {"<", ">", "=", "|"}
 _LONGEST_NAME = 200
 _LONGEST_KEY = 1 << 16

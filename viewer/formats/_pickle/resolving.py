@@ -18,6 +18,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.values import Opaque, Sparse, Value
 from viewer.formats._misfit import MisfitError
+from viewer.formats._pickle.names import SPARSE
 from viewer.formats._pickle.tensors import Storage, Tensor
 from viewer.formats._pickle.values import Array, Dtype, Instance, Span, StandIn, is_sizes
 from viewer.phrases import printable
@@ -102,7 +103,7 @@ class _Resolver:
             return Opaque(Phrase("unread-storage"))
         if isinstance(value, Instance) and value.of.role == "joblib":
             return Opaque(Phrase("unread-name", name=value.of.name))
-        if isinstance(value, Instance) and value.of.role in ("csc", "csr"):
+        if isinstance(value, Instance) and value.of.role in SPARSE:
             return self.sparse(value)
         if isinstance(value, Instance):
             return self.expression(value, 0)
@@ -117,7 +118,11 @@ class _Resolver:
         shape = state.get("_shape", state.get("shape"))
         if not is_sizes(shape) or len(shape) != 2:
             raise self.fail(Phrase("sparse-no-shape"))
-        data, indices, indptr = (self.part(state, name) for name in ("data", "indices", "indptr"))
+        names = ("row", "col") if matrix.of.role == "coo" else ("indices", "indptr")
+        coordinates = state.get("coords")  # rows and columns, since SciPy 1.13
+        if names[0] == "row" and isinstance(coordinates, tuple) and len(coordinates) == 2:
+            state = {**state, **dict(zip(names, coordinates, strict=True))}
+        data, indices, indptr = (self.part(state, name) for name in ("data", *names))
         try:
             return Sparse((shape[0], shape[1]), data, indices, indptr, matrix.of.role)
         except MisfitError as problem:
@@ -139,7 +144,7 @@ class _Resolver:
         if value.of.role == "expression":
             return Opaque(Phrase("unread-expression", name=name))
         inner = state.get("x" if value.of.role == "Ch" else "a")
-        if isinstance(inner, Instance) and inner.of.role not in ("csc", "csr"):
+        if isinstance(inner, Instance) and inner.of.role not in SPARSE:
             found: Deferred | Opaque = self.expression(inner, depth + 1)
         elif isinstance(inner, Array):
             found = inner.deferred(self.fail) or Opaque(inner.what)
