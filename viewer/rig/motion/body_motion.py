@@ -9,7 +9,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, frozen
+from viewer.rig.arrays import Floats, freeze, frozen
 from viewer.rig.coefficients import unused_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
@@ -118,12 +118,11 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         joint = motion.joint_names[0]
         names = {"motion": motion.name, "joint": joint, "figure": figure.name}
         raise RigError(Diagnostic("F004.body-joint", values=names))
-    count = motion.n_rows
-    vectors = np.zeros((count, skeleton.n_joints, 3))
+    vectors: dict[int, Floats] = {}  # of each joint that moves
     lost = []
     for column, name in enumerate(motion.joint_names):
         if name in skeleton.names:
-            vectors[:, skeleton.names.index(name)] = motion.vectors[:, column]
+            vectors[skeleton.names.index(name)] = motion.vectors[:, column]
         elif motion.vectors[:, column].any():
             lost.append(name)
     notes = _put_hands(motion, figure, vectors)
@@ -131,7 +130,10 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         values = {"n": len(lost), "figure": figure.name, "names": lost}
         notes.append(Diagnostic("F007.joints-left-out", values=values))
     weights, more = _weights(motion, figure)
-    rotations = rotation_vector_to_quaternion(vectors)
+    # One joint at a time, because long motions fill much of the memory.
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (motion.n_rows, skeleton.n_joints, 1))
+    for joint, rows in vectors.items():
+        rotations[:, joint] = rotation_vector_to_quaternion(rows)
     translations, origin_rotations = motion.translations, None
     if motion.world_rotations is not None:
         origin_rotations = rotation_vector_to_quaternion(motion.world_rotations)
@@ -148,7 +150,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     clip = SampledClip(
         motion.name,
         motion.timing,
-        rotations,
+        freeze(rotations),
         figure_translations=translations,
         shape_weights=weights,
     )
@@ -171,8 +173,10 @@ def rest_roots(figure: Figure, shape: Floats | None) -> Floats:
     return root_positions(figure, weights)
 
 
-def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diagnostic]:
-    """Rotate the fingers by their components, in place; return messages about omitted data."""
+def _put_hands(
+    motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]
+) -> list[Diagnostic]:
+    """Add the fingers' rotation vectors by joint; return messages about omitted data."""
     notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
         hand = _hand(figure, side)
@@ -188,7 +192,8 @@ def _put_hands(motion: BodyMotion, figure: Figure, vectors: Floats) -> list[Diag
         fingers = coefficients[:, :used] @ hand.components[:used]
         if not motion.flat_hands:
             fingers = fingers + hand.mean
-        vectors[:, hand.joints] = fingers.reshape(len(fingers), -1, 3)
+        fingers = fingers.reshape(len(fingers), -1, 3)
+        vectors |= {int(joint): fingers[:, row] for row, joint in enumerate(hand.joints)}
     return notes
 
 
