@@ -71,6 +71,7 @@ def begin(
     FormatError, RigError
         See ``load``.
     """
+    contents = _with_bodies(contents)
     figures = contents.figures
     pairs = _pairs([figure for _, figure in figures])
     cast = Cast([])
@@ -112,6 +113,15 @@ def begin(
         scene.space = switched[0].space
         scene.in_space = partial(_assembled_in, contents, settings, cast.builders)
     return scene, cast.builders
+
+
+def _with_bodies(contents: Contents) -> Contents:
+    """Return contents in which poses of bodies without a figure are motions of one frame."""
+    if not contents.poses:
+        return contents
+    from viewer.loading.lone_poses import with_bodies
+
+    return with_bodies(contents)
 
 
 def _assembled_in(
