@@ -141,6 +141,15 @@ def test_rows_of_the_same_frame_are_different_people(form: str, key: str) -> Non
     assert repeated == (0 if key else 1)
 
 
+def test_rows_that_repeat_a_person_in_a_frame_are_reported() -> None:
+    frames, persons = np.array([5, 5, 6, 5]), np.array([4, 9, 4, 4])
+    opened = source({"pose": TURNED, "trans": PLACES, "frame_ids": frames, "track_ids": persons})
+    found = next(iter(open_results(opened).parts())).bodies
+    assert_allclose(found[4].translations, PLACES[[0, 2]], atol=1e-12)
+    notes = [note for note in opened.diagnostics.warnings if note.key == "F007.video-same-frame"]
+    assert [note.values for note in notes] == [{"n": 1}]
+
+
 @pytest.mark.parametrize(
     "changes", [{"rotmat": TURNED[:1, :22]}, {"betas": np.zeros(5)}], ids=["joints", "shape"]
 )

@@ -53,6 +53,55 @@ def test_vertices_follow_the_tools_formula(tmp_path: Path) -> None:
         assert_drawn(scene, person, 0, wanted)
 
 
+def aligned(shown: dict[str, Any]) -> Any:
+    """Return the joints of the people as BEV stores them: relative to a point near the hips."""
+    found = []
+    for row, pose in enumerate(shown["smpl_thetas"]):
+        turned = matrices(pose.reshape(24, 3))
+        joints = vertices("smpl", model("smpl"), shown["smpl_betas"][row], turned, 0.0)[1]
+        found.append(joints - joints[[1, 2]].mean(axis=0))
+    return np.array(found)
+
+
+def test_people_of_bev_are_placed_by_their_hips_and_seen_by_its_camera(tmp_path: Path) -> None:
+    width, height = 1280.0, 720.0
+    shown = image(2, 1.0)
+    joints = aligned(shown)
+    points = joints + shown["cam_trans"][:, None]
+    # The image is padded to a square, which is scaled to 512 pixels with a focal length of 443.4.
+    pixels = points[..., :2] / points[..., 2:] * 443.4 / 512.0 * width + [width / 2.0, height / 2.0]
+    path = written(tmp_path, shown | {"joints": single(joints), "pj2d_org": single(pixels)})
+    scene = scene_of(path, "smpl")
+    for person in range(2):
+        turned = matrices(shown["smpl_thetas"][person].reshape(24, 3))
+        wanted, own = vertices("smpl", model("smpl"), shown["smpl_betas"][person], turned, 0.0)
+        assert_drawn(scene, person, 0, wanted + points[person, 0] - own[0])
+    (view,) = open_results(Source.open(path)).views
+    focal = 443.4 / 512.0 * width
+    camera = [[focal, 0.0, width / 2.0], [0.0, focal, height / 2.0], [0.0, 0.0, 1.0]]
+    assert_allclose(view.intrinsic, camera, rtol=0, atol=0.01)  # pixels; single precision
+    assert view.size == (1280, 720)
+
+
+def test_weak_perspective_of_romp_is_not_a_camera(tmp_path: Path) -> None:
+    shown = image(2, 1.0)
+    joints = aligned(shown)
+    cam = np.array([[0.5, 0.1, 0.2], [0.3, -0.2, 0.1]])
+    shown["cam_trans"] = single(2.0 * np.c_[cam[:, 1:], np.ones(2)] / cam[:, :1])
+    pixels = (cam[:, None, :1] * joints[..., :2] + cam[:, None, 1:] + 1.0) * 640.0 - [0.0, 280.0]
+    path = written(tmp_path, shown | {"joints": single(joints), "pj2d_org": single(pixels)})
+    assert not open_results(Source.open(path)).views
+
+
+def test_rows_of_the_same_person_and_image_are_reported(tmp_path: Path) -> None:
+    path = written(tmp_path, {"1.jpg": image(3, 0.0, track_ids=np.array([4, 4, 5]))})
+    source = Source.open(path)
+    found = next(iter(open_results(source).parts())).bodies
+    assert sorted(found) == [4, 5]
+    notes = [note for note in source.diagnostics.warnings if note.key == "F007.video-same-frame"]
+    assert [note.values for note in notes] == [{"n": 1}]
+
+
 def test_tracked_people_keep_their_ids_and_gaps(tmp_path: Path) -> None:
     tracks = {"00000002.jpg": [7], "00000003.jpg": [4, 7], "00000005.jpg": [7]}
     results = {

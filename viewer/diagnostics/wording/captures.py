@@ -93,6 +93,7 @@ MESSAGES = {
     "treated as present in every frame",
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
     "their order",
+    "F007.video-same-frame": "{n:#row} ignored: the person is in an earlier row of the same frame",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
     "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "

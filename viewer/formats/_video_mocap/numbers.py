@@ -6,16 +6,19 @@ import re
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from viewer.formats._archive.checking import finite
 from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._reach import FARTHEST, is_beyond
-from viewer.rig.arrays import Bools, Deferred, Floats
+from viewer.formats._source import Source
+from viewer.rig.arrays import Bools, Deferred, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
 __all__ = [
     "Frames",
     "RowBudget",
+    "first_rows",
     "frames_of",
     "has",
     "intrinsics_of",
@@ -120,6 +123,15 @@ def frames_of(archive: Archive, key: str, count: int) -> Frames:
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
         raise archive.fault("F002.video-frame-numbers", item=key)
     return found.astype(np.int64)
+
+
+def first_rows(source: Source, frames: ArrayLike) -> tuple[Frames, Ints]:
+    """Return different frames in order, and the first row of each; warn if others are ignored."""
+    numbers = np.asarray(frames, dtype=np.int64)
+    found, first = np.unique(numbers, return_index=True)
+    if len(found) < len(numbers):
+        source.warn("F007.video-same-frame", n=len(numbers) - len(found))
+    return found, first.astype(np.int32)
 
 
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:

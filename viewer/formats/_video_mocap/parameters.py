@@ -29,6 +29,7 @@ from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     Frames,
     RowBudget,
+    first_rows,
     frames_of,
     person_number,
     places,
@@ -264,12 +265,12 @@ def _people_of_arrays(
             most = max(most, 0 if layout.person else len(numbers))
             for number in numbers.tolist():
                 own = number if number not in people else _unused(people, index)
-                people[own] = _rows_of(track, np.flatnonzero(persons == number))
+                people[own] = _rows_of(source, track, np.flatnonzero(persons == number))
             continue
         known = (person_number(part) for part in path)
         number = next((each for each in known if each is not None and each >= 0), index)
         people[number if number not in people else _unused(people, index)] = _rows_of(
-            track, np.arange(len(persons))
+            source, track, np.arange(len(persons))
         )
     if most > 1:
         source.warn("F007.video-repeated", n=most)
@@ -287,9 +288,9 @@ def _persons(archive: Archive, layout: _Layout, frames: Frames) -> Frames:
     return persons
 
 
-def _rows_of(track: Track, chosen: Frames) -> Track:
-    """Return rows of a track in the order of their frames; only the first of a frame is kept."""
-    frames, first = np.unique(track.frames[chosen], return_index=True)
+def _rows_of(source: Source, track: Track, chosen: Frames) -> Track:
+    """Return rows of a track in the order of their frames; warn if a frame occurs again."""
+    frames, first = first_rows(source, track.frames[chosen])
     kept = chosen[first]
     shape, count = track.shape, len(track.frames)
     if track.vectors is None or track.translations is None:

@@ -25,6 +25,7 @@ from viewer.formats._archive.values import Archive, Value
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     RowBudget,
+    first_rows,
     intrinsics_of,
     sole,
     vectors_of,
@@ -127,12 +128,12 @@ def _whole_numbers(frame: Archive, key: str) -> list[int]:
 
 
 def _track(archive: Archive, rows: list[tuple[int, Floats]]) -> Track:
-    frames, first = np.unique([frame for frame, _ in rows], return_index=True)
+    frames, first = first_rows(archive.source, [frame for frame, _ in rows])
     stacked = np.array([row for _, row in rows])[first]
     numbers = finite(archive, "smpl or camera", stacked, "frames")
     turned = numbers[:, :216].reshape(-1, _N_JOINTS, 3, 3)
     return Track(
-        frames.astype(np.int64),
+        frames,
         FAMILY[24].names,
         vectors_of(archive, "smpl", turned),
         within_reach(archive, "camera", numbers[:, 226:229]),

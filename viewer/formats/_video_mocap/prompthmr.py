@@ -19,6 +19,7 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     RowBudget,
+    first_rows,
     frames_of,
     has,
     intrinsics_of,
@@ -77,7 +78,7 @@ def _track(person: Archive, body: Archive) -> Track:
         vectors = matrices(body, "rotmat", (count, 55, 3, 3))
     else:
         vectors = rows(body, "pose", (count, 165)).reshape(count, 55, 3)
-    frames, first = np.unique(frames_of(person, "frames", count), return_index=True)
+    frames, first = first_rows(person.source, frames_of(person, "frames", count))
     shape = rows(body, "shape", (count, None))[first] if body.has("shape") else None
     return Track(
         frames, FAMILY[55].names, vectors[first], places(body, "trans", count)[first], shape

@@ -62,6 +62,8 @@ class Track:
         Captured points, instead of a body.
     rig : tuple of (N, P), (N, S), (N, E), (N, 3), or None
         Model parameters, identity, expression and position of the Momentum Human Rig.
+    places_root : bool
+        As for ``BodyMotion``.
     """
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
@@ -74,6 +76,7 @@ class Track:
     layout: PointLayout | None = None
     points: Floats | None = None
     rig: tuple[Floats, Floats, Floats, Floats] | None = None
+    places_root: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -252,6 +255,7 @@ class _Capture:
             track.joint_names,
             np.zeros((0, 0, 3)) if track.vectors is None else track.vectors,
             np.zeros((0, 3)) if track.translations is None else track.translations,
+            places_root=track.places_root,
             shape=shape,
             hands=track.hands,
             world_rotations=track.world_rotations,

@@ -4,11 +4,15 @@
 
     results           dict in an array of objects: the people of an image, or by the name of each
                       image of a video: smpl_thetas (P, 72)  smpl_betas (P, 10)  cam_trans (P, 3)
-                      track_ids (P,), if people were tracked; cam, verts, joints … are not read
+                      joints (P, J, 3)  pj2d_org (P, J, 2), in pixels of the image
+                      track_ids (P,), if people were tracked; cam, verts … are not read
     sequence_results  the same by track, which is not read
 
-SMPL in the space of the camera. BEV has an eleventh shape coefficient, the fraction of SMIL's
-infant, which SMPL does not have. Images are numbered by their names, otherwise by their order.
+SMPL in the space of the camera: ``joints`` + ``cam_trans``. The joints of BEV are relative to the
+middle of the hips. BEV projects them with a field of view of 60 degrees of the longer side of the
+image, ROMP with a weak perspective of each person, so only BEV's files determine a camera. BEV has
+an eleventh shape coefficient, the fraction of SMIL's infant, which SMPL does not have. Images are
+numbered by their names, otherwise by their order.
 """
 
 from __future__ import annotations
@@ -22,21 +26,28 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     RowBudget,
+    first_rows,
     frames_of,
     has,
+    intrinsics_of,
     places,
     rows,
     shape_of,
+    within_reach,
 )
-from viewer.formats._video_mocap.results import Results, Track
+from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Floats
 from viewer.rig.smpl_family import FAMILY
 
 __all__ = ["read", "recognises"]
 
 _RESULTS, _POSES, _PLACES, _SHAPES = "results", "smpl_thetas", "cam_trans", "smpl_betas"
-_TRACKS = "track_ids"
-_N_SHAPES = 10
+_TRACKS, _JOINTS, _PIXELS = "track_ids", "joints", "pj2d_org"
+_FOCAL = 443.4 / 512.0  # focal length of BEV, as a fraction of the longer side of the image
+_EXACT = 2e-3  # maximum error of projected joints and focal lengths, as a fraction of that side
+_MOST_IMAGES = 64  # number of images of which the joints determine the camera
+_N_SHAPES, _N_JOINTS = 10, 24
+_NEAREST = 0.01  # minimum distance of a joint in front of the camera, metres
 _NUMBER = re.compile(r"(\d{1,9})\.\w+")
 
 
@@ -57,8 +68,9 @@ def read(source: Source, archive: Archive) -> Results:
         budget.spend(sum(shape_of(image, _POSES)[:1]))
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     is_tracked, has_infants, most = True, False, 1
+    has_joints = all(_joints(image) is not None for image in images.values())
     for number, image in images.items():
-        table = _table(image)
+        table = _table(image, has_joints)
         persons = np.arange(len(table))
         if image.has(_TRACKS):
             persons = frames_of(image, _TRACKS, len(table))
@@ -69,9 +81,58 @@ def read(source: Source, archive: Archive) -> Results:
             found[person].append((number, row))
     if not is_tracked and most > 1 and len(images) > 1:
         source.warn("F007.video-repeated", n=most)
-    people = {person: _track(listed) for person, listed in sorted(found.items())}
+    people = {
+        person: _track(source, listed, has_joints) for person, listed in sorted(found.items())
+    }
     facts = (("not applied", "BEV's fraction of the infant shape"),) if has_infants else ()
-    return Results("ROMP, BEV", "SMPL", {"camera": people}, {"camera": "-y"}, facts=facts)
+    camera = _camera([*images.values()])
+    cameras = {} if camera is None else {"camera": camera}
+    return Results("ROMP, BEV", "SMPL", {"camera": people}, {"camera": "-y"}, cameras, facts=facts)
+
+
+def _camera(images: list[Archive]) -> Cameras | None:
+    """Return BEV's camera, found from the projections of the joints; None for other projections.
+
+    Least squares for f and c in u = f x / z + c, where c is the centre of the image.
+    """
+    parts = [_projected(image) for image in images[:: -(-len(images) // _MOST_IMAGES) or 1]]
+    found = [part for part in parts if part is not None and len(part)]
+    if not found:
+        return None
+    points = np.concatenate(found)  # x / z, y / z, u, v
+    table = np.zeros((len(points), 2, 3))
+    table[:, :, 0] = points[:, :2]
+    table[:, 0, 1] = table[:, 1, 2] = 1.0
+    pixels = points[:, 2:].reshape(-1)
+    solution = np.linalg.lstsq(table.reshape(-1, 3), pixels)[0]
+    errors = np.abs(table.reshape(-1, 3) @ solution - pixels)
+    side = 2.0 * float(solution[1:].max())
+    if max(errors.max(), abs(solution[0] - _FOCAL * side)) > _EXACT * side:
+        return None
+    center = solution[1:].astype(np.float64)
+    size = round(2.0 * float(center[0])), round(2.0 * float(center[1]))
+    matrix, still = intrinsics_of(float(solution[0]), center), (np.eye(3)[None], np.zeros((1, 3)))
+    return Cameras(np.zeros(1, np.int64), matrix, *still, size)
+
+
+def _projected(image: Archive) -> Floats | None:
+    """Return directions and pixels of the joints in front of the camera: (N, 4)."""
+    joints, count = _joints(image), sum(shape_of(image, _POSES)[:1])
+    if joints is None or shape_of(image, _PIXELS) != (*joints.shape[:2], 2):
+        return None
+    points = (joints + places(image, _PLACES, count)[:, None]).reshape(-1, 3)
+    pixels = rows(image, _PIXELS, (*joints.shape[:2], 2)).reshape(-1, 2)
+    is_ahead = points[:, 2] > _NEAREST
+    return np.concatenate([points[:, :2] / points[:, 2:], pixels], axis=1)[is_ahead]
+
+
+def _joints(image: Archive) -> Floats | None:
+    """Return the joints of the people in an image relative to ``cam_trans``: (P, J, 3)."""
+    shape = shape_of(image, _JOINTS)
+    count = sum(shape_of(image, _POSES)[:1])
+    if len(shape) != 3 or shape[0] != count or shape[1] < _N_JOINTS or shape[2] != 3:
+        return None
+    return rows(image, _JOINTS, shape)
 
 
 def _images(whole: Archive) -> dict[int, Archive]:
@@ -91,24 +152,31 @@ def _images(whole: Archive) -> dict[int, Archive]:
     }
 
 
-def _table(image: Archive) -> Floats:
-    """Return poses, translations and shape coefficients of the people in an image: (P, 85)."""
+def _table(image: Archive, has_joints: bool) -> Floats:
+    """Return poses, places and shape coefficients of the people in an image: (P, 85).
+
+    Places are the positions of the pelvis if the file has joints, otherwise translations.
+    """
     poses = rows(image, _POSES, (None, 72))
     count = len(poses)
     shape = np.zeros((count, _N_SHAPES))
     if image.has(_SHAPES):
         given = rows(image, _SHAPES, (count, None))[:, :_N_SHAPES]
         shape[:, : given.shape[1]] = given
-    return np.concatenate([poses, places(image, _PLACES, count), shape], axis=1)
+    placed, joints = places(image, _PLACES, count), _joints(image)
+    if has_joints and joints is not None:
+        placed = within_reach(image, _JOINTS, placed + joints[:, 0])
+    return np.concatenate([poses, placed, shape], axis=1)
 
 
-def _track(listed: list[tuple[int, Floats]]) -> Track:
-    frames, first = np.unique([number for number, _ in listed], return_index=True)
+def _track(source: Source, listed: list[tuple[int, Floats]], has_joints: bool) -> Track:
+    frames, first = first_rows(source, [number for number, _ in listed])
     numbers = np.array([row for _, row in listed])[first]
     return Track(
-        frames.astype(np.int64),
+        frames,
         FAMILY[24].names,
         numbers[:, :72].reshape(-1, 24, 3),
         numbers[:, 72:75],
         numbers[:, 75:],
+        places_root=has_joints,
     )

@@ -30,6 +30,7 @@ from viewer.formats._source import Source
 from viewer.formats._video_mocap.mhr_points import ORIGIN, point_layout
 from viewer.formats._video_mocap.numbers import (
     RowBudget,
+    first_rows,
     intrinsics_of,
     rows,
     shape_of,
@@ -229,7 +230,7 @@ def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
         if camera is not None:
             cameras.setdefault(frame, camera)
     layout = point_layout(*(sizes or (0, 0, 0)))
-    people = {person: _track(rows, layout) for person, rows in sorted(placed.items())}
+    people = {person: _track(source, rows, layout) for person, rows in sorted(placed.items())}
     thinned = Diagnostic(
         "F007.video-vertices", source.path, values={"n": sum(sizes[-1:]), "all": most}
     )
@@ -253,15 +254,15 @@ class _Row(NamedTuple):
     parameters: tuple[Floats, ...]
 
 
-def _track(rows: list[_Row], layout: PointLayout) -> Track:
-    frames, first = np.unique([row.frame for row in rows], return_index=True)
+def _track(source: Source, rows: list[_Row], layout: PointLayout) -> Track:
+    frames, first = first_rows(source, [row.frame for row in rows])
     kept = [rows[row] for row in first.tolist()]
     places = np.array([row.points for row in kept])
     points = np.concatenate([places, np.ones((*places.shape[:2], 1))], axis=2)
     if ORIGIN in layout.names:  # origin of the rig, which is not a point of the body
         points[:, layout.names.index(ORIGIN)] = 0.0
     return Track(
-        frames.astype(np.int64),
+        frames,
         layout=layout,
         points=points,
         rig=_rig(kept),

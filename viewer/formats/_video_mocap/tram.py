@@ -21,6 +21,7 @@ from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
+    first_rows,
     frames_of,
     has,
     intrinsics_of,
@@ -112,7 +113,7 @@ def _track(archive: Archive) -> Track:
     else:
         found = rows(archive, "pred_pose", (count, 144)).reshape(count, 24, 6)
         vectors = six(archive, "pred_pose", found)
-    frames, first = np.unique(frames_of(archive, "frame", count), return_index=True)
+    frames, first = first_rows(archive.source, frames_of(archive, "frame", count))
     return Track(
         frames,
         FAMILY[24].names,

@@ -12,12 +12,11 @@ diagonal of the video, whose size is not in the file.
 
 from __future__ import annotations
 
-import numpy as np
-
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     RowBudget,
+    first_rows,
     frames_of,
     has,
     person_number,
@@ -72,7 +71,7 @@ def _number(archive: Archive, key: str) -> int:
 def _track(person: Archive, poses: str, translations: str) -> Track:
     vectors = rows(person, poses, (None, 72))
     count = len(vectors)
-    frames, first = np.unique(frames_of(person, "frame_ids", count), return_index=True)
+    frames, first = first_rows(person.source, frames_of(person, "frame_ids", count))
     shape = rows(person, "betas", (count, None))[first] if person.has("betas") else None
     return Track(
         frames,

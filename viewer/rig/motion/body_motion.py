@@ -54,6 +54,9 @@ class BodyMotion:
     world_rotations : (N, 3) or None
         Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
         have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
+    places_root : bool
+        Whether ``translations`` are the positions of the root joint, V = R (X - J0) + T; requires
+        ``about_origin`` to be False and no ``world_rotations``.
     """
 
     name: str
@@ -69,6 +72,7 @@ class BodyMotion:
     up: str = ""
     facts: tuple[tuple[str, str], ...] = ()
     world_rotations: Floats | None = None
+    places_root: bool = False
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...]) -> None:
@@ -132,14 +136,16 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     weights, more = _weights(motion, figure)
     # One joint at a time, because long motions fill much of the memory.
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (motion.n_rows, skeleton.n_joints, 1))
-    for joint, rows in vectors.items():
-        rotations[:, joint] = rotation_vector_to_quaternion(rows)
+    for row, turned in vectors.items():
+        rotations[:, row] = rotation_vector_to_quaternion(turned)
     translations, origin_rotations = motion.translations, None
     if motion.world_rotations is not None:
         origin_rotations = rotation_vector_to_quaternion(motion.world_rotations)
         rotations[:, 0] = multiply(origin_rotations, rotations[:, 0])
     elif motion.about_origin:
         origin_rotations = rotations[:, 0]
+    elif motion.places_root:
+        translations = translations - root_positions(figure, weights)
     if origin_rotations is not None:
         # t = T - J0 + R J0: skinning rotates about the rest root J0, the file rotates about the
         # origin.
@@ -173,9 +179,7 @@ def rest_roots(figure: Figure, shape: Floats | None) -> Floats:
     return root_positions(figure, weights)
 
 
-def _put_hands(
-    motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]
-) -> list[Diagnostic]:
+def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -> list[Diagnostic]:
     """Add the fingers' rotation vectors by joint; return messages about omitted data."""
     notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
