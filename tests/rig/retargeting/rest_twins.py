@@ -61,7 +61,7 @@ def truth(starts_in_t_pose: bool) -> tuple[np.ndarray, np.ndarray]:
 
 def dance() -> tuple[np.ndarray, np.ndarray]:
     """Return rotations and the path of a dancer whose mean pose is far from any rest pose: the head
-    is lowered and turned, the back bent, the forearms twisted and the hands bent.
+    is lowered and turned, the back bent, the elbows' axes are tilted and the hands bent.
     """
     rng = np.random.default_rng(2)
     phase = np.linspace(0.0, 2.0 * np.pi, N_FRAMES, endpoint=False)
@@ -77,7 +77,9 @@ def dance() -> tuple[np.ndarray, np.ndarray]:
     for side, sign in (("Left", 1.0), ("Right", -1.0)):
         beat = 0.4 * np.sin(phase)[:, None]
         vectors[:, NAMES.index(f"{side}Leg")] = (0.6 + sign * beat) * X
-        vectors[:, NAMES.index(f"{side}ForeArm")] = -sign * (0.9 + sign * beat) * Y
+        # The elbows bend about an axis 0.5 radians away from that of a T-pose.
+        elbow = -sign * (np.cos(0.5) * Y + np.sin(0.5) * Z)
+        vectors[:, NAMES.index(f"{side}ForeArm")] = (0.9 + sign * beat) * elbow
         vectors[:, NAMES.index(f"{side}ToeBase")] = 0.0
         add(f"{side}UpLeg", -0.4 * X)
         add(f"{side}Arm", -sign * 0.9 * Z)
