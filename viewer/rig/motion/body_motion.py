@@ -173,9 +173,7 @@ def rest_roots(figure: Figure, shape: Floats | None) -> Floats:
     return root_positions(figure, weights)
 
 
-def _put_hands(
-    motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]
-) -> list[Diagnostic]:
+def _put_hands(motion: BodyMotion, figure: Figure, vectors: dict[int, Floats]) -> list[Diagnostic]:
     """Add the fingers' rotation vectors by joint; return messages about omitted data."""
     notes: list[Diagnostic] = []
     for side, coefficients in motion.hands.items():
