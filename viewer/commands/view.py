@@ -33,6 +33,7 @@ from viewer.formats import free_path, opened_text
 from viewer.phrases import printable
 from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box
@@ -138,6 +139,7 @@ def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
     print_warnings(warn_of_missing(scene, options))
+    prepare_scene(scene)
     points = scene_points(scene, options.show)
     return _Start(scene, builders, points, camera_of(arguments, scene, points, SIZE))
 

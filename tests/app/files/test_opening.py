@@ -14,6 +14,7 @@ from viewer.app.files.state import Files
 from viewer.errors import RenderError
 from viewer.loading import load, read_files
 from viewer.progress import report
+from viewer.rendering.gpu.index_sets import curve_order
 
 
 def _open(hand, *paths):
@@ -135,6 +136,19 @@ def test_warnings_of_a_file_are_shown(hand, tmp_path):
     assert warnings
     _open(hand, odd)
     assert [note.text for note in hand.state.messages.notes][-len(warnings) :] == list(warnings)
+
+
+def test_triangles_are_sorted_by_the_thread_that_reads_the_file(hand, tmp_path, monkeypatch):
+    threads = []
+
+    def noted(*given):
+        threads.append(threading.current_thread() is threading.main_thread())
+        return curve_order(*given)
+
+    for module in ("index_sets", "mesh_buffers"):
+        monkeypatch.setattr(f"viewer.rendering.gpu.{module}.curve_order", noted)
+    hand.open(*write_rig(tmp_path, "other"))
+    assert hand.state.actor.figure.name == "other" and threads == [False]
 
 
 def test_slow_reading_can_be_cancelled(hand, rig, monkeypatch):

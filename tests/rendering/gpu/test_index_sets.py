@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from rendering.drawn_figures import sphere
 
-from viewer.rendering.gpu.index_sets import curve_places, index_set
+from viewer.rendering.gpu.index_sets import curve_order, curve_places, index_set
 from viewer.rendering.gpu.surfaces import PLAIN
 
 
@@ -22,7 +22,9 @@ def shaded(triangles, kept=32) -> int:
 
 
 def drawn(ctx, triangles, materials, positions):
-    made = index_set(ctx, triangles, materials, [PLAIN, PLAIN], positions)
+    parts = np.full(len(triangles), -1)
+    order = None if positions is None else curve_order(triangles, materials, parts, positions)
+    made = index_set(ctx, triangles, materials, [PLAIN, PLAIN], order)
     indices = np.frombuffer(made.indices.read(), dtype="u4").reshape(-1, 3)
     made.indices.release()
     return made, indices
@@ -67,7 +69,8 @@ def test_order_is_unchanged_without_positions(ctx):
 def test_small_numbers_of_triangles_are_sorted(ctx, count):
     points = np.zeros((3, 3))
     triangles = np.array([[0, 1, 2]], dtype=np.int32)[:count]
-    made, _ = index_set(ctx, triangles, np.zeros(count), [PLAIN], points), None
+    order = curve_order(triangles, np.zeros(count), np.zeros(count), points)
+    made = index_set(ctx, triangles, np.zeros(count), [PLAIN], order)
     assert made.spans == ((0, 3 * count),) and len(made.order) == count
     made.indices.release()
 

@@ -94,9 +94,12 @@ def _covered_height(state: AppState, points: Floats) -> float:
         return 0.0
     x, y, width, height = state.view_rect
     matrix = state.camera.projection_matrix(state.aspect, state.box) @ state.camera.view_matrix()
-    clip = points @ matrix[:, :3].T + matrix[:, 3]
-    across = x + 0.5 * width * (1.0 + clip[:, 0] / clip[:, 3])
-    down = y + 0.5 * height * (1.0 - clip[:, 1] / clip[:, 3])
     row = imgui.get_frame_height() + 2.0 * imgui.get_style().window_padding.y
-    is_covered = (across > tools[0] - _GAP) & (down < tools[1] + row + _GAP)
-    return tools[1] + row + _GAP - y if is_covered.any() else 0.0
+    lower = tools[1] + row + _GAP
+    # Only few of what may be millions of points are high enough.
+    depth = points @ matrix[3, :3] + matrix[3, 3]
+    down = y + 0.5 * height * (1.0 - (points @ matrix[1, :3] + matrix[1, 3]) / depth)
+    is_high = down < lower
+    across = (points[is_high] @ matrix[0, :3] + matrix[0, 3]) / depth[is_high]
+    is_covered = x + 0.5 * width * (1.0 + across) > tools[0] - _GAP
+    return lower - y if is_covered.any() else 0.0

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from viewer.errors import ViewerError
 from viewer.loading import Contents, MotionSettings, begin, read_files
 from viewer.progress import Cancelled, receiving
+from viewer.rendering.gpu.index_sets import prepare_scene
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
@@ -88,6 +89,8 @@ class Loader:
         for paths in self._attempts:
             try:
                 self._read_one(paths)
+                if self.scene is not None:
+                    prepare_scene(self.scene)
                 self.error = ""
                 break
             except ViewerError as problem:

@@ -15,15 +15,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
+from viewer.progress import report
 from viewer.rendering.gpu.surfaces import PLAIN, Surface
 from viewer.rendering.gpu.upload import buffer
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import bounding_box
+from viewer.rig.memo import Memo
+from viewer.rig.mesh import bounding_box, split_seams
+from viewer.rig.scene import Scene
 
-__all__ = ["IndexSet", "MeshRun", "curve_places", "index_set", "kept_triangles"]
+__all__ = [
+    "IndexSet",
+    "MeshRun",
+    "curve_order",
+    "curve_places",
+    "index_set",
+    "kept_triangles",
+    "prepare_scene",
+    "split_vertices",
+    "triangle_order",
+]
 
 _CURVE_BITS = 10  # bits per axis
+_split: Memo[Figure, tuple[Ints, Ints, Ints]] = Memo()
+_orders: Memo[Figure, Ints] = Memo()
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,10 +111,10 @@ def index_set(
     triangles: Ints,
     materials: Ints,
     surfaces: list[Surface],
-    positions: Floats | None = None,
+    order: Ints | None = None,
     parts: Ints | None = None,
 ) -> IndexSet:
-    """Upload triangles, sorted along a space-filling curve within each run.
+    """Upload triangles.
 
     Parameters
     ----------
@@ -111,8 +126,8 @@ def index_set(
         Index into ``surfaces`` of each triangle, -1 for none.
     surfaces : list of Surface
         Surface of each material.
-    positions : (R, 3), optional
-        Rest positions of the split vertices; without them triangles keep their order.
+    order : (T,) int32, optional
+        Order of the triangles, see ``curve_order``; that of the file if omitted.
     parts : (T,), optional
         Part of each triangle, -1 for none.
 
@@ -122,25 +137,51 @@ def index_set(
         Contains a run for each material of each part, in the order of the file.
     """
     parts = np.full(len(triangles), -1, dtype=np.int32) if parts is None else parts
-    edges = np.flatnonzero((np.diff(materials) != 0) | (np.diff(parts) != 0)) + 1
+    edges = _edges(materials, parts)
     runs = []
     for first, last in zip([0, *edges], [*edges, len(materials)], strict=True):
         index = int(materials[first]) if len(materials) else -1
         surface = PLAIN if index < 0 else surfaces[index]
         part = int(parts[first]) if len(parts) else -1
         runs.append(MeshRun(3 * int(first), 3 * int(last - first), surface, part))
-    order: Ints = np.arange(len(triangles), dtype=np.int32)
-    if positions is not None and len(triangles):
-        run = np.zeros(len(triangles), dtype=np.int64)
-        run[edges] = 1
-        # The sum of the corners is three times the centre; a mean over an axis takes longer.
-        one, two, three = triangles.T
-        centers = positions.take(one, axis=0) + positions.take(two, axis=0)
-        centers += positions.take(three, axis=0)
-        places = curve_places(centers)
-        along = (np.cumsum(run) << 3 * _CURVE_BITS) + places
-        order = np.argsort(along, kind="stable").astype(np.int32)
+    if order is None:
+        order = np.arange(len(triangles), dtype=np.int32)
     return IndexSet(buffer(context, triangles[order], "u4"), tuple(runs), order)
+
+
+def _edges(materials: Ints, parts: Ints) -> Ints:
+    """Return the first triangle of each run except the first."""
+    is_first = (np.diff(materials) != 0) | (np.diff(parts) != 0)
+    return (np.flatnonzero(is_first) + 1).astype(np.int32)
+
+
+def curve_order(triangles: Ints, materials: Ints, parts: Ints, positions: Floats) -> Ints:
+    """Return the order of triangles along a space-filling curve within each run.
+
+    Parameters
+    ----------
+    triangles : (T, 3)
+        Indices of vertices.
+    materials, parts : (T,)
+        Material and part of each triangle, -1 for none.
+    positions : (R, 3)
+        Rest positions of the vertices.
+
+    Returns
+    -------
+    (T,) int32
+        Index of the triangle at each position.
+    """
+    if not len(triangles):
+        return np.zeros(0, dtype=np.int32)
+    run = np.zeros(len(triangles), dtype=np.int64)
+    run[_edges(materials, parts)] = 1
+    # The sum of the corners is three times the centre; a mean over an axis takes longer.
+    one, two, three = triangles.T
+    centers = positions.take(one, axis=0) + positions.take(two, axis=0)
+    centers += positions.take(three, axis=0)
+    along = (np.cumsum(run) << 3 * _CURVE_BITS) + curve_places(centers)
+    return np.argsort(along, kind="stable").astype(np.int32)
 
 
 def curve_places(points: Floats) -> NDArray[np.int64]:
@@ -184,3 +225,31 @@ def kept_triangles(figure: Figure, hidden: tuple[int, ...], triangles: Ints) -> 
         return np.ones(len(triangles), dtype=bool)
     is_shown: Bools = ~np.isin(figure.body_parts.of_vertex, hidden)
     return np.any(is_shown[triangles], axis=1)
+
+
+def prepare_scene(scene: Scene) -> None:
+    """Compute the order of triangles in advance, in the thread that reads files.
+
+    For millions of triangles, this takes longer than the upload and would block the window.
+    """
+    for figure in dict.fromkeys(actor.figure for actor in scene.actors):
+        if figure.mesh is not None:
+            report(0, 0, "")
+            triangle_order(figure)
+
+
+def split_vertices(figure: Figure) -> tuple[Ints, Ints, Ints]:
+    """Return ``split_seams`` of a figure's mesh."""
+    return _split.get(figure, (), lambda: split_seams(figure.require_mesh()))
+
+
+def triangle_order(figure: Figure) -> Ints:
+    """Return the order in which all triangles of a figure are uploaded: (T,) int32."""
+
+    def order() -> Ints:
+        mesh = figure.require_mesh()
+        sources, _, triangles = split_vertices(figure)
+        rest = mesh.positions[sources]
+        return curve_order(triangles, mesh.material_indices, mesh.part_indices, rest)
+
+    return _orders.get(figure, (), order)

@@ -9,7 +9,14 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from viewer.rendering.gpu.index_sets import IndexSet, index_set, kept_triangles
+from viewer.rendering.gpu.index_sets import (
+    IndexSet,
+    curve_order,
+    index_set,
+    kept_triangles,
+    split_vertices,
+    triangle_order,
+)
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
@@ -19,7 +26,7 @@ from viewer.rig.blendshapes import active_rows
 from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell, shell_of
-from viewer.rig.mesh import Mesh, bounding_box, split_seams, visible_vertices
+from viewer.rig.mesh import Mesh, bounding_box, visible_vertices
 from viewer.rig.skinning import Skinning, skin_used
 
 __all__ = ["MeshBuffers"]
@@ -60,7 +67,7 @@ class MeshBuffers:
     def __init__(self, context: moderngl.Context, figure: Figure, notes: list[str]) -> None:
         mesh = figure.require_mesh()
         self.context, self.figure = context, figure
-        self.sources, uv_indices, self.triangles = split_seams(mesh)
+        self.sources, uv_indices, self.triangles = split_vertices(figure)
         self.n_vertices = len(self.sources)
         self.copies: Ints = np.empty(mesh.n_vertices, dtype=np.int32)
         self.copies[self.sources] = np.arange(self.n_vertices)
@@ -137,11 +144,18 @@ class MeshBuffers:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
             parts = mesh.part_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
-        rest = None if as_listed else mesh.positions[self.sources]
-        made = index_set(
-            self.context, split[kept], materials[kept], self.surfaces, rest, parts[kept]
-        )
+        is_whole = split is self.triangles and kept.all()
+        if not kept.all():
+            split, materials, parts = split[kept], materials[kept], parts[kept]
+        order: Ints | None = None
+        if not as_listed and is_whole:
+            order = triangle_order(self.figure)
+        elif not as_listed:
+            order = curve_order(split, materials, parts, mesh.positions[self.sources])
+        made = index_set(self.context, split, materials, self.surfaces, order, parts)
         self._owner.keep(made.indices)
+        if kept.all():
+            return made
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
     def skin(self, skinning: Skinning) -> SkinBuffers:
