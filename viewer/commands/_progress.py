@@ -31,12 +31,18 @@ class Progress:
         self._due = time.monotonic() + _FIRST
         self._bar: Bar | None = None
 
+    def begin(self) -> None:
+        """Show the bar at once: the first step may take long."""
+        if sys.stderr.isatty():
+            self._draw(0)
+
     def show(self, done: int) -> None:
         """Update the bar to a number of completed steps."""
-        now = time.monotonic()
-        if now < self._due or not sys.stderr.isatty() or done <= 0:
-            return
-        self._due = now + _EVERY
+        if time.monotonic() >= self._due and sys.stderr.isatty() and done > 0:
+            self._draw(done)
+
+    def _draw(self, done: int) -> None:
+        self._due = time.monotonic() + _EVERY
         title = printable(self.title, 60)
         if self._bar is None:
             self._bar = _bar()

@@ -22,7 +22,9 @@ from tests.batching.engines.cluster_jobs import (
     write_elsewhere,
 )
 from viewer.batching.engines import Limits
+from viewer.batching.engines._remote import Reply
 from viewer.batching.engines._task_size import LONGEST
+from viewer.batching.items import Result
 from viewer.errors import ViewerError
 from viewer.media.unfinished import temporary_prefix
 from viewer.version import VERSION
@@ -214,6 +216,13 @@ def test_workers_that_do_not_share_files_are_reported(address, tmp_path, monkeyp
     assert {one.status for one in finished(read_nothing, some, limits).values()} == {"failed"}
     finished(write_elsewhere, some[:1], limits)
     assert len(notes) == 1 and f"wrote {some[0].output}, which does not exist" in notes[0]
+    checks = _worker_checks.WorkerChecks(notes.append)
+    outputs = [str(tmp_path / name) for name in ("a", "b", "absent/a", "absent/b", "gone/a")]
+    Path(outputs[0]).touch()
+    for path in outputs:
+        # One in each folder is looked for, and one note is given.
+        checks.accepted(Reply("tcp://w", [Result(some[0], "done", outputs=(path,))], 0.0))
+    assert len(notes) == 2 and f"wrote {outputs[2]}, which" in notes[1]
     monkeypatch.setattr(os.path, "lexists", lambda path: True)
     with pytest.raises(ViewerError, match=rf"cannot find {absent}: workers need access"):
         list(dask_cluster.run(some, read_nothing, limits))

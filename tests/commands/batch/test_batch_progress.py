@@ -32,11 +32,11 @@ def shown(monkeypatch, is_terminal, statuses):
     monkeypatch.setenv("COLUMNS", "120")
     monkeypatch.setattr(display, "time", clock)
     monkeypatch.setattr(_progress, "time", clock)
+    if is_terminal:
+        bar = _progress._bar()
+        bar.get_time = clock.monotonic
+        monkeypatch.setattr(_progress, "_bar", lambda: bar)
     with Display("convert", ITEMS, prints=False) as batch:
-        if is_terminal:
-            bar = _progress._bar()
-            bar.get_time = clock.monotonic
-            monkeypatch.setattr(_progress, "_bar", lambda: bar)
         for item, status in zip(ITEMS, statuses, strict=False):
             clock.now += 2.0
             batch.show(Result(item, status))
@@ -49,6 +49,11 @@ def test_bar_shows_rate_failures_and_time_left(monkeypatch) -> None:
     assert " 20/100 0.5/s, 1 failed " in last
     # 80 items at 0.5 per second.
     assert last.rstrip().endswith("0:02:40")
+
+
+def test_bar_is_shown_before_the_first_item_finishes(monkeypatch) -> None:
+    assert "  0/100" in shown(monkeypatch, True, [])
+    assert shown(monkeypatch, False, []) == ""
 
 
 def test_lines_without_a_terminal_have_rate_and_time_left(monkeypatch) -> None:

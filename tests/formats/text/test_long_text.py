@@ -23,6 +23,7 @@ TEXTS = [
     MARK + b"\x1a",
     b"x\nends with a letter\x1a",
     b"ply\r\n\x1a",
+    b"a\n" + b"\x1a" * 5000,
 ]
 
 

@@ -25,7 +25,9 @@ class WorkerChecks:
 
     def __init__(self, note: Callable[[str], None]) -> None:
         self._note = note
-        self._writers: set[str] = set()  # workers whose first output has been checked
+        # Workers and the folders in which an output of theirs has been found; "" for a worker that
+        # wrote one elsewhere, of which one note is enough.
+        self._found: set[tuple[str, str]] = set()
 
     def accepted(self, reply: Reply | OtherVersion | NoFolder) -> Reply:
         """Return the reply of a suitable worker.
@@ -52,18 +54,22 @@ class WorkerChecks:
                 f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
                 "inputs under the same paths"
             )
-        written = next((path for one in reply.results for path in one.outputs), "")
-        if written and reply.worker not in self._writers:
-            self._writers.add(reply.worker)
-            self._check_output(reply.worker, written)
+        for one in reply.results:
+            for path in one.outputs:
+                self._check_output(reply.worker, path)
         return reply
 
     def _check_output(self, worker: str, path: str) -> None:
-        """Note an output of a worker that does not exist on this machine."""
+        """Note that the first output of a worker in a folder does not exist on this machine."""
+        folder = os.path.dirname(path) or "."
+        if not self._found.isdisjoint({(worker, folder), (worker, "")}):
+            return
         with contextlib.suppress(OSError):
             # This updates the cache of a network file system.
-            os.listdir(os.path.dirname(path) or ".")
-        if not os.path.lexists(path):
+            os.listdir(folder)
+        is_found = os.path.lexists(path)
+        self._found.add((worker, folder if is_found else ""))
+        if not is_found:
             self._note(
                 f"the worker {worker} wrote {printable(path, 300)}, which does not exist on this "
                 "machine: write outputs to a folder that all workers share"

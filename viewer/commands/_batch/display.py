@@ -48,8 +48,7 @@ class Display:
         self._n_failed += result.status not in ("done", "unchanged")
         rate = self._rate.at(self._n_done - self._n_unchanged)
         failed = f", {self._n_failed} failed" if self._n_failed else ""
-        # Printed text would break the bar; standard output may be closed.
-        if not (self._order and sys.stdout is not None and sys.stdout.isatty()):
+        if self._has_bar():
             # A new title would start a new bar, which could not estimate the time left.
             self._progress.unit = f"{rate:.3g}/s{failed}"
             self._progress.show(self._n_done)
@@ -67,6 +66,10 @@ class Display:
         self._progress.hide()
         print_warnings([text], plain="note")
 
+    def _has_bar(self) -> bool:
+        # Printed text would break the bar; standard output may be closed.
+        return not (self._order and sys.stdout is not None and sys.stdout.isatty())
+
     def _print(self, result: Result) -> None:
         text = result.text.rstrip("\n")
         name = printable(result.item.name, 300)
@@ -80,6 +83,8 @@ class Display:
                 print(found)
 
     def __enter__(self) -> Display:
+        if self.total > 1 and self._has_bar():
+            self._progress.begin()
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -13,6 +13,7 @@ __all__ = ["LongText", "count_line_ends", "line_parts", "without_marks"]
 
 _LONG = 1 << 24  # bytes; reading shorter files as a whole takes little memory
 _MARKED = 8  # number of bytes with a mark at the start
+_TAIL = 4096  # number of bytes of which each read at the end removes the marks
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _CONTROL_Z = b"\x1a"  # end-of-file character of CP/M and DOS
 # Files with these first bytes are binary and may end with any byte.
@@ -45,8 +46,8 @@ class LongText:
         head = read_part(path, 0, _MARKED)
         if not head.startswith(_ANY_END):
             self._first = len(head) - len(head.removeprefix(_BYTE_ORDER_MARK))
-            while self and self.part(len(self) - 1, len(self)) == _CONTROL_Z:
-                self._end -= 1
+            while (tail := self.part(max(len(self) - _TAIL, 0), len(self))).endswith(_CONTROL_Z):
+                self._end -= len(tail) - len(tail.rstrip(_CONTROL_Z))
 
     @classmethod
     def open(cls, path: Path, max_size: int) -> LongText | None:
