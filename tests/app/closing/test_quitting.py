@@ -247,6 +247,13 @@ def test_edits_of_animations_that_do_not_play_are_saved(drive, tmp_path):
     choose_animation(hand.state, 1)
     hand.step(2)
     assert len(texts_of(hand)) == 1 and texts_of(hand)[0].endswith(": keys of wave")
+    hand.key("q", "ctrl")
+    hand.step(2)
+    hand.click(SAVE)
+    assert hand.state.of(Files).dialog.name.endswith("_edited.glb")  # never the opened file
+    close_dialog(hand)
+    hand.step(2)
+    hand.click(STAY)
     save_motion(hand.state, tmp_path / "a.glb")
     hand.finish_job()
     assert not hand.state.error and texts_of(hand) == []

@@ -41,7 +41,7 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     state : AppState
         Receives the dialog.
     suffix : str
-        Suffix of the suggested name; that of the first format if empty.
+        Suffix of the suggested name of a file with edited keys; that of the first format if empty.
     """
     moving = moving_actors(state)
     asks = len(moving) > 1 or state.actor not in moving
@@ -56,7 +56,7 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
         "save",
         "Export motion",
         suffixes,
-        f"{stem}{suffix or suffixes[0]}",
+        f"{stem}_edited{suffix}" if suffix else f"{stem}{suffixes[0]}",
         more=lambda state, dialog: _draw_more(state, dialog, selection),
         more_rows=N_ROWS + (1.5 if asks else 0.0),
         written=lambda path: motion_files(state, path, selection.everyone),
