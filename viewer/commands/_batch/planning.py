@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import stat
 from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Literal
 
@@ -219,10 +221,14 @@ def _cluster_notes(request: Request) -> list[str]:
 
 
 def _size(items: Sequence[Item]) -> int:
-    """Return the total size of files in bytes; folders count as 0."""
-    return sum(
-        os.path.getsize(file) for item in items for file in item.files if os.path.isfile(file)
-    )
+    """Return the total size of files in bytes; folders, and files that vanished, count as 0."""
+    total = 0
+    for item in items:
+        for file in item.files:
+            with suppress(OSError):
+                found = os.stat(file)
+                total += found.st_size if stat.S_ISREG(found.st_mode) else 0
+    return total
 
 
 def _cores() -> int:
