@@ -148,7 +148,9 @@ noise[..., 3] = 255
 path = Path(sys.argv[1])
 size = write(path)
 path.write_bytes(b"precious")
-for limit in (0, 1000, size // 3, size - 40_000, size - 1000, size - 1):
+# The sizes of two .mp4 files of the same frames may differ by some bytes.
+last = size - (100 if path.suffix == ".mp4" else 1)
+for limit in (0, 1000, size // 3, size - 40_000, size - 1000, last):
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
     write(path)
 """

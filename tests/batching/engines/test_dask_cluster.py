@@ -6,6 +6,7 @@ import itertools
 import os
 import signal
 from collections import Counter
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -35,14 +36,13 @@ from viewer.batching.engines import _worker_checks, dask_cluster
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
 
-@pytest.fixture(scope="module")
-def address(tmp_path_factory):
-    """Start a scheduler with two worker processes; the second declares a GPU."""
+@contextmanager
+def two_workers(folder):
+    """Start a scheduler with two worker processes; the second declares a GPU. Yield its address."""
     from distributed import Nanny, Scheduler, SpecCluster
 
-    folder = str(tmp_path_factory.mktemp("dask"))
     common = {"host": "tcp://127.0.0.1", "nthreads": 1, "memory_limit": None,
-              "local_directory": folder}  # fmt: skip
+              "local_directory": str(folder)}  # fmt: skip
     workers = {
         0: {"cls": Nanny, "options": common},
         1: {"cls": Nanny, "options": common | {"resources": {"GPU": 1}}},
@@ -53,13 +53,18 @@ def address(tmp_path_factory):
         yield cluster.scheduler_address
 
 
-def two_workers(address):
-    """Return an address when its cluster has two workers: an earlier test may have killed one."""
-    from distributed import Client
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    """The address of a scheduler for tests that kill none of its workers."""
+    with two_workers(tmp_path_factory.mktemp("dask")) as found:
+        yield found
 
-    with Client(address) as client:
-        client.wait_for_workers(2, timeout=60)
-    return address
+
+@pytest.fixture
+def mortal(tmp_path_factory):
+    """The address of a scheduler whose workers may be killed: Dask may fail to restart them."""
+    with two_workers(tmp_path_factory.mktemp("dask")) as found:
+        yield found
 
 
 def finished(job, some, limits, on_result=lambda result: None):
@@ -86,7 +91,7 @@ def test_local_cluster_reports_crashes_hangs_and_defects() -> None:
     assert {one.text for one in found.values() if one.status == "done"} <= set("0123")
 
 
-def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path) -> None:
+def test_items_of_a_killed_worker_run_on_another_worker(mortal, tmp_path) -> None:
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(60)]
     first = []
 
@@ -95,7 +100,7 @@ def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path) -> No
             first.append(int((tmp_path / str(result.item.index)).read_text()))
             os.kill(first[0], signal.SIGKILL)
 
-    found = finished(Job(seconds=0.02), some, Limits(2, cluster=address), kill)
+    found = finished(Job(seconds=0.02), some, Limits(2, cluster=mortal), kill)
     assert {one.status for one in found.values()} == {"done"} and first
     runs = [len(path.read_text().split()) for path in tmp_path.iterdir()]
     assert len(runs) == 60
@@ -103,9 +108,9 @@ def test_items_of_a_killed_worker_run_on_another_worker(address, tmp_path) -> No
     assert sum(runs) <= 60 + 2 * dask_cluster._PER_WORKER
 
 
-@pytest.mark.parametrize("where", ["local", "address"])
+@pytest.mark.parametrize("where", ["local", "mortal"])
 def test_worker_killed_within_a_task_of_many_items(where, request, tmp_path) -> None:
-    cluster = "local" if where == "local" else two_workers(request.getfixturevalue("address"))
+    cluster = where if where == "local" else request.getfixturevalue(where)
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(600)]
     Path(some[590].output).touch()
     os.utime(some[590].output, (1e9, 1e9))  # not written by this batch
@@ -158,7 +163,7 @@ def test_two_thousand_files_of_which_some_are_broken(address, tmp_path) -> None:
 
 def test_drawing_runs_on_workers_that_declare_gpus(address, tmp_path) -> None:
     some = [replace(item, output=str(tmp_path / str(item.index))) for item in items(12)]
-    finished(Job(uses_gpu=True), some, Limits(2, cluster=two_workers(address)))
+    finished(Job(uses_gpu=True), some, Limits(2, cluster=address))
     assert len({path.read_text() for path in tmp_path.iterdir()}) == 1
     finished(Job(seconds=0.05), some, Limits(2, cluster=address))
     assert len({path.read_text().split()[1] for path in tmp_path.iterdir()}) == 2
