@@ -14,6 +14,7 @@ from viewer.app.closing.question_window import draw_question
 from viewer.app.closing.questions import advance_closing, may_replace_scene, request_quit
 from viewer.app.closing.state import Closing
 from viewer.app.context.context_menu import answer_right_click, draw_context_menu
+from viewer.app.core.edited_animations import Animations, keep_edited
 from viewer.app.core.fitting import keep_fitting
 from viewer.app.core.job_steps import advance_job
 from viewer.app.core.saved_work import SavedWork
@@ -342,6 +343,7 @@ class Frame:
         except ViewerError as problem:
             state.error = str(problem)
             return
+        keep_edited(state.of(Animations), state.actor, actor)
         state.scene.actors[state.chosen_actor] = actor
         state.scene.files += contents.files
         added = [*contents.poses, *contents.pictures]

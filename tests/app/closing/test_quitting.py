@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import threading
+import weakref
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from app.curves.plotted import _center
 from app.retargeting.driven import driven_scene
+from PIL import Image
 from rig.animated import animated_leg
 
 import viewer
@@ -262,6 +266,43 @@ def test_edits_of_animations_that_do_not_play_are_saved(drive, tmp_path):
     assert found["wave"] == pytest.approx(actor.figure.animations[0].clip().channels[0].times[-1])
     hand.key("q", "ctrl")
     assert is_over(hand)
+
+
+@pytest.fixture
+def aside(drive):
+    """A test driver on a leg with texture coordinates whose first animation was edited."""
+    figure = animated_leg()
+    mesh = replace(figure.mesh, uvs=np.zeros((figure.mesh.n_vertices, 2)))
+    hand = drive(scene=Scene([Actor(replace(figure, mesh=mesh))]), size=(600, 400))
+    choose_animation(hand.state, 0)
+    hand.state.actor.clip = replace(hand.state.actor.clip, end=2.0)
+    hand.step(2)
+    choose_animation(hand.state, 1)
+    hand.step(2)
+    assert len(texts_of(hand)) == 1
+    return hand
+
+
+def test_texture_keeps_the_edits_of_animations_that_do_not_play(aside, tmp_path):
+    old = aside.state.actor
+    Image.new("RGB", (4, 4), (255, 0, 0)).save(tmp_path / "red.png")
+    aside.open(tmp_path / "red.png")
+    assert not aside.state.error and aside.state.actor is not old
+    assert len(texts_of(aside)) == 1
+    undo(aside.state)
+    assert aside.state.actor is old and len(texts_of(aside)) == 1
+    redo(aside.state)
+    choose_animation(aside.state, 0)
+    assert aside.state.actor.clip.end == 2.0
+
+
+def test_edited_animations_do_not_keep_a_replaced_scene(aside, rig):
+    old = weakref.ref(aside.state.actor.figure)
+    aside.open(*rig)
+    aside.click(DISCARD)
+    aside.step(3)
+    gc.collect()
+    assert texts_of(aside) == [] and old() is None
 
 
 def test_joint_match_by_hand_is_unsaved_until_it_is_automatic_again(drive):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from viewer.app.core.edited_animations import edited_aside
+from viewer.app.core.edited_animations import Animations, edited_aside
 from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.curves.clip_actions import ask_for_clip
@@ -55,7 +55,7 @@ def _keys(state: AppState) -> list[Unsaved]:
         if isinstance(clip, Clip | TransformClip) and clip not in saved and not is_read:
             text = f"{name}: keys of {printable(clip.name, _LONGEST)}"
             found.append(Unsaved(text, partial(_ask_for_keys, row=row, index=-1)))
-        for index, aside in edited_aside(state, actor).items():
+        for index, aside in edited_aside(state.of(Animations), actor).items():
             if aside not in saved:
                 text = f"{name}: keys of {printable(aside.name, _LONGEST)}"
                 found.append(Unsaved(text, partial(_ask_for_keys, row=row, index=index)))

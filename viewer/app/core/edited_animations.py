@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import field, replace
 from functools import partial
 
-from viewer.app.core.state import AppState
 from viewer.data_classes import dataclass
 from viewer.rig.figure import Figure
 from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.scene import Actor
 
-__all__ = ["Animations", "edited_aside", "with_edited_keys"]
+__all__ = ["Animations", "edited_aside", "keep_edited", "with_edited_keys"]
 
 
 @dataclass(slots=True)
 class Animations:
-    """Edited keys of animations that are not being played.
+    """Edited keys of animations of the scene that are not being played.
 
     Attributes
     ----------
@@ -28,23 +27,29 @@ class Animations:
     edited: dict[tuple[Actor, int], TransformClip] = field(default_factory=dict)
 
 
-def edited_aside(state: AppState, actor: Actor) -> dict[int, TransformClip]:
+def edited_aside(animations: Animations, actor: Actor) -> dict[int, TransformClip]:
     """Return the edited keys of the animations that an actor does not play now, by index."""
     playing = actor.animation if isinstance(actor.clip, TransformClip) else -1
-    found = state.of(Animations).edited.items()
+    found = animations.edited.items()
     return {index: clip for (owner, index), clip in found if owner is actor and index != playing}
 
 
-def with_edited_keys(state: AppState, actor: Actor) -> Figure:
+def keep_edited(animations: Animations, old: Actor, new: Actor) -> None:
+    """Keep the edited keys of an actor that is replaced in the scene; undo restores the old one."""
+    edited = animations.edited
+    edited |= {(new, index): clip for (owner, index), clip in edited.items() if owner is old}
+
+
+def with_edited_keys(animations: Animations, actor: Actor) -> Figure:
     """Return an actor's figure whose animations have the keys edited before another was played."""
-    aside = edited_aside(state, actor)
+    aside = edited_aside(animations, actor)
     if not aside:
         return actor.figure
-    animations = list(actor.figure.animations)
+    found = list(actor.figure.animations)
     for index, clip in aside.items():
-        old, read = animations[index], partial(_same, clip)
-        animations[index] = Animation(old.name, clip.start, clip.end, read, old.place)
-    return replace(actor.figure, animations=tuple(animations))
+        old, read = found[index], partial(_same, clip)
+        found[index] = Animation(old.name, clip.start, clip.end, read, old.place)
+    return replace(actor.figure, animations=tuple(found))
 
 
 def _same(clip: TransformClip) -> TransformClip:

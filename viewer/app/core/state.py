@@ -11,6 +11,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from viewer.app.core.clock import Clock
+from viewer.app.core.edited_animations import Animations
 from viewer.app.core.framing import Framing
 from viewer.app.core.jobs import Job
 from viewer.app.core.messages import Messages
@@ -182,6 +183,7 @@ class AppState:
         """Go to the start of the scene's motion, with an empty history."""
         self.clock.show(self.scene)
         self.history.start(self.scene, self.options)
+        self.put(Animations())  # those of the previous scene would keep its actors in memory
         self.put(SavedWork()).add_actors(self.scene.actors)
         self.say(*self.scene.diagnostics)
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from viewer.app.core.edited_animations import edited_aside, with_edited_keys
+from viewer.app.core.edited_animations import Animations, edited_aside, with_edited_keys
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
 from viewer.app.core.saved_work import SavedWork
@@ -213,7 +213,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
             continue
         # Edits made during the export must not change the written motion.
         copied = actor.copy()
-        copied.figure = with_edited_keys(state, actor)
+        copied.figure = with_edited_keys(state.of(Animations), actor)
         if actor.springs is not None and isinstance(actor.clip, JointMotion):
             copied.springs = None
             release_springs(copied)
@@ -237,7 +237,7 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
 def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:
     """Return the edited clips of an actor that a file contains."""
     has_all = file.suffix.lower() in _ALL_ANIMATIONS and keeps_keys(state.scene, actor)
-    return (actor.clip, *(edited_aside(state, actor).values() if has_all else ()))
+    return (actor.clip, *(edited_aside(state.of(Animations), actor).values() if has_all else ()))
 
 
 def _write(
