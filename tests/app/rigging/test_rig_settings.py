@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app import rig_scene
+from app.curves.plotted import clip_text
 from app.rig_scene import TRUE
 from app.rigging.rig_panel import SIZE, names, seen, stop
 from app.tiny import write_rig
@@ -279,6 +280,16 @@ def test_mesh_and_template_are_added_in_the_unit_and_up_axis_of_the_scene(drive,
     assert_allclose(posed.placement[:3, :3] @ [0.0, 1.0, 0.0], [0.0, 0.0, 0.1], atol=1e-12)
     points = [actor_points(actor)[:, 0] for actor in hand.state.scene.actors]
     assert points[2].min() > max(points[0].max(), points[1].max())
+
+
+def test_motion_of_an_added_template_is_not_an_edit(rigging, rig, tmp_path):
+    hand = rigging()
+    (tmp_path / "wave.anim").write_text(clip_text())
+    start_reading(hand.state, (*rig, tmp_path / "wave.anim"))
+    hand.finish_job()
+    hand.click("Pose it…")
+    hand.step(2)
+    assert hand.state.actor.clip.name == "wave" and unsaved_edits(hand.state) == []
 
 
 def test_result_is_saved_and_opens_again(rigging, tmp_path):

@@ -8,6 +8,7 @@ import numpy as np
 from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_job_room
+from viewer.app.core.saved_work import SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.core.widgets import (
     button,
@@ -166,6 +167,7 @@ def _add_template(state: AppState) -> None:
     shift = edge - span[0] + (_GAP - 1.0) * (span[1] - span[0])
     actor.placement = translation_matrix(np.array([shift, 0.0, 0.0])) @ actor.placement
     state.scene.actors.append(actor)
+    state.of(SavedWork).add_actors([actor])  # the template was read from files
     state.choose_actor(len(state.scene.actors) - 1)
     choose_template(state, f"actor {id(actor)}")
 
