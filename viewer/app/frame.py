@@ -149,7 +149,6 @@ class Frame:
         self._take_loaded()
         if advance_job(state):
             state.of(Closing).withdraw()  # the user may want to export again
-        advance_closing(state)
         # Edits are recorded before the clock poses the scene, which is not an edit.
         state.history.observe(state.scene, state.options, is_held(state))
         self._take_streamed()
@@ -158,6 +157,7 @@ class Frame:
         follow_actor(state)
         keep_fitting(state, files.stream is not None)
         self.renderer.marks, self.renderer.ghost = show_finding(state), show_rig(state)
+        advance_closing(state)  # after a new rig, which is unsaved, has been put into the scene
         hover_joint(state)
         self._draw_scene(scale)
         if self.target is not None:

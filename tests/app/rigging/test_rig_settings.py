@@ -18,6 +18,8 @@ from numpy.testing import assert_allclose
 
 pytest.importorskip("scipy")
 import viewer
+from viewer.app.closing.questions import request_quit
+from viewer.app.closing.state import Closing
 from viewer.app.closing.unsaved import unsaved_edits
 from viewer.app.files.state import Files
 from viewer.app.rigging.placing import placing_now
@@ -290,6 +292,18 @@ def test_motion_of_an_added_template_is_not_an_edit(rigging, rig, tmp_path):
     hand.click("Pose it…")
     hand.step(2)
     assert hand.state.actor.clip.name == "wave" and unsaved_edits(hand.state) == []
+
+
+def test_window_that_waits_for_a_rig_asks_to_save_it(rigging):
+    hand = rigging()
+    hand.click("Run")
+    request_quit(hand.state)
+    hand.state.of(Closing).waits = True  # "Finish first"
+    hand.finish_job()
+    assert not hand.state.of(Closing).is_over and "Save…" in hand.state.item_rects
+    hand.click("Discard")
+    hand.step(2)
+    assert hand.state.of(Closing).is_over
 
 
 def test_result_is_saved_and_opens_again(rigging, tmp_path):
