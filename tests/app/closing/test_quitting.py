@@ -23,7 +23,11 @@ from viewer.app.files.saving import save_in_background
 from viewer.app.files.state import Files
 from viewer.app.playback.animations import choose_animation
 from viewer.app.recording.state import Recording, RecordSettings
-from viewer.app.retargeting.match_actions import match_automatically, match_joint
+from viewer.app.retargeting.match_actions import (
+    ask_where_to_save,
+    match_automatically,
+    match_joint,
+)
 from viewer.formats import Source, read
 from viewer.media.saving import save_text
 from viewer.progress import report
@@ -322,3 +326,17 @@ def test_joint_match_by_hand_is_unsaved_until_it_is_automatic_again(drive):
     match_automatically(hand.state)
     hand.finish_job()
     assert texts_of(hand) == []
+
+
+def test_joint_match_is_unsaved_and_saved_while_it_is_applied(drive, tmp_path, monkeypatch):
+    monkeypatch.setattr("viewer.app.retargeting.drive_changes._SHORT", 0)
+    hand = drive(scene=driven_scene(), size=(1000, 900))
+    ask_where_to_save(hand.state)
+    save = hand.state.of(Files).dialog.done
+    match_joint(hand.state, 0, -1)
+    assert hand.state.actor.drive.joint_map is None  # the motion is still being computed
+    assert texts_of(hand) == ["body: joint match"]
+    save(hand.state, [tmp_path / "map.txt"])
+    assert texts_of(hand) == []
+    hand.finish_job()
+    assert hand.state.actor.drive.joint_map is not None and texts_of(hand) == []

@@ -11,6 +11,7 @@ from viewer.app.core.state import AppState
 from viewer.app.curves.clip_actions import ask_for_clip
 from viewer.app.files.motion_dialog import ask_for_motion
 from viewer.app.playback.animations import choose_animation
+from viewer.app.retargeting.drive_changes import shown_drive
 from viewer.app.retargeting.match_actions import ask_where_to_save
 from viewer.app.rigging.results import shown_result
 from viewer.app.rigging.results_section import ask_where_to_save_rig
@@ -79,7 +80,8 @@ def _matches(state: AppState) -> list[Unsaved]:
     """Return the joint matches chosen by hand; people of a capture have one in common."""
     saved, found = state.of(SavedWork), dict[int, Unsaved]()
     for row, actor in enumerate(state.scene.actors):
-        joint_map = None if actor.drive is None else actor.drive.joint_map
+        drive = shown_drive(state, actor)
+        joint_map = None if drive is None else drive.joint_map
         if joint_map is not None and joint_map not in saved:
             text = f"{printable(actor.name, _LONGEST)}: joint match"
             found.setdefault(id(joint_map), Unsaved(text, partial(_ask_for_match, row=row)))

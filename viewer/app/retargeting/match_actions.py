@@ -12,7 +12,7 @@ from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files
 from viewer.app.files.state import Files
-from viewer.app.retargeting.drive_changes import change_drive, no_edit
+from viewer.app.retargeting.drive_changes import change_drive, no_edit, shown_drive
 from viewer.errors import ViewerError
 from viewer.formats import Source, file_stem
 from viewer.formats._text.joint_map import read_joint_map, write_joint_map
@@ -105,7 +105,7 @@ def _load(state: AppState, paths: list[Path]) -> None:
 def _save(state: AppState, paths: list[Path]) -> None:
     """Write the match of the chosen figure."""
     actor = state.actor
-    drive = actor.drive
+    drive = shown_drive(state, actor)
     if drive is None:
         state.say_status(no_drive(state))
         return
