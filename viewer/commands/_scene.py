@@ -139,9 +139,9 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
         default="auto",
         metavar="N|zero|auto",
         help="rest pose of a skeleton that drives a figure: frame N, the file's zero pose, or "
-        "auto: the zero pose if it is a standing pose, otherwise the T-pose of parallel "
-        "joint axes, otherwise a frame in a T- or A-pose, otherwise estimated from the motion "
-        "(default: auto)",
+        "auto: the zero pose if it is a standing pose, otherwise a T-pose if the joint axes "
+        "are parallel to the body's in it, otherwise a frame in a T- or A-pose, otherwise "
+        "estimated from the motion (default: auto)",
     )
     group.add_argument(
         "--feet",

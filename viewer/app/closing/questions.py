@@ -150,7 +150,7 @@ def _about_edits(edits: list[Unsaved], purpose: str) -> Question:
         "Unsaved changes",
         (f"Save changes before {purpose}?", *listed),
         (
-            ("Save…", "choose a file for the first of them", save),
+            ("Save…", "choose a file for the first of these changes", save),
             ("Discard", "lose these changes", discard),
             ("Cancel##closing", "continue as before", keep_open),
         ),
