@@ -42,6 +42,19 @@ def folder(tmp_path_factory):
     return folder
 
 
+@pytest.fixture
+def seen(monkeypatch):
+    """The arguments of the transfer, which ends the command instead of computing weights."""
+    found = {}
+
+    def instead(figure, pose, target, settings, report, name):
+        found.update(figure=figure, pose=pose, target=target, settings=settings, name=name)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rig, "transfer", instead)
+    return found
+
+
 def fox_vertices(pose=None):
     fox = viewer.load().actors[0]
     return viewer.deform(fox.figure, pose or fox.pose)[0]
@@ -117,14 +130,7 @@ def test_template_can_be_posed_by_the_pose_options(folder, tmp_path, capsys):
     assert float(error.split()[2]) > 0.05  # per cent; 0 in the pose of the target
 
 
-def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, monkeypatch):
-    seen = {}
-
-    def instead(figure, pose, target, settings, report, name):
-        seen.update(figure=figure, pose=pose, target=target, settings=settings)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(rig, "transfer", instead)
+def test_template_may_be_posed_by_a_frame_of_a_sequence(tmp_path, capsys, seen):
     body = viewer.load(bundled_body()).actors[0].figure
     poses = np.zeros((5, 72))
     poses[:, 5] = np.arange(5) / 10.0
@@ -149,14 +155,7 @@ def test_missing_frame_is_refused_by_option_name(tmp_path, capsys, option):
     assert capsys.readouterr().err == f"viewer: {option}: expected 0 to 4, found 9\n"
 
 
-def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
-    seen = {}
-
-    def instead(figure, pose, target, settings, report, name):
-        seen.update(settings=settings, name=name)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(rig, "transfer", instead)
+def test_options_reach_the_transfer(folder, tmp_path, capsys, seen):
     pairs = tmp_path / "pairs.txt"
     pairs.write_text("head 1 2 3\njaw 4 5 6  # there\n\n0 0 0 7 8 9\n")
     options = ["--method", "nearest", "--up", "z", "--facing", "x", "--scale", "axes", "--smooth"]
@@ -185,14 +184,7 @@ def test_options_reach_the_transfer(folder, tmp_path, monkeypatch, capsys):
     assert weights.match.max_distance == 0.02 and seen["name"] == "scan"
 
 
-def test_mesh_of_a_gltf_file_without_a_skin_has_no_rig(tmp_path, monkeypatch, capsys):
-    seen = {}
-
-    def instead(figure, pose, target, settings, report, name):
-        seen.update(target=target)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(rig, "transfer", instead)
+def test_mesh_of_a_gltf_file_without_a_skin_has_no_rig(tmp_path, capsys, seen):
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]])
     triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
     mesh = Mesh(corners, vertex_normals(corners, triangles), triangles)
@@ -202,14 +194,7 @@ def test_mesh_of_a_gltf_file_without_a_skin_has_no_rig(tmp_path, monkeypatch, ca
     assert "already has a rig" not in capsys.readouterr().err
 
 
-def test_rigged_target_is_used_in_its_pose(tmp_path, monkeypatch, capsys):
-    seen = {}
-
-    def instead(figure, pose, target, settings, report, name):
-        seen.update(target=target)
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(rig, "transfer", instead)
+def test_rigged_target_is_used_in_its_pose(tmp_path, capsys, seen):
     from viewer.loading import bundled_files
 
     assert run(["rig", *map(str, bundled_files())]) == 130
