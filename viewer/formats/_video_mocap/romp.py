@@ -68,7 +68,7 @@ def read(source: Source, archive: Archive) -> Results:
         budget.spend(sum(shape_of(image, _POSES)[:1]))
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     is_tracked, has_infants, most = True, False, 1
-    has_joints = all(_joints(image) is not None for image in images.values())
+    has_joints = all(map(_has_joints, images.values()))
     for number, image in images.items():
         table = _table(image, has_joints)
         persons = np.arange(len(table))
@@ -117,22 +117,20 @@ def _camera(images: list[Archive]) -> Cameras | None:
 
 def _projected(image: Archive) -> Floats | None:
     """Return directions and pixels of the joints in front of the camera: (N, 4)."""
-    joints, count = _joints(image), sum(shape_of(image, _POSES)[:1])
-    if joints is None or shape_of(image, _PIXELS) != (*joints.shape[:2], 2):
+    shape = shape_of(image, _JOINTS)
+    if not _has_joints(image) or shape_of(image, _PIXELS) != (*shape[:2], 2):
         return None
-    points = (joints + places(image, _PLACES, count)[:, None]).reshape(-1, 3)
-    pixels = rows(image, _PIXELS, (*joints.shape[:2], 2)).reshape(-1, 2)
+    placed = places(image, _PLACES, shape[0])
+    points = (rows(image, _JOINTS, shape) + placed[:, None]).reshape(-1, 3)
+    pixels = rows(image, _PIXELS, (*shape[:2], 2)).reshape(-1, 2)
     is_ahead = points[:, 2] > _NEAREST
     return np.concatenate([points[:, :2] / points[:, 2:], pixels], axis=1)[is_ahead]
 
 
-def _joints(image: Archive) -> Floats | None:
-    """Return the joints of the people in an image relative to ``cam_trans``: (P, J, 3)."""
-    shape = shape_of(image, _JOINTS)
-    count = sum(shape_of(image, _POSES)[:1])
-    if len(shape) != 3 or shape[0] != count or shape[1] < _N_JOINTS or shape[2] != 3:
-        return None
-    return rows(image, _JOINTS, shape)
+def _has_joints(image: Archive) -> bool:
+    """Return whether an image has the joints of its people relative to ``cam_trans``."""
+    shape, count = shape_of(image, _JOINTS), sum(shape_of(image, _POSES)[:1])
+    return len(shape) == 3 and shape[0] == count and shape[1] >= _N_JOINTS and shape[2] == 3
 
 
 def _images(whole: Archive) -> dict[int, Archive]:
@@ -163,9 +161,10 @@ def _table(image: Archive, has_joints: bool) -> Floats:
     if image.has(_SHAPES):
         given = rows(image, _SHAPES, (count, None))[:, :_N_SHAPES]
         shape[:, : given.shape[1]] = given
-    placed, joints = places(image, _PLACES, count), _joints(image)
-    if has_joints and joints is not None:
-        placed = within_reach(image, _JOINTS, placed + joints[:, 0])
+    placed = places(image, _PLACES, count)
+    if has_joints:
+        roots = rows(image, _JOINTS, shape_of(image, _JOINTS))[:, 0]
+        placed = within_reach(image, _JOINTS, placed + roots)
     return np.concatenate([poses, placed, shape], axis=1)
 
 
