@@ -144,17 +144,17 @@ class MeshBuffers:
             of_figure, split, materials = mesh.triangles, self.triangles, mesh.material_indices
             parts = mesh.part_indices
         kept = kept_triangles(self.figure, hidden, of_figure)
-        is_whole = split is self.triangles and kept.all()
-        if not kept.all():
+        keeps_all = bool(kept.all())
+        if not keeps_all:
             split, materials, parts = split[kept], materials[kept], parts[kept]
         order: Ints | None = None
-        if not as_listed and is_whole:
+        if not as_listed and split is self.triangles:
             order = triangle_order(self.figure)
         elif not as_listed:
             order = curve_order(split, materials, parts, mesh.positions[self.sources])
         made = index_set(self.context, split, materials, self.surfaces, order, parts)
         self._owner.keep(made.indices)
-        if kept.all():
+        if keeps_all:
             return made
         return replace(made, order=np.flatnonzero(kept).astype(np.int32)[made.order])
 
