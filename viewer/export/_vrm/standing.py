@@ -10,7 +10,7 @@ import numpy as np
 from viewer.rig.arrays import Floats
 from viewer.rig.blendshapes import BlendShapes
 from viewer.rig.figure import Figure
-from viewer.rig.geometry.quaternion import multiply
+from viewer.rig.geometry.quaternion import between, multiply
 from viewer.rig.geometry.rotation import (
     matrix_to_quaternion,
     nearest_rotations,
@@ -188,7 +188,8 @@ def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:
         parent = int(skeleton.parents[joint])
         above = unit_rotation(world[parent]) if parent >= 0 else np.eye(3)
         own = quaternion_to_matrix(rotations[joint])
-        rotations[joint] = matrix_to_quaternion(above.T @ _arc(away, wanted) @ above @ own)
+        turn = quaternion_to_matrix(between(away, wanted))
+        rotations[joint] = matrix_to_quaternion(above.T @ turn @ above @ own)
     return replace(figure, skeleton=replace(skeleton, rest_rotations=rotations)), largest
 
 
@@ -207,14 +208,3 @@ def _worlds(skeleton: Skeleton, rotations: Floats) -> Floats:
     local[:, :3, 3] = skeleton.rest_translations
     local[:, 3, 3] = 1.0
     return forward_kinematics(skeleton.parents, local)
-
-
-def _arc(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotation between unit vectors: (3, 3)."""
-    middle = unit(start + end)
-    if not middle.any():
-        middle = unit(np.cross(start, np.eye(3)[np.abs(start).argmin()]))
-        return 2.0 * np.outer(middle, middle) - np.eye(3)
-    # Two rotations by 180 degrees: about the start, and about the middle.
-    first = 2.0 * np.outer(start, start) - np.eye(3)
-    return (2.0 * np.outer(middle, middle) - np.eye(3)) @ first

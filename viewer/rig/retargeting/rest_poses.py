@@ -6,11 +6,11 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, Ints
+from viewer.rig.geometry.quaternion import between
 from viewer.rig.geometry.rotation import (
     axis_rotations,
     nearest_rotations,
     quaternion_to_matrix,
-    rotation_vector_to_matrix,
 )
 from viewer.rig.kinematics import forward_kinematics, world_matrices
 from viewer.rig.pose import rest_pose
@@ -260,13 +260,5 @@ def _frame(side: Floats, main: Floats) -> Floats | None:
 
 
 def shortest_arc(start: Floats, end: Floats) -> Floats:
-    """Return the smallest rotation from one direction to another: (3, 3) for unit vectors."""
-    axis = np.cross(start, end)
-    sine, cosine = float(np.linalg.norm(axis)), float(start @ end)
-    if sine > 1e-12:
-        return rotation_vector_to_matrix(axis / sine * np.arctan2(sine, cosine))
-    if cosine > 0.0:
-        return np.eye(3)
-    # Rotate by 180 degrees about any perpendicular axis.
-    across = np.cross(start, np.eye(3)[np.abs(start).argmin()])
-    return rotation_vector_to_matrix(np.pi * across / np.linalg.norm(across))
+    """Return the smallest rotation from one direction to another: (3, 3)."""
+    return quaternion_to_matrix(between(start, end))
