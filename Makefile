@@ -2,8 +2,8 @@
 #   make run    open the bundled figure (without a display: write its picture here)
 #   make test   run all tests
 #   make quick  run the tests that do not draw, start programs or compute for long: about a minute
-# Others: make lint, make bench, make golden [NAME...], make manual, make gallery,
-# make figure, make clean.
+# Others: make lint, make house, make record TO=FOLDER, make bench, make golden [NAME...],
+# make manual, make gallery, make figure, make clean.
 
 PYTHON ?= python3
 VENV ?= .venv
@@ -24,7 +24,8 @@ PICTURES := $(wordlist 2,$(words $(MAKECMDGOALS)),$(MAKECMDGOALS))
 $(PICTURES): ; @:
 endif
 
-.PHONY: run test suite quick lint style types compiled bench golden manual gallery figure system clean
+.PHONY: run test suite quick lint style types house record compiled bench golden manual gallery
+.PHONY: figure system clean
 
 # A window may open even if pictures cannot be drawn without one, so failures are ignored here.
 run: $(READY)
@@ -55,6 +56,14 @@ style: $(READY)
 
 types: $(READY)
 	@$(BIN)/mypy
+
+# Sizes of the tree, beside those of the last tag.
+house: $(READY)
+	@$(BIN)/python tests/house.py
+
+# What the program says and writes for many files, to be compared with that of another version.
+record: $(READY)
+	@$(BIN)/python tests/record.py $(or $(TO),$(error type make record TO=FOLDER))
 
 # The tests compile every module: if one process has done so before, each of the others needs 10 s
 # less. Failures here are ignored, as they recur and are reported in the tests.
