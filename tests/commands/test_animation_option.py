@@ -63,3 +63,17 @@ def test_conversion_writes_the_requested_animation(capsys, box, tmp_path):
     assert run(["convert", box, "--animation", "Rise", "-o", copy]) == 0
     capsys.readouterr()
     assert run(["diff", box, copy, "--animation", "Rise", "--tolerance", "1e-6"]) == 0
+
+
+@pytest.mark.parametrize("output", ["out.bvh", "out.npz", "out_{frame}.obj"])
+def test_conversion_to_frames_names_the_animations_that_are_not_written(
+    capsys, box, tmp_path, output
+):
+    assert run(["convert", box, "--frames", "0:2", "-o", str(tmp_path / output)]) == 0
+    assert "1 other animation is not written: Rise" in capsys.readouterr().out
+    again = ["convert", box, "--animation", "Rise", "--force", "-o", str(tmp_path / output)]
+    assert run([*again, "--frames", "30:32"]) == 0
+    assert "1 other animation is not written: Slide" in capsys.readouterr().out
+    # One pose is requested: nothing that was asked for is missing.
+    assert run(["convert", box, "--time", "0.5", "-o", str(tmp_path / "pose.bvh")]) == 0
+    assert "other animation" not in capsys.readouterr().out

@@ -12,6 +12,7 @@ from typing import Any
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export._exporter import Exporter
+from viewer.export._left_out import other_animations_note
 from viewer.export._options import MotionOptions, VrmMeta
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
@@ -338,7 +339,9 @@ def export_animation(
     """
     module = import_module(f"{__name__}.{key}")
     notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
-    return notes
+    if len(animation.frames.present) == 1:
+        return notes  # a pose was requested
+    return notes + other_animations_note(animation.figure, animation.motion)
 
 
 def animation_for(

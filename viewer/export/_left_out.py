@@ -9,7 +9,8 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
-from viewer.rig.motion.evaluation import Frames
+from viewer.rig.motion.animation_choice import animation_labels
+from viewer.rig.motion.evaluation import Frames, JointMotion
 from viewer.rig.skeleton import Skeleton
 
 _NEGLIGIBLE = 1e-4  # tolerance: rounding of constant scales in files is smaller
@@ -58,3 +59,19 @@ def joint_scales_note(frames: Frames, skeleton: Skeleton, key: str) -> list[Diag
 def not_held_note(kind: str, parts: Sequence[Phrase]) -> list[Diagnostic]:
     """Return a note that lists the parts that a format cannot store, if there are any."""
     return [Diagnostic("X003.parts", values={"format": kind, "parts": parts})] if parts else []
+
+
+def other_animations_note(figure: Figure, motion: JointMotion) -> list[Diagnostic]:
+    """Return a note that lists a figure's animations other than the one that is written as frames.
+
+    A clip with edited keys is another object than the one read, with the same name.
+    """
+    listed = figure.animations
+    played = [each.plays(motion) for each in listed]
+    if not any(played):
+        played = [each.name == motion.name != "" for each in listed]
+    labels = zip(animation_labels(figure), played, strict=True)
+    names = [label for label, is_played in labels if not is_played]
+    if not names:
+        return []
+    return [Diagnostic("X003.other-animations", values={"names": names, "n": len(names)})]

@@ -30,12 +30,12 @@ from viewer.export._gltf.sampled import (
     add_sampled,
     common_name,
     motion_remarks,
-    others_left,
     placed_actor,
     sampled_losses,
     sampled_of,
     written_part,
 )
+from viewer.export._left_out import other_animations_note
 from viewer.export._losses.between import resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import MotionOptions
@@ -266,7 +266,7 @@ def export_animations(
         own += sampled_losses(written_part(path, file, made), sampled, options)
         own += resampling_losses(path, sampled.animation, how)
         own += not_held(sampled.animation.figure, sampled.body.shape)
-        own += others_left(part)
+        own += other_animations_note(part.animation.figure, part.animation.motion)
         notes += [_of_figure(part.actor, note) for note in own]
     for actor, each in zip(others, added, strict=True):
         notes += [_of_figure(actor, note) for note in _figure_notes(path, actor, each, file, how)]

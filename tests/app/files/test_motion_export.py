@@ -199,7 +199,7 @@ def test_figures_with_keys_that_begin_later_are_sampled(drive, tmp_path):
         for actor in found
     ]
     assert starts == [0.0, 0.25]
-    assert hand.says("1 animation not played is omitted")
+    assert hand.says("1 other animation is not written")
 
 
 def test_only_the_chosen_actor_is_written_if_requested(crowd, tmp_path):

@@ -33,7 +33,6 @@ __all__ = [
     "add_sampled",
     "common_name",
     "motion_remarks",
-    "others_left",
     "placed_actor",
     "sampled_losses",
     "sampled_of",
@@ -104,19 +103,6 @@ def common_name(parts: Sequence[PlacedMotion], stem: str) -> str:
     """Return the name that all motions share, or else the file's name."""
     names = {part.animation.motion.name for part in parts}
     return names.pop() if len(names) == 1 and "" not in names else stem
-
-
-def others_left(part: PlacedMotion) -> list[Diagnostic]:
-    """Return a note about the animations of a figure other than the one that it plays."""
-    listed, actor = part.animation.figure.animations, part.actor
-    names = [
-        each.name or f"animation {number}"
-        for number, each in enumerate(listed, 1)
-        if number - 1 != actor.animation
-    ]
-    if not names:
-        return []
-    return [Diagnostic("X003.other-animations", values={"names": names, "n": len(names)})]
 
 
 def sampled_of(
