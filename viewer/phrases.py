@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["counted", "listed", "one_of", "printable", "quoted"]
+__all__ = ["counted", "listed", "one_of", "printable", "quoted", "rounded"]
 
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
 
@@ -32,6 +32,16 @@ def quoted(word: bytes | str, limit: int = 40) -> str:
     """
     text = word[:200].decode("utf-8", "replace") if isinstance(word, bytes) else word
     return f'"{printable(text, limit)}"'
+
+
+def rounded(value: float, digits: int = 3) -> str:
+    """Format a number with some digits, or all integer digits of numbers below a million.
+
+    >>> rounded(0.012345), rounded(1284.0), rounded(12345.6, 5), rounded(3.2e30)
+    ('0.0123', '1,284', '12,346', '3.2e+30')
+    """
+    is_long = 10.0**digits - 0.5 <= abs(value) < 1e6
+    return format(value, ",.0f" if is_long else f".{digits}g")
 
 
 def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:

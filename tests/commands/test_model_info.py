@@ -133,7 +133,7 @@ def test_parts_of_an_animal_are_counted(describe, lines, box):
     told = lines(box)
     assert "parts      NOT_BODY 0, FEET 4, BACK 4" in told
     assert "reduced    4 vertices, 4 triangles" in told
-    assert "symmetry   left and right differ by 2000 mm" in told
+    assert "symmetry   left and right differ by 2 m" in told
 
 
 def test_placement_and_raw_pose_values_are_reported(describe, box):

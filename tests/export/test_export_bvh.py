@@ -28,7 +28,9 @@ from viewer.export import MotionOptions, export_animation, motion_exporters
 from viewer.export._options import ROTATION_ORDERS
 from viewer.formats import Source, bvh
 from viewer.loading import bundled_body
+from viewer.rig.constraints.constraint import Constraint
 from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh
 from viewer.rig.motion.clip import Channel, Clip
 from viewer.rig.motion.sampled_animation import sample_animation
 from viewer.rig.motion.sampled_clip import SampledClip
@@ -36,6 +38,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.retarget import retarget
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skin import skin_from_lists
 
 
 @pytest.fixture(scope="module")
@@ -54,6 +57,25 @@ def test_body_joints_match_an_independent_reader(body: Figure, tmp_path: Path) -
     assert notes[0] == (
         "PATH: 24 joints, 12 frames (0 to 11) at 30 fps, centimetres, y up, channels ZYX"
     )
+    assert len(notes) == 1  # no loss is reported
+
+
+def test_constraints_move_joints_but_not_the_offsets_of_the_file(tmp_path: Path) -> None:
+    # The aimed joint points at the arm also at rest, where its own child is turned with it.
+    parents = np.array([-1, 0, 1, 1, 3], dtype=np.int32)
+    places = np.array([[0.0, 1, 0], [0, 2, 0], [1, 2, 0], [0, 2, 2], [0, 2, 3]])
+    rig = ball_skeleton(("hips", "spine", "arm", "aimed", "end"), parents, places)
+    rig = replace(rig, constraints=(Constraint(3, 2, "aim", (0.0, 0.0, -1.0)),))
+    animation = rig_animation(rig)
+    bound = np.tile(np.eye(4), (5, 1, 1))
+    bound[:, :3, 3] = -places
+    points, rows = places + np.array([0.1, 0.2, 0.3]), [[(joint, 1.0)] for joint in range(5)]
+    mesh = Mesh(points, np.tile([0.0, 0, 1], (5, 1)), np.array([[0, 1, 2], [2, 3, 4]]))
+    figure = replace(animation.figure, mesh=mesh, skin=skin_from_lists(rows, bound))
+    animation = replace(animation, figure=figure)
+    found, notes = write(animation, tmp_path)
+    assert_places(found, animation)
+    assert found.offsets[4] == pytest.approx([0.0, 0.0, 1.0])
     assert len(notes) == 1  # no loss is reported
 
 

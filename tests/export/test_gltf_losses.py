@@ -29,7 +29,28 @@ def test_influences_can_be_limited(tmp_path):
     gltf, notes = write(tmp_path, actor, max_influences=3)
     assert_drawn(gltf, actor.figure, actor.pose, max_influences=3)
     assert len(gltf.influence_sets()) == 1
-    assert not any("influences" in note for note in notes[1:])
+    assert not any("JOINTS_0" in note for note in notes[1:])
+    cause = "only the 3 strongest influences of each vertex are written, as requested"
+    assert sum(note.endswith(cause) for note in notes) == 1
+
+
+def test_reduced_weights_are_compared_with_the_figure_as_opened(tmp_path):
+    # The tip at (1, 0, 0) turns by 180 degrees about z and takes vertex 3 from (1, 2, 1) to
+    # (1, -2, 1): with all influences it is at (1, 1, 1), with the strongest one at (1, 2, 1).
+    actor = seamed_actor(weights=((1, 0), (0, 1), (1, 0), (0.75, 0.25), (1, 0)), unit="m")
+    actor.pose.dofs[5] = np.pi
+    _, notes = write(tmp_path, actor, max_influences=1)
+    assert notes[1] == (
+        f"{tmp_path}/out.glb: vertices differ from the pose by up to 1 m (vertex 3): only the "
+        "strongest influence of each vertex is written, as requested"
+    )
+    # Vertex 1 has a sum of 0.5 and stands at (0.5, 0, 0) instead of (1, 0, 0).
+    rows = ((1.0, 0.0), (0.0, 0.5), (1.0, 0.0), (0.5, 0.5), (1.0, 0.0))
+    _, notes = write(tmp_path, seamed_actor(weights=rows, unit="m"), normalize=True)
+    assert notes[1] == (
+        f"{tmp_path}/out.glb: vertices differ from the pose by up to 500 mm (vertex 1): weights "
+        "are scaled to a sum of 1, as requested"
+    )
 
 
 def test_all_thirteen_influences_are_written(tmp_path):
@@ -97,7 +118,7 @@ def test_negative_and_repeated_weights_are_changed_to_comply_with_gltf(tmp_path)
     assert_allclose(gltf.vertices()[0][:2], [[0, 0, 0], [1, 0, 0]], rtol=0, atol=EXACT)
     assert gltf.influence_sets()[0][1][1].tolist() == [0.5, 0.5, 0, 0]
     assert notes[1] == (
-        f"{tmp_path}/out.glb: vertices differ from the pose by up to 1000 mm (vertex 0): weights "
+        f"{tmp_path}/out.glb: vertices differ from the pose by up to 1 m (vertex 0): weights "
         "of 1 vertex are negative: omitted and the others scaled, as glTF requires"
     )
 
@@ -112,7 +133,7 @@ def test_loss_of_other_skinning_methods_is_reported(tmp_path):
     gltf, notes = write(tmp_path, actor, method="dqs")
     assert_drawn(gltf, actor.figure, actor.pose)
     assert notes[1] == (
-        f"{tmp_path}/out.glb: vertices differ from the pose by up to {1000 * worst:.0f} mm "
+        f"{tmp_path}/out.glb: vertices differ from the pose by up to {worst:.3g} m "
         "(vertex 3): Dual quaternion (DQS) skinning is not supported: glTF uses linear blending"
     )
 
@@ -146,7 +167,7 @@ def test_distant_meshes_report_single_precision_loss(tmp_path):
     _, notes = write(tmp_path, Actor(Figure("far", mesh, unit="m")))
     # Above 2^24 single precision represents even integers only.
     assert notes[1] == (
-        f"{tmp_path}/out.glb: vertices differ from the pose by up to 1000 mm (vertex 0): the mesh "
+        f"{tmp_path}/out.glb: vertices differ from the pose by up to 1 m (vertex 0): the mesh "
         "is too far from its origin for glTF's single precision"
     )
 

@@ -251,7 +251,7 @@ def test_error_caused_by_raw_weights_is_reported(tmp_path):
     actor.pose.figure_translation[:] = 3, 4, 0
     _, notes = there_and_back(actor, tmp_path)
     # Because of its weights, vertex 0 moves by only half of the 5 m.
-    assert told_error(notes) == (pytest.approx(2500, rel=5e-3), "mm")
+    assert told_error(notes) == (pytest.approx(2.5, rel=5e-3), "m")
     lost = ["part-up", "part-body-parts", "part-symmetry", "part-reduced", "part-regressor"]
     assert [part.key for part in parts_not_held(notes)] == lost
 
@@ -277,7 +277,7 @@ def test_loss_of_dual_quaternions_is_reported(tmp_path):
     # DQS rotates by 45 degrees and preserves the distance r from the line, while LBS reduces it to
     # r cos 45; the farthest vertex is 4, sqrt(18) from the line.
     gap = 18**0.5 * (1 - 0.5**0.5)
-    assert told_error(notes) == (pytest.approx(1000 * gap, rel=5e-3), "mm")
+    assert told_error(notes) == (pytest.approx(gap, rel=5e-3), "m")
 
 
 def test_seams_are_split(tmp_path):

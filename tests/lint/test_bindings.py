@@ -31,7 +31,7 @@ def test_other_joints_are_compared_despite_a_singular_matrix() -> None:
     found = {finding.code: finding for finding in lint_scene(scene)}
     assert found["B002"].joints.tolist() == [0]
     assert found["B004"].joints.tolist() == [1]
-    values = {"n": 1, "joint": "knee", "distance": "1000 mm"}
+    values = {"n": 1, "joint": "knee", "distance": "1 m"}
     assert told([found["B004"].diagnostic]) == [("B004.joints", values)]
 
 

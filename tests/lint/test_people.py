@@ -20,7 +20,7 @@ def found(scene: Scene):
 
 def test_exchange_is_reported_with_the_other_person_and_the_distance() -> None:
     (finding,) = found(exchanged())
-    assert finding.message == ("swaps positions with person 1, 2000 mm away, in 1 frame: 120")
+    assert finding.message == ("swaps positions with person 1, 2 m away, in 1 frame: 120")
 
 
 def test_exchange_and_its_reversal_are_reported_in_two_frames() -> None:

@@ -29,7 +29,7 @@ def test_metres_are_inferred_for_sizes_between_infant_and_giant(size, expected):
 
 
 @pytest.mark.parametrize(
-    ("unit", "text"), [("m", "2000 mm"), ("cm", "20 mm"), ("mm", "2 mm"), ("in", "50.8 mm")]
+    ("unit", "text"), [("m", "2 m"), ("cm", "20 mm"), ("mm", "2 mm"), ("in", "50.8 mm")]
 )
 def test_small_lengths_are_millimetres_in_every_known_unit(unit, text):
     skeleton = ball_skeleton(("a",), np.array([-1]), np.zeros((1, 3)))

@@ -4,6 +4,7 @@
 ``{word:quoted}``      text in quotes; None is the end of the file
 ``{word:word}``        the same without quotes
 ``{name}``             number unchanged, text with control characters escaped
+``{name:.3g}``         a number with three digits, see ``viewer.phrases.rounded``
 ``{name:text}``        the same, at most 200 characters
 ``{name:name}``        a name in a file, at most 60 characters; undecodable bytes as �
 ``{names:list}``       the first six and the number of others, or ``none``; ``list12``: twelve
@@ -26,9 +27,10 @@ from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
-from viewer.phrases import counted, listed, one_of, printable, quoted
+from viewer.phrases import counted, listed, one_of, printable, quoted, rounded
 
 _SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # specification of a signed number
+_DIGITS = re.compile(r"\.(\d)g")  # specification of a number rounded to some digits
 _PLACE = "\0"  # placeholder of a value inside its own specification
 _PLACED = re.compile("\0(?:([a-z0-9]+)\1)?")  # the placeholder, and the specification it may have
 _LONGEST = 1000  # maximum number of characters of a text value
@@ -72,6 +74,9 @@ class _Formatter(Formatter):
             return printable(value, _LONGEST)
         if format_spec.startswith("list"):
             return listed([*map(printable, value)], int(format_spec[4:] or 6)) or "none"
+        digits = _DIGITS.fullmatch(format_spec)
+        if digits is not None:
+            return rounded(value, int(digits[1]))
         plain = _PLAIN.get(format_spec)
         return plain(value) if plain is not None else str(format(value, format_spec))
 

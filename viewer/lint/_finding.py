@@ -14,7 +14,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import CODES, Diagnostic
 from viewer.lint._counting import Counting
 from viewer.lint._track import Track
-from viewer.phrases import printable
+from viewer.phrases import printable, rounded
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.motion.animation_choice import animation_labels
@@ -250,14 +250,14 @@ class Subject:
         figure = self.actor.figure
         if figure.unit in METRES:
             return length_text(figure, length)
-        return f"{length:.3g} units" + self._relative(length)
+        return f"{rounded(length)} units" + self._relative(length)
 
     def speed(self, speed: float) -> str:
         """Return a speed as text: in metres per second if the unit is known."""
         unit = self.actor.figure.unit
         if unit in METRES:
-            return f"{speed * METRES[unit]:.3g} m/s"
-        return f"{speed:.3g} units per second" + self._relative(speed)
+            return f"{rounded(speed * METRES[unit])} m/s"
+        return f"{rounded(speed)} units per second" + self._relative(speed)
 
     def size(self) -> float:
         """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.
@@ -281,7 +281,7 @@ class Subject:
 
     def _relative(self, length: float) -> str:
         size = self.size()
-        return f" ({100.0 * length / size:.3g} % of its size)" if size > 0.0 else ""
+        return f" ({rounded(100.0 * length / size)} % of its size)" if size > 0.0 else ""
 
     def found(
         self,

@@ -8,6 +8,7 @@ import numpy as np
 
 from viewer.lint._finding import Finding, Subject
 from viewer.lint._tracks import track_of
+from viewer.phrases import rounded
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.points import PointClip
 from viewer.rig.cleanup.frame_rows import runs_of
@@ -62,7 +63,7 @@ def _points(subject: Subject, clip: PointClip) -> list[Finding]:
         noise[:, point] = noise_of(rows[:, point, None, :3], seen[:, point], width)[:, 0]
     names = [*layout.names, *(f"point {k}" for k in range(len(layout.names), seen.shape[1]))]
     frames = np.arange(timing.n_frames)
-    values = {"noise": f"{noise.max():.3g} units", "limit": f"{limit:.3g} units"}
+    values = {"noise": f"{rounded(noise.max())} units", "limit": f"{rounded(limit)} units"}
     times = timing.start + frames / timing.frame_rate + subject.actor.offset
     numbers = frames + timing.first_frame
     return _found(subject, noise, limit, names, values, numbers, times)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from viewer.phrases import rounded
+
 __all__ = ["angle_text", "number_text", "short_number"]
 
 _NOT_ZERO = set("123456789n")  # "inf" and "nan" contain an n
@@ -29,12 +31,13 @@ def number_text(value: float, spec: str = "g") -> str:
 
 
 def short_number(value: float) -> str:
-    """Format a number with three significant digits, or all integer digits if there are more.
+    """Format a number with three significant digits, see ``viewer.phrases.rounded``.
 
     >>> short_number(0.012345), short_number(1234.5), short_number(-0.0)
     ('0.0123', '1,234', '0')
     """
-    return number_text(value, ".3g" if abs(value) < 999.5 else ",.0f")
+    text = rounded(value)
+    return text if _NOT_ZERO.intersection(text) else "0"
 
 
 def angle_text(radians: float, in_degrees: bool, sign: str = "") -> str:

@@ -221,6 +221,9 @@ PHRASES = {
     "compared-frames": "vertices compared in {n} of {all} frames",
     "estimated-times": "an estimate from {n:#time}",
     # Causes of vertex errors
+    "requested-influences": "only the {n:?strongest influence|{n} strongest influences} of each "
+    "vertex {n:?is|are} written, as requested",
+    "requested-normalization": "weights are scaled to a sum of 1, as requested",
     "weights-unnormalized": "weights of {n:#vertex} do not add up to 1: scaled, as glTF requires",
     "weights-negative": "weights of {negative:#vertex} are negative: omitted and the others "
     "scaled, as glTF requires",

@@ -73,8 +73,11 @@ class Body:
 
 
 def rest_matrices(figure: Figure, offsets: Floats) -> Floats:
-    """Return joint-to-figure matrices with all DOFs at 0, for given rest translations."""
-    skeleton = replace(figure.require_skeleton(), rest_translations=offsets)
+    """Return joint-to-figure matrices with all DOFs at 0, for given rest translations.
+
+    Constraints are left out: their rotations are in the channels of each frame, like those of DOFs.
+    """
+    skeleton = replace(figure.require_skeleton(), rest_translations=offsets, constraints=())
     pose = rest_pose(skeleton)
     pose.dofs[:] = 0.0
     return world_matrices(skeleton, pose)

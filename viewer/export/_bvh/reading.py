@@ -19,7 +19,14 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.export._bvh.body import Space, rest_matrices
-from viewer.export._losses.skinned import Poses, Side, anchored, bare_poses, figure_side
+from viewer.export._losses.skinned import (
+    Poses,
+    Side,
+    anchored,
+    bare_poses,
+    figure_side,
+    linear_as_opened,
+)
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import (
@@ -82,7 +89,7 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     rest = rest_matrices(figure, rest_translations_of(figure, still[None])[0])[:, :3, :3]
     own = space.rest @ rest * scale
     held = replace(frames, shape_weights=still[None])
-    body = figure_side(figure, held, replace(how, method="lbs"), still).body
+    body = figure_side(figure, held, linear_as_opened(how), still).body
     bound = _bound(figure, still)
 
     def poses(rows: Rows) -> Poses:

@@ -104,7 +104,7 @@ def sides(
     weights = frames.shape_weights
     still = weights[min(written.start, len(weights) - 1)] if shape.baked is None else shape.baked
     columns = changing(frames, still)
-    expected = figure_side(figure, frames, how, still)
+    expected = figure_side(figure, frames, how.unreduced(), still)
     if written.meshes:
         expected = _split(expected, written.sources)
     else:
@@ -164,11 +164,15 @@ def causes_of(
 ) -> list[Phrase]:
     """Return the causes of vertex errors."""
     found = []
+    if influences is not None and how.max_influences:
+        found.append(Phrase("requested-influences", n=how.max_influences))
+    if influences is not None and how.normalize and not how.max_influences:
+        found.append(Phrase("requested-normalization"))
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_phrase(influences))
     if influences is not None and how.method != "lbs":
         found.append(Phrase("nonlinear-skinning", method=METHODS[how.method].title))
-    if influences is not None and figure.correctives is not None and how.correctives:
+    if influences is not None and figure.correctives is not None:
         found.append(Phrase("unsupported-correctives"))
     weights = frames.shape_weights
     weights = weights if len(weights) == 1 else weights[rows]

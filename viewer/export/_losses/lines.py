@@ -18,7 +18,7 @@ from viewer.export._losses.apart import (
     sampling,
     tolerance,
 )
-from viewer.export._losses.skinned import Side, changing, figure_side
+from viewer.export._losses.skinned import Side, changing, figure_side, linear_as_opened
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import Frames, frames_between
@@ -51,7 +51,8 @@ def driven_losses(
     ``shape`` (S,): shape weights of the file's skeleton.
     """
     rows = span[0] + np.flatnonzero(animation.frames.present[slice(*span)])
-    expected = figure_side(animation.figure, animation.frames, replace(how, method="lbs"), shape)
+    linear = linear_as_opened(how)
+    expected = figure_side(animation.figure, animation.frames, linear, shape)
     found = apart(expected, written, rows, negligible(animation.figure, animation.frames, rows))
     first = animation.first_frame
     return apart_notes(path, animation.figure, found, first, vertices="driven-vertices")
@@ -67,7 +68,7 @@ class JointLosses:
     """
 
     def __init__(self, how: Skinning, n_frames: int) -> None:
-        self._how, self._n_frames = replace(how, method="lbs"), n_frames
+        self._how, self._n_frames = linear_as_opened(how), n_frames
         self._n_seen, self._reach = 0, 0.0
         self._worst: Farthest | None = None
 
@@ -116,7 +117,7 @@ def frames_losses(
     rows = first + np.flatnonzero(frames.present[first:stop])
     still = written.shape_weights[0]
     columns = np.union1d(changing(frames, still), changing(written, still))
-    linear = replace(how, method="lbs")
+    linear = linear_as_opened(how)
     expected = figure_side(figure, frames, linear, still, columns)
     found_side = figure_side(figure, written, linear, still, columns)
     least = negligible(figure, frames, rows)

@@ -142,6 +142,11 @@ def figure_side(
     return Side(body, poses, None if is_linear or body is None else exact)
 
 
+def linear_as_opened(how: Skinning) -> Skinning:
+    """Return LBS of the figure as it was opened, the reference of motions without a mesh."""
+    return replace(how.unreduced(), method="lbs")
+
+
 def bare_poses(places: Floats, frames: Frames) -> Poses:
     """Return poses without a mesh: positions of joints (F, J, 3) in some frames."""
     palette = anchored(np.zeros((len(places), 0, 4, 4)), frames.figure_scales)

@@ -21,6 +21,7 @@ from viewer.export._losses.skinned import (
     body_rows,
     changing,
     figure_side,
+    linear_as_opened,
     vertices,
 )
 from viewer.rig.arrays import Floats
@@ -106,7 +107,7 @@ def worst_times(
     spans = _spans(edges, _SHORT / rate)
     if len(spans) == 0:
         return WorstTimes(np.zeros(0), 0, False)
-    pair, looked = _Pair(figure, one, other, replace(how, method="lbs")), 0
+    pair, looked = _Pair(figure, one, other, linear_as_opened(how)), 0
     is_estimate = len(spans) * _FEWEST > _MOST
     if is_estimate:
         looked = min(len(spans), _MOST)

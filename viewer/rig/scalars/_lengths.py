@@ -1,10 +1,13 @@
-"""Small lengths as text: in millimetres, or as a percentage of the figure's size."""
+"""Lengths as text: in millimetres or metres, or as a percentage of the figure's size."""
 
 from __future__ import annotations
 
+from viewer.phrases import rounded
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.units import METRES
+
+_METRE = 999.5  # millimetres that would be rounded to 1000 mm
 
 
 def length_unit(figure: Figure) -> tuple[float, str]:
@@ -16,7 +19,9 @@ def length_unit(figure: Figure) -> tuple[float, str]:
 
 
 def length_text(figure: Figure, length: float) -> str:
-    """Format a small length with three digits: ``"12.3 mm"``."""
+    """Format a length with three digits: ``"12.3 mm"``, ``"2.31 m"`` or ``"1.5 % of the size"``."""
     factor, unit = length_unit(figure)
     number = factor * length
-    return f"{number:.0f} {unit}" if number >= 999.5 else f"{number:.3g} {unit}"
+    if unit == "mm" and number >= _METRE:
+        number, unit = 0.001 * number, "m"
+    return f"{rounded(number)} {unit}"

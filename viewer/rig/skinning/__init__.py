@@ -107,6 +107,10 @@ class Skinning:
     normalize: bool = False
     correctives: bool = True
 
+    def unreduced(self) -> Skinning:
+        """Return the same method for the figure as it was opened: all of its data, unchanged."""
+        return Skinning(self.method, self.blend_factor)
+
 
 def deform(
     figure: Figure, pose: Pose | None = None, method: str | Skinning = "lbs"
