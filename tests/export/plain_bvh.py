@@ -14,7 +14,7 @@ class PlainBvh:
     """Names, parents, offsets, channels and frames as written in a file."""
 
     def __init__(self, path: Path) -> None:
-        self.text = path.read_bytes().decode("ascii")
+        self.text = path.read_bytes().decode("utf-8")
         assert "\r" not in self.text and self.text.endswith("\n")
         self.lines = [line.strip() for line in self.text.split("\n")]
         self.names: list[str] = []
@@ -51,9 +51,8 @@ class PlainBvh:
                 self.ends[open_joints[-1]] = self._offset(at + 2)
                 at += 4
             else:
-                keyword, name = re.fullmatch(r"(ROOT|JOINT) ([A-Za-z0-9_]+)", line).groups()
+                keyword, name = re.fullmatch(r"(ROOT|JOINT) ?(.*)", line).groups()
                 assert (keyword == "ROOT") == (not self.names)
-                assert name not in self.names
                 assert self.lines[at + 1] == "{"
                 self.parents.append(open_joints[-1] if open_joints else -1)
                 open_joints.append(len(self.names))

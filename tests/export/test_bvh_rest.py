@@ -23,7 +23,9 @@ from plain_bvh import about
 
 import viewer
 from viewer.export._bvh.angles import euler_angles, unrolled
+from viewer.export._bvh.text import safe_names
 from viewer.export._options import ROTATION_ORDERS
+from viewer.formats import Source, bvh
 from viewer.loading import bundled_body
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import sample_animation
@@ -102,10 +104,42 @@ def test_several_roots_get_a_common_parent(tmp_path: Path) -> None:
     assert notes[1] == "several roots: a common parent joint common_root was added"
 
 
-def test_names_are_made_unique_and_ascii(tmp_path: Path) -> None:
-    skeleton = replace(chain(4), names=("left leg", "", "left leg", "é:x"))
-    found, _ = write(rig_animation(skeleton), tmp_path)
-    assert found.names == ["left_leg", "joint1", "left_leg_2", "e_x"]
+ODD = ("left leg", "", "left leg", "é:x", "mixamorig:Hips", "spine.001", "センター", "a  b")
+
+
+def test_names_are_written_as_they_are(tmp_path: Path) -> None:
+    animation = rig_animation(replace(chain(8), names=ODD))
+    found, notes = write(animation, tmp_path)
+    assert found.names == [*ODD]
+    assert (
+        b"\tJOINT \xe3\x82\xbb\xe3\x83\xb3\xe3\x82\xbf\xe3\x83\xbc\n"
+        in (tmp_path / "out.bvh").read_bytes()
+    )
+    assert bvh.read(Source.open(tmp_path / "out.bvh")).figure.skeleton.names == ODD
+    # Colons and full stops are read by all programs.
+    assert notes[1] == (
+        "some programs cannot read 5 joint names, because of spaces or characters outside ASCII, "
+        "or because they are empty or repeated: left leg, , é:x, センター, a  b; --safe-names "
+        "changes them"
+    )
+    # Repeated names do not confuse the comparison with the motion, which finds no error.
+    assert len(notes) == 2
+
+
+def test_safe_names_are_unique_and_ascii_and_each_change_is_said(tmp_path: Path) -> None:
+    animation = rig_animation(replace(chain(8), names=ODD))
+    found, notes = write(animation, tmp_path, safe_names=True)
+    assert found.names == ["left_leg", "joint1", "left_leg_2", "e_x", "mixamorig_Hips",
+                           "spine_001", "joint6", "a__b"]  # fmt: skip
+    assert notes[1].startswith("8 joint names changed: left leg to left_leg, ")
+    assert "センター to joint6" in notes[1]
+
+
+def test_names_that_the_format_cannot_hold_are_changed_and_said(tmp_path: Path) -> None:
+    names = ("a{b}", "c\nd", " e ", "offset 3", "f\ud800")
+    found, notes = write(rig_animation(replace(chain(5), names=names)), tmp_path)
+    assert found.names == ["a_b_", "c_d", "e", "offset_3", "f_"]
+    assert notes[1].startswith("5 joint names changed: a{b} to a_b_, ")
 
 
 def test_lengths_of_a_figure_without_a_unit_are_unscaled(tmp_path: Path) -> None:
@@ -179,3 +213,24 @@ def test_gimbal_locked_frame_keeps_the_previous_angles() -> None:
 
 def test_all_rotation_orders_are_supported() -> None:
     assert sorted(ROTATION_ORDERS) == sorted("".join(p) for p in itertools.permutations("xyz"))
+
+
+def test_repeated_empty_and_foreign_names_become_safe() -> None:
+    names = ["hip", "hip", "hip_2", "", "left knee", "Zähler", "日本", "a:b", "a_b"]
+    expected = ("hip", "hip_3", "hip_2", "joint3", "left_knee", "Zahler", "joint6", "a_b_2", "a_b")
+    assert safe_names(names) == expected
+
+
+@given(st.lists(st.text(max_size=6) | st.sampled_from(["a", "a_2", "a_3", "joint1"]), max_size=12))
+def test_safe_names_of_arbitrary_names_are_valid_and_unique(names: list[str]) -> None:
+    found = safe_names(names)
+    assert len(set(found)) == len(names)
+    assert all(name and set(name) <= set(PLAIN) for name in found)
+    assert safe_names(found) == found
+    first = {name: index for index, name in reversed(list(enumerate(names)))}
+    for index, (old, new) in enumerate(zip(names, found, strict=True)):
+        if old and set(old) <= set(PLAIN) and old.strip("_") and first[old] == index:
+            assert new == old
+
+
+PLAIN = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_"

@@ -83,6 +83,10 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
                           "a.anim", 12),
     "clip alone": ({"a.anim": CLIP}, "F004", "error", "a.anim", None),
     "obj index": ({"a.obj": "v 0 0 0\nf 1 1 2\n"}, "F002", "error", "a.obj", 2),
+    "bvh frame rate": ({"a.bvh": bvh_text.GOOD.replace("0.0333333", "25")}, "C017", "warning",
+                       "a.bvh", None),
+    "second offset": ({"a.bvh": bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 0 0 1 2 3")}, "F006",
+                      "warning", "a.bvh", 8),
     "bvh number": ({"a.bvh": bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 nan 0.0")}, "F003",
                    "error", "a.bvh", 8),
 }  # fmt: skip

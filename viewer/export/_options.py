@@ -66,6 +66,8 @@ class MotionOptions:
         Put the rest pose before the first frame.
     digits : int
         Decimals of text formats.
+    safe_names : bool
+        Write the names of joints with letters, digits and underscores only, each name once.
     world_up : "y", "z", "-y" or "-z"
         The up axis of the animation's world; negative axes are only for exporters that keep that
         world.
@@ -82,6 +84,7 @@ class MotionOptions:
     gaps: str = ""
     rest_frame: bool = False
     digits: int = 6
+    safe_names: bool = False
     world_up: str = "y"
     skinning: Skinning = field(default_factory=Skinning)
     optimizes: bool = False

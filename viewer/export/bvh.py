@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,7 +15,7 @@ from viewer.export._bvh.angles import unrolled
 from viewer.export._bvh.body import Body, Space, body_of, rest_matrices, shape_at
 from viewer.export._bvh.ends import end_offsets
 from viewer.export._bvh.reading import BvhFile, read_back
-from viewer.export._bvh.text import frame_texts, head_text
+from viewer.export._bvh.text import frame_texts, head_text, held_names, odd_names, safe_names
 from viewer.export._gaps import filled, frames_phrase, gaps_note, runs
 from viewer.export._left_out import joint_scales_note
 from viewer.export._losses.between import resampling_losses
@@ -25,9 +26,9 @@ from viewer.formats import Source, all_or_none, bvh, save_bytes
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.rotation import axis_rotations
+from viewer.rig.hierarchy import depth_first
 from viewer.rig.motion.evaluation import Frames, rest_translations_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
-from viewer.rig.retargeting.joint_names import plain_names
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import joint_label
 from viewer.rig.units import METRES, UNIT_NAMES
@@ -110,7 +111,7 @@ def export_animation(
             save_bytes(file, text)
     notes = [writer.summary(file, *span) for file, span in zip(paths, spans, strict=True)]
     lost += resampling_losses(path, animation, options.skinning)
-    return notes + lost + remarks(animation, figure, body, reference, options)
+    return notes + lost + remarks(writer, reference)
 
 
 def check_options(options: MotionOptions) -> None:
@@ -212,7 +213,14 @@ class Writer:
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the joints in the file."""
-        return plain_names(self.figure.require_skeleton().names)
+        names = self.figure.require_skeleton().names
+        return safe_names(names) if self.options.safe_names else held_names(names)
+
+    @property
+    def order(self) -> Ints:
+        """Place of each joint of the animation's figure among the joints of the file: (J,)."""
+        place = np.argsort(depth_first(self.parents)).astype(np.int32)
+        return place[-self.animation.figure.require_skeleton().n_joints :]
 
     @property
     def parents(self) -> Ints:
@@ -251,9 +259,8 @@ class Writer:
     ) -> list[Diagnostic]:
         """Read a file's text back, and return notes about its differences from the motion."""
         animation, how = self.animation, self.options.skinning
-        names = self.names[-animation.figure.require_skeleton().n_joints :]
         ahead = int(self.options.rest_frame) - span[0]
-        file = BvhFile(bvh.read(Source(path, text)), names, self.space, reference, ahead)
+        file = BvhFile(bvh.read(Source(path, text)), self.order, self.space, reference, ahead)
         written = read_back(file, animation.figure, animation.frames, how)
         shape = shape_at(animation.frames, reference)[0]
         return driven_losses(path, animation, written, how, span, shape)
@@ -275,18 +282,18 @@ class Writer:
         return Diagnostic("X001.bvh", path, values=values)
 
 
-def remarks(
-    animation: SampledAnimation, figure: Figure, body: Body, reference: int, options: MotionOptions
-) -> list[Diagnostic]:
+def remarks(writer: Writer, reference: int) -> list[Diagnostic]:
     """Return notes about changed or omitted data."""
+    animation, figure, options = writer.animation, writer.figure, writer.options
     frames, notes = animation.frames, list[Diagnostic]()
     skeleton = figure.require_skeleton()
     if figure is not animation.figure:
         notes.append(Diagnostic("X005.common-root", values={"joint": skeleton.names[0]}))
+    notes += _names_notes(skeleton.names, writer.names)
     notes += gaps_note(frames.present, animation.first_frame, options.closing)
     if figure.unit not in METRES and options.unit:
         notes.append(Diagnostic("X005.unit-unknown", values={"figure": figure.name}))
-    moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(body.moves)]
+    moving = [joint_label(skeleton, int(joint)) for joint in np.flatnonzero(writer.body.moves)]
     if moving:
         values = {"n": len(moving), "names": moving}
         notes.append(Diagnostic("X005.position-channels", values=values))
@@ -299,4 +306,20 @@ def remarks(
         low, high, first_scale = map(float, (scales.min(), scales.max(), scales[0]))
         sizes = {"low": low, "high": high, "first": first_scale}
         notes.append(Diagnostic("X005.scale-changes", values=sizes))
+    return notes
+
+
+def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnostic]:
+    """Return notes about names that were changed, and about those that few programs read."""
+    notes = []
+    pairs = [
+        Phrase("renamed", old=old, new=new)
+        for old, new in zip(names, written, strict=True)
+        if old != new
+    ]
+    if pairs:
+        notes.append(Diagnostic("X005.joints-renamed", values={"n": len(pairs), "pairs": pairs}))
+    odd = odd_names(written)
+    if odd:
+        notes.append(Diagnostic("X005.odd-names", values={"n": len(odd), "names": odd}))
     return notes

@@ -80,7 +80,8 @@ def read(source: Source) -> SkeletonMotion:
         source.path.stem,
         Timing(rate, np.arange(len(motion.values), dtype=np.int32)),
         rotations_of(table, motion.values),
-        translations_of(source, table, motion.values),
+        # Position channels replace the OFFSETs, so zeros would not be the rest pose.
+        translations_of(source, table, motion.values) if motion.has_frames else None,
     )
     return skeleton_motion(table, clip)
 

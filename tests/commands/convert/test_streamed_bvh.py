@@ -90,6 +90,7 @@ OPTIONS = (
     "--rest-frame --digits 2",
     "--up z --unit in",
     "--up -y --fps 25",
+    "--safe-names",
     "--frames 95:207",
     "--frames 250: --as bvh --gaps hold",
 )
@@ -102,6 +103,18 @@ def test_options_produce_the_same_file_and_notes(streamed, options):
     frames = {"--frames 95:207": 112, "--rest-frame --digits 2": 301}.get(options)
     frames = 50 if options.startswith("--frames 250") else frames or FRAMES
     assert f"Frames: {frames}\n".encode() in written
+
+
+def test_names_are_those_that_were_read(streamed):
+    names = ("mixamorig:Hips", "spine.001", "センター", "left  leg", "part 0-4")
+    text = motion()
+    for joint, name in enumerate(names):
+        text = text.replace(f"part 0-{joint}", name)
+    written, _, _, code = streamed(text)
+    lines = [
+        line.strip() for line in written.decode().split("\n") if "ROOT" in line or "JOINT" in line
+    ]
+    assert (code, lines) == (0, [f"ROOT {names[0]}", *(f"JOINT {name}" for name in names[1:])])
 
 
 @pytest.mark.parametrize("options", ("", "--rest-frame", "--frames 1:299", "--unit cm"))

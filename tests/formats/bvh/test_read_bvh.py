@@ -151,8 +151,50 @@ def test_quirks_load_without_warnings(text: str) -> None:
 def test_names_may_be_repeated_missing_or_contain_spaces() -> None:
     text = GOOD.replace("LeftUpLeg", "arm").replace("LeftFoot", "arm").replace("Head", "")
     motion, warnings = read(text.replace("Hips", "my  hips é"))
-    assert motion.figure.skeleton.names == ("my hips é", "arm", "arm", "")
+    assert motion.figure.skeleton.names == ("my  hips é", "arm", "arm", "")
     assert warnings == []
+
+
+def test_a_name_that_continues_on_the_next_line_is_joined_by_a_space() -> None:
+    assert read(GOOD.replace("Hips", "my\n hips"))[0].figure.skeleton.names[0] == "my hips"
+
+
+@pytest.mark.parametrize("time, rate, key", [
+    ("25", 25.0, "C017.bvh-rate"),
+    ("29.97", 30000 / 1001, "C017.bvh-rate"),
+    ("120.0", 120.0, "C017.bvh-rate"),
+    ("33.3333", 30.0, "C017.bvh-milliseconds"),
+    ("8.33333", 120.0, "C017.bvh-milliseconds"),
+])  # fmt: skip
+def test_rates_and_milliseconds_in_place_of_a_frame_time_are_understood(time, rate, key) -> None:
+    motion, warnings = read(GOOD.replace("0.0333333", time))
+    assert motion.clip.timing.frame_rate == pytest.approx(rate, rel=1e-12 if rate > 30 else 1e-4)
+    assert warnings == [
+        (key, None, {"found": time.encode(), "rate": motion.clip.timing.frame_rate})
+    ]
+
+
+@pytest.mark.parametrize("time", ["1", "2.5", "10.000000000"])
+def test_slow_frame_times_are_seconds(time) -> None:
+    motion, warnings = read(GOOD.replace("0.0333333", time))
+    assert (motion.clip.timing.frame_rate, warnings) == (pytest.approx(1.0 / float(time)), [])
+
+
+def test_the_second_offset_of_soma_is_ignored_and_said() -> None:
+    doubled = GOOD.replace("OFFSET 0.1 0.0 0.0", "OFFSET 0.1 0.0 0.0 7 8 9")
+    doubled = doubled.replace("OFFSET 0.0 -0.9 0.0", "OFFSET 0.0 -0.9 0.0 7 8 9")
+    motion, warnings = read(doubled)
+    np.testing.assert_array_equal(motion.figure.skeleton.rest_translations[1:3],
+                                  [[0.1, 0, 0], [0, -0.9, 0]])  # fmt: skip
+    values = {"n": 2, "joint": Phrase("joint", name="LeftUpLeg")}
+    assert warnings == [("F006.bvh-offset", 8, values)]
+
+
+@pytest.mark.parametrize("frames", ["", "MOTION\nFrames: 0\nFrame Time: 0.04\n"])
+def test_the_offset_of_the_root_places_a_skeleton_without_frames(frames: str) -> None:
+    text = GOOD.replace("OFFSET 0.0 0.0 0.0", "OFFSET 5 90 3", 1).partition("MOTION")[0]
+    places = worlds(read(text + frames)[0])[..., :3, 3]
+    np.testing.assert_allclose(places[0, :3], [[5, 90, 3], [5.1, 90, 3], [5.1, 89.1, 3]])
 
 
 def test_several_roots_are_read() -> None:

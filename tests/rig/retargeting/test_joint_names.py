@@ -1,4 +1,4 @@
-"""Recognition of the joint names of many programs, and plain ASCII names."""
+"""Recognition of the joint names of many programs."""
 
 from __future__ import annotations
 
@@ -6,11 +6,9 @@ import time
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from rig.retargeting.joint_tables import TABLES
 
-from viewer.rig.retargeting.joint_names import canonical_names, plain_names
+from viewer.rig.retargeting.joint_names import canonical_names
 from viewer.rig.smpl_family import FAMILY
 
 
@@ -74,24 +72,3 @@ def test_huge_skeletons_are_not_bodies() -> None:
     deep = canonical_names(["spine", "LeftArm", "RightArm"] * 600, np.arange(1800) - 1)
     assert "spine1" in deep
     assert time.process_time() - start < 2.0
-
-
-def test_plain_names_are_unique_and_ascii() -> None:
-    names = ["hip", "hip", "hip_2", "", "left knee", "Zähler", "日本", "a:b", "a_b"]
-    expected = ("hip", "hip_3", "hip_2", "joint3", "left_knee", "Zahler", "joint6", "a_b_2", "a_b")
-    assert plain_names(names) == expected
-
-
-@given(st.lists(st.text(max_size=6) | st.sampled_from(["a", "a_2", "a_3", "joint1"]), max_size=12))
-def test_plain_names_of_arbitrary_names_are_valid_and_unique(names: list[str]) -> None:
-    found = plain_names(names)
-    assert len(set(found)) == len(names)
-    assert all(name and set(name) <= set(PLAIN) for name in found)
-    assert plain_names(found) == found
-    first = {name: index for index, name in reversed(list(enumerate(names)))}
-    for index, (old, new) in enumerate(zip(names, found, strict=True)):
-        if old and set(old) <= set(PLAIN) and old.strip("_") and first[old] == index:
-            assert new == old
-
-
-PLAIN = "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_"

@@ -79,6 +79,12 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
     )
     add_spring_argument(group)
     group.add_argument(
+        "--safe-names",
+        action="store_true",
+        help="BVH: write joint names with letters, digits and underscores only, each name once, "
+        "for programs that cannot read others; changed names are printed",
+    )
+    group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
     )
 
@@ -133,6 +139,7 @@ def motion_options(arguments: argparse.Namespace, skinning: Skinning) -> MotionO
         gaps="interpolate" if arguments.interpolate_gaps else arguments.gaps or "",
         rest_frame=arguments.rest_frame,
         digits=digits,
+        safe_names=arguments.safe_names,
         skinning=skinning,
         optimizes=arguments.optimize,
     )

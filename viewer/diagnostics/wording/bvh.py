@@ -17,6 +17,10 @@ MESSAGES = {
     "F007.bvh-no-time": "missing Frame Time: {rate:g} fps assumed",
     "F007.bvh-time": "Frame Time: expected {low:g} to {high:,.0f} seconds, found {seconds:g}; "
     "{rate:g} fps assumed",
+    "C017.bvh-rate": "Frame Time: expected seconds, found {found:word}, which looks like a frame "
+    "rate; {rate:g} fps assumed (--fps overrides it)",
+    "C017.bvh-milliseconds": "Frame Time: expected seconds, found {found:word}, which looks like "
+    "milliseconds; {rate:g} fps assumed (--fps overrides it)",
     "F007.bvh-positions": "position channels are 0 except at the root: interpreted as relative to "
     "OFFSET",
 }

@@ -27,6 +27,7 @@ CODES = {
         "floating feet",
         "lower the motion (--ground); none if the person stands on something",
     ),
+    "C017": Code("warning", "implausible frame time", "write seconds, or set the rate (--fps)"),
 }
 
 MESSAGES = {

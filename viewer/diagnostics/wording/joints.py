@@ -31,6 +31,8 @@ MESSAGES = {
     "again",
     "F002.bvh-channel-count": "{item}: expected {expected:#channel name}, found {found}",
     "F007.bvh-no-offset": "{joint} has no OFFSET: 0 0 0 assumed",
+    "F006.bvh-offset": "OFFSET: expected 3 numbers, found 6 in {n:#joint} (first: {joint}); the "
+    "last 3 are ignored",
     "F006.bvh-end-channels": "ignored CHANNELS in {joint}",
 }
 

@@ -11,7 +11,6 @@ skinned with LBS, with pose correctives from the file's rotations.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -27,7 +26,7 @@ from viewer.export._losses.skinned import (
     figure_side,
     linear_as_opened,
 )
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import (
     Frames,
@@ -52,8 +51,8 @@ class BvhFile:
     ----------
     motion : SkeletonMotion
         Contents, or some of the frames.
-    names : sequence of J str
-        Names of the figure's joints in the file.
+    order : (J,)
+        Place of each of the figure's joints among the joints of the file.
     space : Space
         Transform from the figure's space to the file's.
     reference : int
@@ -63,7 +62,7 @@ class BvhFile:
     """
 
     motion: SkeletonMotion
-    names: Sequence[str]
+    order: Ints
     space: Space
     reference: int
     ahead: int
@@ -80,9 +79,8 @@ def read_back(file: BvhFile, figure: Figure, frames: Frames, how: Skinning) -> S
     """
     space = file.space
     motion = file.motion
-    skeleton, clip = motion.figure.require_skeleton(), motion.clip
-    numbers = {name: joint for joint, name in enumerate(skeleton.names)}
-    order = [numbers[name] for name in file.names]
+    clip = motion.clip
+    order = file.order
     weights = frames.shape_weights
     still = weights[min(file.reference, len(weights) - 1)]
     scale = float(frames.figure_scales[file.reference])

@@ -93,7 +93,7 @@ def export_parts(animation: Parts, path: Path, options: MotionOptions) -> list[D
     first, writer = stream.first, stream.writer
     lost = stream.losses.notes(path, first.figure, first.first_frame)
     notes = [writer.summary(path, 0, animation.n_frames), *lost]
-    return notes + remarks(first, writer.figure, writer.body, 0, options)
+    return notes + remarks(writer, 0)
 
 
 class _Stream:
@@ -113,7 +113,6 @@ class _Stream:
         body = Body(offsets, empty, empty, moves)
         ends = ends_of(self.first, figure, space, 0)
         self.writer = Writer(self.first, figure, body, ends, space, options)
-        self._names = self.writer.names[-self.first.figure.require_skeleton().n_joints :]
         self._read: SkeletonMotion | None = None  # joints read back from the file
         self.losses = JointLosses(options.skinning, animation.n_frames)
 
@@ -161,9 +160,8 @@ class _Stream:
         clip = clip_of(table, values, part.name, part.frame_rate)
         if self._read is None:
             self._read = bvh.skeleton_motion(table, clip)
-        names = self.writer.names[-part.figure.require_skeleton().n_joints :]
         motion = replace(self._read, clip=clip)
-        file = BvhFile(motion, names, self.writer.space, 0, 0)
+        file = BvhFile(motion, self.writer.order, self.writer.space, 0, 0)
         times = np.arange(part.frames.n_frames) / part.frame_rate
         frames = replace(part.frames, times=times)
         written = read_back(file, part.figure, frames, self._options.skinning)

@@ -1,11 +1,15 @@
 """Text of a BVH file, in the subset that all known readers accept.
 
 One item per line and "{" alone on its line (Blender counts lines), one ROOT, six channels on it and
-three on the others, positions first, the same rotation order everywhere, no exponents, LF.
+three on the others, positions first, the same rotation order everywhere, no exponents, LF. Names
+are UTF-8: see ``held_names`` and ``safe_names``.
 """
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,9 +20,66 @@ from viewer.progress import report
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.hierarchy import depth_first
 
+_SPACES = " \t\n\r\v\f"  # white space of the format
+# Lone surrogates, except those that stand for bytes which are not UTF-8, are not text.
+_NOT_HELD = re.compile("[{}\n\r\v\f\ud800-\udc7f\udd00-\udfff]")
+_ITEM = re.compile(r"((?:^|[ \t])(?:OFFSET|CHANNELS))[ \t]+(?=[-+.\d])", re.IGNORECASE)
+_SPACE = re.compile(r"\s")
 _DEEPEST = 32  # maximum indentation in tabs
 _BLOCK = 256  # number of frames formatted together
 _SECONDS_DIGITS = 9  # minimum decimals of the frame time, for a relative error below 1e-8
+
+
+def held_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names with everything replaced that the format cannot hold; others are unchanged.
+
+    It cannot hold braces, line ends, spaces at either end, a keyword followed by a number (which
+    begins an item), and characters that are not text.
+
+    >>> held_names(["mixamorig:Hips", "left {leg}", " a"])
+    ('mixamorig:Hips', 'left _leg_', 'a')
+    """
+    kept = [_NOT_HELD.sub("_", name.strip(_SPACES)) for name in names]
+    return tuple(_ITEM.sub(r"\1_", name) for name in kept)
+
+
+def safe_names(names: Sequence[str]) -> tuple[str, ...]:
+    """Return names that every program can read: unique, and consisting only of ``[A-Za-z0-9_]``.
+
+    Names that were valid are unchanged.
+
+    >>> safe_names(["hip", "hip", "", "left knee", "é"])
+    ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
+    """
+    bare = []
+    for index, name in enumerate(names):
+        letters = unicodedata.normalize("NFKD", name)
+        letters = "".join(letter for letter in letters if not unicodedata.combining(letter))
+        text = re.sub(r"[^A-Za-z0-9_]", "_", letters)
+        bare.append(text if text.strip("_") else f"joint{index}")
+    # Valid names are reserved first, so that they stay unchanged wherever they occur.
+    taken = {text for text, name in zip(bare, names, strict=True) if text == name}
+    result: list[str] = []
+    used: set[str] = set()
+    numbers: Counter[str] = Counter()
+    for text, name in zip(bare, names, strict=True):
+        chosen = text
+        while chosen in used or (chosen in taken and chosen != name):
+            numbers[text] += 1
+            chosen = f"{text}_{numbers[text] + 1}"
+        used.add(chosen)
+        result.append(chosen)
+    return tuple(result)
+
+
+def odd_names(names: Sequence[str]) -> list[str]:
+    """Return the names that some programs cannot read: empty, repeated, with spaces, not ASCII."""
+    counts = Counter(names)
+    return [
+        name
+        for name, count in counts.items()
+        if count > 1 or not name or not name.isascii() or _SPACE.search(name)
+    ]
 
 
 def head_text(
@@ -34,7 +95,7 @@ def head_text(
 ) -> bytes:
     """Return the text of a file before its frames.
 
-    ``names``: unique names of letters, digits and underscores.
+    ``names``: names that the format can hold, see ``held_names``.
     ``parents`` (J,): parent indices; the first joint is the only root.
     ``offsets`` (J, 3): offsets from the parent; the root's offset is written as 0.
     ``ends``: offset of the End Site of every joint without children.
@@ -49,7 +110,7 @@ def head_text(
     seconds = 1.0 / rate
     decimals = max(_SECONDS_DIGITS, _SECONDS_DIGITS - 1 - int(np.floor(np.log10(seconds))))
     lines += ["MOTION", f"Frames: {n_frames}", f"Frame Time: {seconds:.{decimals}f}"]
-    return ("\n".join(lines) + "\n").encode("ascii")
+    return ("\n".join(lines) + "\n").encode("utf-8", "surrogateescape")
 
 
 def frame_texts(
@@ -100,7 +161,7 @@ def _hierarchy(
         parent = int(parents[joint])
         close(parent)
         depth = len(open_joints)
-        put(depth, f"{'ROOT' if parent < 0 else 'JOINT'} {names[joint]}")
+        put(depth, f"{'ROOT' if parent < 0 else 'JOINT'} {names[joint]}".rstrip(" "))
         put(depth, "{")
         put(depth + 1, f"OFFSET {_vector(offsets[joint] if parent >= 0 else np.zeros(3), digits)}")
         has_positions = parent < 0 or moves[joint]

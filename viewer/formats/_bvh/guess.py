@@ -27,6 +27,8 @@ _RATES = (
     *(180.0, 200.0, 240.0, 250.0, 300.0, 480.0, 500.0, 1000.0),
     *(24000 / 1001, 30000 / 1001, 60000 / 1001, 120000 / 1001),
 )
+_LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
+_DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
 _UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
 _LOOKS = 16  # number of frames to examine
@@ -37,7 +39,8 @@ _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
 def frame_rate(source: Source, frame_time: bytes | None) -> float:
     """Return the standard frame rate whose rounded frame time is the one in the file.
 
-    ``0.0333333`` is 30 per second, ``0.033367`` is 30000/1001, ``0.1`` is 10.
+    ``0.0333333`` is 30 per second, ``0.033367`` is 30000/1001, ``0.1`` is 10. ``25`` is taken for a
+    rate, and ``33.3333`` for milliseconds, with a warning.
     """
     if frame_time is None:
         source.warn("F007.bvh-no-time", rate=DEFAULT_RATE)
@@ -47,14 +50,32 @@ def frame_rate(source: Source, frame_time: bytes | None) -> float:
         low, high = 1.0 / FASTEST, 1.0 / SLOWEST
         source.warn("F007.bvh-time", seconds=seconds, low=low, high=high, rate=DEFAULT_RATE)
         return DEFAULT_RATE
+    is_own = len(frame_time.partition(b".")[2]) >= _DECIMALS
+    if _LONGEST <= seconds <= max(_RATES) and not is_own:
+        return _mistaken_rate(source, frame_time, seconds)
+    return _nearest_rate(frame_time, seconds, 1.0 / seconds)
+
+
+def _mistaken_rate(source: Source, frame_time: bytes, seconds: float) -> float:
+    """Return the frame rate of a file whose frame time cannot be in seconds, and warn."""
+    is_standard = _nearest_rate(frame_time, seconds, seconds) in _RATES
+    in_milliseconds = _nearest_rate(frame_time, seconds, 1000.0 / seconds)
+    if is_standard or seconds.is_integer() or in_milliseconds not in _RATES:
+        source.warn("C017.bvh-rate", found=frame_time, rate=seconds)
+        return seconds
+    source.warn("C017.bvh-milliseconds", found=frame_time, rate=in_milliseconds)
+    return in_milliseconds
+
+
+def _nearest_rate(frame_time: bytes, seconds: float, exact: float) -> float:
+    """Return the standard rate from which an exact rate differs only by rounding, or the latter."""
     digits = frame_time.lower().partition(b"e")[0].rstrip(b"f").replace(b".", b"").lstrip(b"+0")
-    exact = 1.0 / seconds
     if len(digits) < 2:
         return float(round(exact)) if abs(exact - round(exact)) < 1e-9 * exact else exact
     # Half a unit of the last digit written, relative to the frame time.
     rounding = 0.5 / float(digits)
     nearest = min((*_RATES, float(max(round(exact), 1))), key=lambda rate: abs(rate - exact))
-    return nearest if abs(nearest * seconds - 1.0) <= rounding * (1.0 + 1e-9) else exact
+    return nearest if abs(nearest / exact - 1.0) <= rounding * (1.0 + 1e-9) else exact
 
 
 def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:

@@ -79,6 +79,7 @@ class _Parser:
         self.open: list[int] = []
         self.n_joints = 0  # number of joints in ``found``; the other entries are End Sites
         self.extra_braces = 0
+        self.doubled: list[tuple[int, int, BvhJoint]] = []  # joints whose OFFSET has 6 numbers
 
     def hierarchy(self) -> Hierarchy:
         """Return the joints and the offset of the motion."""
@@ -94,6 +95,17 @@ class _Parser:
             raise self._fault("F002.bvh-no-root")
         if self.extra_braces:
             self.source.warn("F006.extra-braces", n=self.extra_braces)
+        if self.doubled:
+            start, _, first = self.doubled[0]
+            places = [place for _, place, joint in self.doubled if not joint.is_end]
+            self.source.warn(
+                "F006.bvh-offset",
+                start,
+                part="joints",
+                places=places,
+                n=len(self.doubled),
+                joint=called(first),
+            )
         return Hierarchy(self.found, -1 if self.word is None else self.word.end())
 
     def _item(self) -> None:
@@ -126,14 +138,14 @@ class _Parser:
         self._advance()
         if keyword == b"END" and self.keyword == b"SITE":
             self._advance()
-        name: list[str] = []
+        words: list[Word] = []
         while self.word is not None and self.word.group() not in (b"{", b"}"):
             if self._begins_item():
                 break
-            name.append(self.word.group().decode("utf-8", "surrogateescape"))
+            words.append(self.word)
             self._advance()
         parent = self.open[-1] if self.open else -1
-        joint = BvhJoint(" ".join(name), parent, start, is_end)
+        joint = BvhJoint(self._name(words), parent, start, is_end)
         if is_end:
             joint.name = self.found[parent].name
         if self.word is None or self.word.group() != b"{":
@@ -143,6 +155,13 @@ class _Parser:
         self.found.append(joint)
         self.n_joints += not is_end
         self._advance()
+
+    def _name(self, words: list[Word]) -> str:
+        """Return a name as written, with the spaces between its words unless lines end there."""
+        text = self.source.data[words[0].start() : words[-1].end()] if words else b""
+        if set(text) & set(b"\n\r\v\f"):
+            text = b" ".join(word.group() for word in words)
+        return text.decode("utf-8", "surrogateescape")
 
     def _begins_item(self) -> bool:
         """Return whether a keyword and its number follow a name whose "{" is missing."""
@@ -173,18 +192,29 @@ class _Parser:
                 return
             values.append(value)
             self._advance()
-        if self.word is not None and to_number(self.word.group()) is not None:
-            self._refuse_offset(joint, keyword, 3)
+        extra: list[Word] = []
+        while self.word is not None and to_number(self.word.group()) is not None:
+            extra.append(self.word)
+            self._advance()
+        if extra and len(extra) != 3:
+            self._refuse_offset(joint, keyword, extra)
+            return
         joint.offset = values
+        if extra:  # SOMA writes two offsets, of which the first is the usual one
+            self.doubled.append((keyword.start(), self.n_joints - 1, joint))
 
-    def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int) -> None:
-        """Record an error in an OFFSET with a wrong number of values, and skip it."""
+    def _refuse_offset(self, joint: BvhJoint, keyword: Word, found: int | list[Word]) -> None:
+        """Record an error in an OFFSET with a wrong number of values, and skip it.
+
+        ``found``: the number of values if there are too few, otherwise the additional words.
+        """
         refuse, word = self.source.refuse, self._found()
         places = None if joint.is_end else [self.n_joints - 1]
         item = Phrase("of", item="OFFSET", owner=called(joint))
         here = keyword.start() if self.word is None else self.word.start()
-        if found == 3:
-            refuse("F002.more", here, 1, "joints", places, item=item, expected=3, found=word)
+        if isinstance(found, list):
+            more = {"expected": 3, "found": found[0].group()}
+            refuse("F002.more", found[0].start(), 1, "joints", places, item=item, **more)
         elif word is None or self.keyword in (b"{", b"}", *_ITEMS):
             start = keyword.start()
             refuse("F002.width", start, 1, "joints", places, item=item, expected=3, found=found)

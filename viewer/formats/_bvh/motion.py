@@ -35,10 +35,13 @@ class Motion:
         One column per channel: lengths and degrees.
     frame_time : bytes or None
         Seconds between frames as written; None if missing.
+    has_frames : bool
+        False for the rest pose of a file without frames.
     """
 
     values: Floats
     frame_time: bytes | None
+    has_frames: bool = True
 
 
 def read_motion(source: Source, start: int, n_channels: int) -> Motion:
@@ -56,7 +59,7 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     Returns
     -------
     Motion
-        Motion with at least one frame: zeros (the rest pose) if the file has none.
+        Motion with at least one frame: zeros if the file has none.
 
     Raises
     ------
@@ -72,7 +75,8 @@ def read_motion(source: Source, start: int, n_channels: int) -> Motion:
     if n_channels == 0:
         source.warn("F007.bvh-no-channels", start)
         return _rest(0, time)
-    return Motion(_rows(source, start, n_channels, declared), time)
+    rows = _rows(source, start, n_channels, declared)
+    return Motion(rows, time) if len(rows) else _rest(n_channels, time)
 
 
 def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int]:
@@ -90,7 +94,7 @@ def read_head(source: Source, start: int) -> tuple[int | None, bytes | None, int
 
 
 def _rest(n_channels: int, time: bytes | None) -> Motion:
-    return Motion(np.zeros((1, n_channels)), time)
+    return Motion(np.zeros((1, n_channels)), time, has_frames=False)
 
 
 def _count(source: Source, match: re.Match[bytes]) -> int:
@@ -128,7 +132,6 @@ def _rows(source: Source, start: int, width: int, declared: int | None) -> Float
         _warn_of_difference(source, width, declared, whole, rest)
     if whole == 0:
         source.warn("F007.bvh-empty", start)
-        return _rest(width, None).values
     return values[: whole * width].reshape(whole, width)
 
 

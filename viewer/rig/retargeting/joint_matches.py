@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
+from collections import Counter
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -11,7 +14,7 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Ints
 from viewer.rig.retargeting.joint_map import UNMAPPED, JointMap, map_from_pairs, mapped_partners
-from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place, plain_names
+from viewer.rig.retargeting.joint_names import joint_meanings, joints_by_place
 from viewer.rig.skeleton import Skeleton, joint_labels
 
 __all__ = ["Matches", "match_joints"]
@@ -76,7 +79,7 @@ def match_joints(
     RigError
         If too few joints match, or the mapping names a missing joint or lists a joint twice.
     """
-    plain = _lower(source.names), _lower(target.names)
+    plain = _comparable(source.names), _comparable(target.names)
     meanings = joint_meanings(source), joint_meanings(target)
     own = _automatic(source, target, plain, meanings)
     partners, is_mapped = own, np.zeros(target.n_joints, dtype=bool)
@@ -132,8 +135,20 @@ def _origins(source: Skeleton, target: Skeleton, partners: Ints, meanings: _Name
     return origins
 
 
-def _lower(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name.lower() for name in plain_names(names))
+def _comparable(names: Sequence[str]) -> tuple[str, ...]:
+    """Return unique names in which case, symbols and the width of letters do not matter.
+
+    >>> _comparable(["Left Leg", "left_leg", ""])
+    ('left_leg', 'left_leg#2', '#1')
+    """
+    counts: Counter[str] = Counter()
+    found = []
+    for name in names:
+        text = re.sub(r"\W", "_", unicodedata.normalize("NFKC", name).casefold())
+        text = text if text.strip("_") else ""
+        counts[text] += 1
+        found.append(text if text and counts[text] == 1 else f"{text}#{counts[text]}")
+    return tuple(found)
 
 
 def _has_same_hierarchy(source: Skeleton, target: Skeleton, plain: _Names) -> bool:
@@ -151,7 +166,8 @@ def _match_equal(partners: Ints, names: _Names, meanings: _Names | None) -> None
     known = {
         name: joint
         for joint, name in enumerate(names[0])
-        if name and joint not in used and not (meanings and meanings[0][joint])
+        # Unnamed joints are "#1", "#2" …, and have nothing in common.
+        if name[:1] not in ("", "#") and joint not in used and not (meanings and meanings[0][joint])
     }
     for joint, name in enumerate(names[1]):
         is_open = partners[joint] == UNMAPPED and not (meanings and meanings[1][joint])

@@ -11,7 +11,6 @@ programs make all names unique (``LeftArm_07``) are removed.
 from __future__ import annotations
 
 import re
-import unicodedata
 from collections import Counter
 from collections.abc import Sequence
 from functools import lru_cache
@@ -20,7 +19,7 @@ from viewer.rig.arrays import Ints
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES, Humanoid
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["canonical_names", "joint_meanings", "joints_by_place", "plain_names", "sided_words"]
+__all__ = ["canonical_names", "joint_meanings", "joints_by_place", "sided_words"]
 
 _WORDS = {
     "pelvis": "pelvis hips",
@@ -67,43 +66,6 @@ _SPINES = ("spine1", "spine2", "spine3")
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
 
 _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
-
-
-def plain_names(names: Sequence[str]) -> tuple[str, ...]:
-    """Return names that every program can read: unique, and consisting only of ``[A-Za-z0-9_]``.
-
-    Parameters
-    ----------
-    names : sequence of J str
-        Names, which may repeat, be empty, or contain any characters.
-
-    Returns
-    -------
-    tuple of J str
-        Valid names; those that were valid are unchanged.
-
-    >>> plain_names(["hip", "hip", "", "left knee", "é"])
-    ('hip', 'hip_2', 'joint2', 'left_knee', 'e')
-    """
-    bare = []
-    for index, name in enumerate(names):
-        letters = unicodedata.normalize("NFKD", name)
-        letters = "".join(letter for letter in letters if not unicodedata.combining(letter))
-        text = re.sub(r"[^A-Za-z0-9_]", "_", letters)
-        bare.append(text if text.strip("_") else f"joint{index}")
-    # Valid names are reserved first, so that they stay unchanged wherever they occur.
-    taken = {text for text, name in zip(bare, names, strict=True) if text == name}
-    result: list[str] = []
-    used: set[str] = set()
-    numbers: Counter[str] = Counter()
-    for text, name in zip(bare, names, strict=True):
-        chosen = text
-        while chosen in used or (chosen in taken and chosen != name):
-            numbers[text] += 1
-            chosen = f"{text}_{numbers[text] + 1}"
-        used.add(chosen)
-        result.append(chosen)
-    return tuple(result)
 
 
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
