@@ -60,6 +60,8 @@ class Source:
         detail) for MHR.
     used_options : set of str
         Options that its reader has used.
+    frame_faults : list of Diagnostic
+        The first error in frames of a motion that become gaps, see ``_frame_gaps.py``.
     """
 
     def __init__(
@@ -76,6 +78,7 @@ class Source:
         self.also_read: list[Path] = []
         self.options: dict[str, str] = {}
         self.used_options: set[str] = set()
+        self.frame_faults: list[Diagnostic] = []
         self._opened: dict[Callable[[Source], Any], Any] = {}
         self._data = None if data is None else without_marks(data)
         self._is_stored = data is None  # whether the data can be read again
@@ -162,6 +165,7 @@ class Source:
     def _related(self, path: Path) -> Source:
         source = Source(path, max_size=self.max_size, diagnostics=self.diagnostics)
         source.also_read = self.also_read
+        source.frame_faults = self.frame_faults
         self.also_read.append(path)
         source._offsets = self._offsets
         return source

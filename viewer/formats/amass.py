@@ -20,13 +20,13 @@ import math
 import numpy as np
 
 from viewer.errors import FormatError
-from viewer.formats._archive.checking import archive_of, finite
+from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
+from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
-from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.phrases import printable
-from viewer.rig.arrays import Deferred, Floats, Ints
+from viewer.rig.arrays import Bools, Deferred, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
@@ -122,19 +122,36 @@ def read(source: Source) -> BodyMotion:
     count = len(vectors)
     is_aist = found == "smpl_poses"
     _notice(source, archive)
+    rate, rows = _rate(source, archive, is_aist), _timed_rows(archive, count, found)
+    translations = _translations(source, archive, count, found)
+    shape = _coefficients(source, archive, _SHAPES, count, found)
+    expression = _coefficients(source, archive, _EXPRESSIONS, count, found)
+    tables = (vectors, translations, shape, expression, *hands.values())
+    bad = invalid_rows(*(table for table in tables if table is not None and len(table) == count))
+    is_lost = bad & (rows >= 0)
+    if is_lost.any() and is_lost.sum() == (rows >= 0).sum():
+        raise no_frames(source, int(is_lost.sum()))
+    for note in gap_notes(source, {None: np.flatnonzero(is_lost)}):
+        source.diagnostics.add(note)
+    rows[is_lost] = -1
     return BodyMotion(
         source.path.stem,
-        Timing(_rate(source, archive, is_aist), _timed_rows(archive, count, found)),
+        Timing(rate, rows),
         names,
-        vectors,
-        _translations(source, archive, count, found),
-        shape=_coefficients(source, archive, _SHAPES, count, found),
-        expression=_coefficients(source, archive, _EXPRESSIONS, count, found),
-        hands=hands,
+        held_rows(vectors, bad),
+        held_rows(translations, bad),
+        shape=_held(shape, bad),
+        expression=_held(expression, bad),
+        hands={side: held_rows(table, bad) for side, table in hands.items()},
         flat_hands=_flag(archive, "flat_hand_mean"),
         up=_up(archive, is_aist),
         facts=_facts(archive),
     )
+
+
+def _held(table: Floats | None, bad: Bools) -> Floats | None:
+    """Return coefficients without those of invalid frames; constant ones are unchanged."""
+    return table if table is None or len(table) != len(bad) else held_rows(table, bad)
 
 
 def _refusal(source: Source, archive: Archive) -> FormatError:
@@ -149,7 +166,7 @@ def _refusal(source: Source, archive: Archive) -> FormatError:
 
 
 def _rows(archive: Archive, key: str, count: int | None = None, first: str = "") -> Floats:
-    """Return an array as one finite row per frame: (N, C)."""
+    """Return an array as one row per frame, (N, C); NaN in place of invalid numbers."""
     array = archive.array(key)
     shape = array.shape if len(array.shape) > 1 else (1, *array.shape)
     if count is not None and shape[0] != count:
@@ -159,7 +176,7 @@ def _rows(archive: Archive, key: str, count: int | None = None, first: str = "")
     if not shape[0]:
         raise archive.fault("F002.motion-no-frames", item=key)
     values = array.values().reshape(shape[0], math.prod(shape[1:]))
-    return finite(archive, key, values, "frames" if shape[0] > 1 else "")
+    return (finite_or_nan if shape[0] > 1 else finite)(archive, key, values)
 
 
 def _whole_poses(archive: Archive, key: str) -> tuple[tuple[str, ...], Floats]:
@@ -189,7 +206,9 @@ def _numbers(archive: Archive, key: str) -> Floats:
 
 
 def _are_same(first: Floats, second: Floats) -> bool:
-    return first.shape == second.shape and np.allclose(first, second, rtol=0, atol=_SAME)
+    return first.shape == second.shape and np.allclose(
+        first, second, rtol=0, atol=_SAME, equal_nan=True
+    )
 
 
 def _compare_parts(
@@ -278,22 +297,7 @@ def _translations(source: Source, archive: Archive, count: int, first: str) -> F
         raise archive.fault(
             "F002.motion-scale", item="smpl_scaling", low=low, high=high, found=scale
         )
-    rows = finite(archive, key, rows / scale)
-    is_far = is_beyond(rows)
-    if not is_far.any():
-        return rows
-    frame = int(is_far.argmax())
-    archive.refuse(
-        "F003.motion-reach",
-        item=key,
-        count=int(is_far.sum()),
-        part="frames",
-        places=np.flatnonzero(is_far),
-        limit=FARTHEST,
-        found=float(rows[frame][np.abs(rows[frame]).argmax()]),
-        frame=frame,
-    )
-    return held_rows(rows, is_far)
+    return within_reach(archive, key, finite_or_nan(archive, key, rows / scale))
 
 
 def _coefficients(
@@ -337,7 +341,7 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
     """Return the row of every frame; -1 if the file marks the person as absent."""
     rows: Ints = np.arange(count, dtype=np.int32)
     if archive.has("present"):
-        present = _rows(archive, "present").ravel()
+        present = finite(archive, "present", archive.array("present").values().ravel())
         if len(present) != count:
             raise archive.fault(
                 "F002.motion-present",
@@ -374,7 +378,7 @@ def _text(archive: Archive, key: str) -> str:
 
 def _notice(source: Source, archive: Archive) -> None:
     if archive.has("dmpls"):
-        moved = int(_rows(archive, "dmpls").any(axis=1).sum())
+        moved = int(np.nan_to_num(_rows(archive, "dmpls")).any(axis=1).sum())
         if moved:
             source.warn("F007.motion-tissue", n=moved)
     odd = [key for key in archive.keys if key not in _KNOWN]

@@ -103,8 +103,8 @@ def test_distant_places_of_single_frames_are_refused() -> None:
     given = [{"pose": VECTORS[row].ravel(), "trans": far, "frame": row} for row in range(2)]
     with pytest.raises(FormatError) as caught:
         bodies(given)
-    assert caught.value.diagnostic is not None
-    assert caught.value.diagnostic.key == "F003.motion-reach"
+    assert caught.value.diagnostic.key == "F003.frames-lost"
+    assert caught.value.diagnostic.values["problem"].key == "F003.motion-reach"
 
 
 @pytest.mark.parametrize("key", ["", "track_id", "id"])

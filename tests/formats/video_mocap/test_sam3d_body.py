@@ -181,8 +181,8 @@ def test_folders_of_other_files_are_not_results(tmp_path: Path) -> None:
     [
         ({"pred_cam_t": np.zeros(2)}, "F002.value"),
         ({"pred_vertices": np.zeros((20, 2))}, "F002.value"),
-        ({"pred_vertices": np.full((20, 3), np.inf)}, "F003.finite"),
-        ({"pred_cam_t": np.full(3, 1e20)}, "F003.motion-reach"),
+        ({"shape_params": np.full(45, np.inf)}, "F003.frames-lost"),
+        ({"pred_cam_t": np.full(3, 1e20)}, "F003.frames-lost"),
         ({"pred_global_rots": np.zeros((5, 3, 3))}, "F002.value"),
     ],
 )

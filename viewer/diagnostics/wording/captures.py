@@ -63,6 +63,16 @@ MESSAGES = {
     "F002.camera-data": "expected a list of numbers in brackets, found {found:quoted}",
     "F002.camera-lacks": "{item:text}: expected rows, cols and data, found no {name}",
     "F002.camera-count": "{item:text}: expected {shape:axes} numbers, found {found}",
+    # Frames with invalid numbers, in motions and results of video motion capture
+    "F003.frames-lost": "expected at least one valid frame, found none in {n:#frame}; first error: "
+    "{problem}",
+    "F007.frames-lost": "{n:#frame} with invalid numbers {n:?is a gap|are gaps}: {frames:list}; "
+    "first error: {problem}",
+    "F007.points-lost": "{n:#point} with invalid numbers {n:?is|are} not visible; first error: "
+    "{problem}",
+    "F007.person-lost": "{person} omitted: {n:#frame}, none of them valid; first error: {problem}",
+    "F007.camera-frames": "camera: held during {n:#frame} with invalid numbers ({frames:list}); "
+    "first error: {problem}",
     # Results of video motion capture
     "F002.video-unknown": "expected results of video motion capture, found keys {found:list12}",
     "F002.video-people": "expected at least one person in results of {tool}, found none",
@@ -103,6 +113,7 @@ MESSAGES = {
 }
 
 PHRASES = {
+    "frames-of": "{person:+{}, }{frames}",
     "not-finite": "expected finite numbers, found {found:g}",
     "beyond-limit": "expected numbers within ±{limit:.2g}, found {found:g}",
     "found-no-key": "no value",

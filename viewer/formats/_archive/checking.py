@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from viewer.diagnostics import Part, Phrase
 from viewer.formats._archive.opening import open_archive
 from viewer.formats._archive.values import Archive
-from viewer.formats._neutral import held_rows, neutral_corners
+from viewer.formats._neutral import neutral_corners
+from viewer.formats._reach import FARTHEST
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = ["archive_of", "are_indices", "corners_of", "finite"]
+__all__ = ["archive_of", "are_indices", "corners_of", "finite", "finite_or_nan", "within_reach"]
 
 
 _ROWS = {
@@ -24,7 +25,6 @@ _ROWS = {
     "triangles": "row-triangle",
     "bindings": "row-joint",
     "joints": "row-joint",
-    "frames": "row-frame",
 }
 """Phrase key for a row, by part of a figure or motion."""
 
@@ -54,67 +54,93 @@ def finite(
     part : str
         Part of the figure or motion, see ``Diagnostic``.
     places : (N,), optional
-        Vertex, joint or frame of each row; the index of the row if omitted.
+        Vertex or joint of each row; the index of the row if omitted.
 
     Returns
     -------
     (N, ...)
         Neutral values in place of invalid ones, unless the file is refused: NaN for positions, the
-        identity for bind matrices, the previous row for frames, otherwise 0.
+        identity for bind matrices, otherwise 0.
 
     Raises
     ------
     FormatError
         If a number is not finite; the message states the key and the number.
     """
+    numbers, bad = _invalid(values)
+    if bad is None:
+        return numbers
+    rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if bad.ndim else np.zeros(1, int)
+    of = rows if places is None else places[rows]
+    message, found = _problem(numbers, bad)
+    if part:
+        found["at"] = Phrase(_ROWS[part], index=int(of[0]))
+    archive.refuse(
+        f"{'W003' if part == 'weights' else 'F003'}.{message}",
+        item=key,
+        count=int(bad.sum()),
+        part=part,
+        places=of if part else None,
+        **found,
+    )
+    if part == "bindings":
+        # The whole matrix is replaced, as a single 0 would result in a different transform.
+        lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
+        return np.where(lost[:, None, None], np.eye(4), numbers)
+    return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
+
+
+def finite_or_nan(archive: Archive, key: str, values: NDArray[Any]) -> Floats:
+    """Return numbers of frames as float64, NaN for those that ``finite`` would refuse.
+
+    The reader turns such frames into gaps, see ``_frame_gaps.py``.
+    """
+    numbers, bad = _invalid(values)
+    if bad is None:
+        return numbers
+    message, found = _problem(numbers, bad)
+    archive.leave_gap(f"F003.{message}", item=key, **found)
+    return np.where(bad, np.nan, numbers)
+
+
+def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
+    """Return translations (..., 3) of a key, NaN for those beyond the limit of all motions."""
+    far = np.abs(found) > FARTHEST
+    if not far.any():
+        return found
+    place = np.argwhere(far)[0]
+    archive.leave_gap(
+        "F003.motion-reach",
+        item=key,
+        limit=FARTHEST,
+        found=float(found[tuple(place)]),
+        frame=int(place[0]),
+    )
+    return np.where(far, np.nan, found)
+
+
+def _invalid(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
+    """Return numbers as float64, and a mask of those not finite or beyond single precision."""
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
     numbers = values if is_ready else values.astype(np.float64)
     # Two reductions need no temporary array, and both propagate NaN.
     low, high = numbers.min(initial=0.0), numbers.max(initial=0.0)
     if low >= -LARGEST and high <= LARGEST:
-        return numbers
+        return numbers, None
     with np.errstate(invalid="ignore"):
-        bad: Bools = ~(np.abs(numbers) <= LARGEST)
-    _refuse_numbers(archive, key, numbers, bad, part, places)
-    return _with_neutral(numbers, bad, part)
+        return numbers, np.asarray(~(np.abs(numbers) <= LARGEST))
 
 
-def _refuse_numbers(
-    archive: Archive,
-    key: str,
-    numbers: Floats,
-    bad: Bools,
-    part: Part,
-    places: NDArray[np.integer] | None,
-) -> None:
-    """Record an error for numbers that are not finite, or beyond single precision."""
+def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
+    """Return the message about the first invalid number, without its code, and its values."""
     first = np.argwhere(bad)[0].tolist()
     found = float(numbers[tuple(first)])
-    rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if first else np.zeros(1, np.int64)
-    of = rows if places is None else places[rows]
-    at: Phrase | str = Phrase("element", indices=first) if first else ""
-    values: dict[str, Any] = {"limit": LARGEST} if np.isfinite(found) else {}
-    archive.refuse(
-        f"{'W003' if part == 'weights' else 'F003'}.{'limit' if values else 'finite'}",
-        item=key,
-        count=int(bad.sum()),
-        part=part,
-        places=of if part else None,
-        found=found,
-        at=Phrase(_ROWS[part], index=int(of[0])) if part else at,
-        **values,
-    )
-
-
-def _with_neutral(numbers: Floats, bad: Bools, part: Part) -> Floats:
-    if part in ("frames", "bindings"):
-        lost: Bools = np.asarray(bad.reshape(len(bad), -1).any(axis=1))
-        if part == "frames":
-            return held_rows(numbers, lost)
-        # The whole matrix is replaced, as a single 0 would result in a different transform.
-        return np.where(lost[:, None, None], np.eye(4), numbers)
-    return np.where(bad, np.nan if part == "positions" else 0.0, numbers)
+    values: dict[str, Any] = {
+        "found": found,
+        "at": Phrase("element", indices=first) if first else "",
+    }
+    return ("limit", {**values, "limit": LARGEST}) if np.isfinite(found) else ("finite", values)
 
 
 def corners_of(archive: Archive, key: str, values: NDArray[Any], n_vertices: int) -> Ints:

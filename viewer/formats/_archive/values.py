@@ -312,6 +312,11 @@ class Archive:
         item = printable(self.label + item, 60)
         self.source.refuse(key, None, count, part, places, item=item, **values)
 
+    def leave_gap(self, key: str, *, item: str, **values: Any) -> None:
+        """Record an error in frames of ``item``, which become gaps; only the first is reported."""
+        if not self.source.frame_faults:
+            self.source.frame_faults.append(self.fault(key, item=item, **values).diagnostic)
+
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
         """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
         return self.source.fault(key, item=printable(self.label + item, 60), **values)

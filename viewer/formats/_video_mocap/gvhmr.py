@@ -91,7 +91,9 @@ def _track(part: Archive) -> Track:
 
 def _size(intrinsics: Floats) -> tuple[int, int]:
     """Return the video's size, as the tool uses its centre as the image centre."""
-    center = intrinsics[0, :2, 2]
+    center = np.nan_to_num(
+        intrinsics[~np.isnan(intrinsics).any(axis=(1, 2))][:1, :2, 2].sum(axis=0)
+    )
     return round(2 * center[0]), round(2 * center[1])
 
 

@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from viewer.formats._archive.checking import finite
+from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Axes
-from viewer.formats._reach import FARTHEST, is_beyond
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Deferred, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
@@ -32,7 +31,6 @@ __all__ = [
     "six",
     "sole",
     "vectors_of",
-    "within_reach",
 ]
 
 Frames = np.ndarray[Any, np.dtype[np.int64]]
@@ -84,42 +82,22 @@ def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
 
 
 def rows(archive: Archive, key: str, shape: Axes) -> Floats:
-    """Return finite numbers of a shape, one row per frame."""
-    array = archive.array(key, shape)
-    return finite(archive, key, array.values(), "frames" if len(array.shape) > 1 else "")
+    """Return numbers of a shape, one row per frame; NaN in place of invalid ones."""
+    return finite_or_nan(archive, key, archive.array(key, shape).values())
 
 
 def places(archive: Archive, key: str, count: int) -> Floats:
-    """Return translations (N, 3), also from (N, 1, 3), within the limit of all motions.
-
-    Raises
-    ------
-    FormatError
-        If the shape differs, or a translation is too far away.
-    """
+    """Return translations (N, 3), also from (N, 1, 3); NaN beyond the limit of all motions."""
     is_nested = len(archive.array(key).shape) == 3
     found = rows(archive, key, (count, 1, 3) if is_nested else (count, 3)).reshape(count, 3)
     return within_reach(archive, key, found)
 
 
-def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
-    """Return translations (N, 3) that were read from a key, within the limit of all motions."""
-    far = is_beyond(found) if len(found) else np.zeros(0, dtype=np.bool_)
-    if far.any():
-        frame = int(far.argmax())
-        number = float(found[frame][np.abs(found[frame]).argmax()])
-        raise archive.fault(
-            "F003.motion-reach", item=key, limit=FARTHEST, found=number, frame=frame
-        )
-    return found
-
-
 def frames_of(archive: Archive, key: str, count: int) -> Frames:
     """Return frame numbers, integers in any order: (N,); of a table, those in its first column."""
-    if len(archive.array(key).shape) == 2:
-        found = rows(archive, key, (count, None))[:, 0]
-    else:
-        found = rows(archive, key, (count,))
+    shape = (count, None) if len(archive.array(key).shape) == 2 else (count,)
+    found = archive.array(key, shape).values()
+    found = finite(archive, key, found[:, 0] if found.ndim == 2 else found)
     if (found != np.floor(found)).any() or (np.abs(found) > 1 << 40).any():
         raise archive.fault("F002.video-frame-numbers", item=key)
     return found.astype(np.int64)
@@ -137,12 +115,8 @@ def first_rows(source: Source, frames: ArrayLike) -> tuple[Frames, Ints]:
 def matrices(archive: Archive, key: str, shape: Axes) -> Floats:
     """Return rotation vectors of rotation matrices (..., 3, 3); zeros become the identity.
 
-    Matrices in single precision are not exactly orthogonal; the nearest rotation is used.
-
-    Raises
-    ------
-    FormatError
-        If a matrix is neither near a rotation nor zero.
+    Matrices in single precision are not exactly orthogonal; the nearest rotation is used, and NaN
+    in place of matrices that are neither near a rotation nor zero.
     """
     return vectors_of(archive, key, rows(archive, key, shape))
 
@@ -158,13 +132,16 @@ def vectors_of(archive: Archive, key: str, found: Floats) -> Floats:
 
 
 def _rotations(archive: Archive, key: str, found: Floats) -> Floats:
+    is_invalid: Bools = np.asarray(np.isnan(found).any(axis=(-2, -1)))
     is_missing: Bools = np.asarray(~found.any(axis=(-2, -1)))
-    found = np.where(is_missing[..., None, None], np.eye(3), found)
+    found = np.where((is_missing | is_invalid)[..., None, None], np.eye(3), found)
     determinants = np.linalg.det(found)
-    if (determinants < _SMALLEST).any():
+    is_flat = determinants < _SMALLEST
+    if is_flat.any():
         worst = float(determinants.min())
-        raise archive.fault("F002.video-rotation", item=key, found=worst)
-    return nearest_rotations(found)[0]
+        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+        is_invalid |= is_flat
+    return np.where(is_invalid[..., None, None], np.nan, nearest_rotations(found)[0])
 
 
 def six(archive: Archive, key: str, found: Floats) -> Floats:
@@ -181,9 +158,11 @@ def six(archive: Archive, key: str, found: Floats) -> Floats:
 
 def _unit(archive: Archive, key: str, vectors: Floats) -> Floats:
     lengths = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    if (lengths < _SMALLEST).any():
-        raise archive.fault("F002.video-rotation", item=key, found=float(lengths.min()))
-    return vectors / lengths
+    is_short = lengths < _SMALLEST
+    if is_short.any():
+        worst = float(lengths[is_short].min())
+        archive.leave_gap("F002.video-rotation", item=key, found=worst)
+    return np.where(is_short, np.nan, vectors / np.where(is_short, 1.0, lengths))
 
 
 def numbers(archive: Archive, key: str, count: int) -> Floats:

@@ -24,6 +24,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
+from viewer.formats._archive.checking import within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
@@ -35,7 +36,6 @@ from viewer.formats._video_mocap.numbers import (
     places,
     rows,
     shape_of,
-    within_reach,
 )
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.formats._archive.checking import finite
+from viewer.formats._archive.checking import finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Value
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
@@ -29,7 +29,6 @@ from viewer.formats._video_mocap.numbers import (
     intrinsics_of,
     sole,
     vectors_of,
-    within_reach,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Deferred, Floats
@@ -130,7 +129,7 @@ def _whole_numbers(frame: Archive, key: str) -> list[int]:
 def _track(archive: Archive, rows: list[tuple[int, Floats]]) -> Track:
     frames, first = first_rows(archive.source, [frame for frame, _ in rows])
     stacked = np.array([row for _, row in rows])[first]
-    numbers = finite(archive, "smpl or camera", stacked, "frames")
+    numbers = finite_or_nan(archive, "smpl or camera", stacked)
     turned = numbers[:, :216].reshape(-1, _N_JOINTS, 3, 3)
     return Track(
         frames,

@@ -11,11 +11,14 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.formats._frame_gaps import frame_spans, gap_notes, invalid_rows, no_frames
+from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.captures.camera_view import CameraMotion, CameraView
 from viewer.rig.captures.capture import Capture, CapturePart, RestRoots
 from viewer.rig.captures.capture_rate import capture_rate
+from viewer.rig.captures.person import person_label
 from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
@@ -78,6 +81,51 @@ class Track:
     rig: tuple[Floats, Floats, Floats, Floats] | None = None
     places_root: bool = False
 
+    def selected(self, chosen: np.ndarray[Any, np.dtype[Any]]) -> Track:
+        """Return some of the frames: indices of rows, or a mask (N,)."""
+        count, shape = len(self.frames), self.shape
+
+        def of(table: Floats | None) -> Floats | None:
+            return None if table is None else table[chosen]
+
+        return replace(
+            self,
+            frames=self.frames[chosen],
+            vectors=of(self.vectors),
+            translations=of(self.translations),
+            shape=shape[chosen] if shape is not None and len(shape) == count else shape,
+            hands={side: table[chosen] for side, table in self.hands.items()},
+            world_rotations=of(self.world_rotations),
+            points=of(self.points),
+            rig=None if self.rig is None else tuple(table[chosen] for table in self.rig),
+        )
+
+    @property
+    def invalid(self) -> Bools:
+        """Mask of the frames in which a number, or each visible point, is NaN: (N,)."""
+        tables = [self.vectors, self.translations, self.world_rotations, *self.hands.values()]
+        tables += () if self.rig is None else self.rig
+        if self.shape is not None and len(self.shape) == len(self.frames):
+            tables.append(self.shape)
+        bad = invalid_rows(*tables)
+        if self.points is None:
+            return bad
+        lacks = np.isnan(self.points).any(axis=-1)
+        lost = (lacks | (self.points[..., 3] == 0.0)).all(axis=-1) & lacks.any(axis=-1)
+        return bad | lost if len(bad) else lost
+
+    @property
+    def n_unseen(self) -> int:
+        """Number of points with NaN in all frames."""
+        return 0 if self.points is None else int(np.isnan(self.points).any(axis=-1).sum())
+
+    def seen(self) -> Track:
+        """Return the track with confidence 0 for invalid points."""
+        if self.points is None or not np.isnan(self.points.sum()):
+            return self
+        bad = np.isnan(self.points).any(axis=-1, keepdims=True)
+        return replace(self, points=np.where(bad, 0.0, self.points))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cameras:
@@ -100,6 +148,14 @@ class Cameras:
     rotations: Floats
     translations: Floats
     size: tuple[int, int] | None = None
+
+    @property
+    def invalid(self) -> Bools:
+        """Mask of the frames in which a number is NaN: (N,)."""
+        bad: Bools = np.zeros(len(self.frames), dtype=np.bool_)
+        for table in (self.intrinsics, self.rotations, self.translations):
+            bad = bad | invalid_rows(table)  # a single row is that of every frame
+        return bad
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -126,6 +182,8 @@ class Results:
         Recognised and ignored contents, for ``viewer info``.
     notes : tuple of Diagnostic
         Messages about the file.
+    span : tuple of int
+        First and last frame of the video, if people may be missing in them.
     """
 
     tool: str
@@ -137,6 +195,7 @@ class Results:
     frame_rate: float | None = None
     facts: tuple[tuple[str, str], ...] = ()
     notes: tuple[Diagnostic, ...] = ()
+    span: tuple[int, ...] = ()
 
 
 def capture_of(source: Source, results: Results, options: Options) -> Capture:
@@ -157,7 +216,12 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
         found = [*results.people]
         raise source.fault("F002.video-space", space=space, found=found, tool=results.tool)
     frames = [track.frames for people in results.people.values() for track in people.values()]
-    first, last = int(np.concatenate(frames).min()), int(np.concatenate(frames).max())
+    most = max(len(track.frames) for track in results.people[space].values())
+    results, gaps = _without_invalid(source, results)
+    if space not in results.people:
+        raise no_frames(source, most)
+    numbers = np.concatenate([*frames, np.asarray(results.span, np.int64)])
+    first, last = int(numbers.min()), int(numbers.max())
     if first < 0 or last - first >= _MOST_FRAMES or last >= 1 << 30:
         raise source.fault("F002.video-frames", most=_MOST_FRAMES, low=first, high=last)
     known = options.frame_rate, results.frame_rate, options.video_rate
@@ -165,8 +229,69 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     if not any(known) and last > first:
         source.warn("F007.video-no-rate", rate=rate)
     source.used_options |= {"space"} | ({"average-shape"} if _shapes_vary(results) else set())
-    capture = _Capture(source, results, options, first, last - first + 1, rate)
+    capture = _Capture(source, results, options, first, last - first + 1, rate, gaps)
     return capture.in_space(space)
+
+
+def _without_invalid(
+    source: Source, results: Results
+) -> tuple[Results, dict[str, list[Diagnostic]]]:
+    """Return results without frames in which a number of a person is invalid, and notes by space.
+
+    Spaces without a valid frame are omitted.
+    """
+    if not source.frame_faults:
+        return results, {}
+    problem = replace(source.frame_faults[0], path=None, line=None)
+    people: dict[str, dict[int, Track]] = {}
+    notes: dict[str, list[Diagnostic]] = {}
+    for space, tracks in results.people.items():
+        bad = {person: track.invalid for person, track in tracks.items()}
+        lost = [person for person in tracks if len(bad[person]) and bad[person].all()]
+        kept = {person: track for person, track in tracks.items() if person not in lost}
+        if lost and not any(len(track.frames) for track in kept.values()):
+            continue
+        people[space] = {person: track.selected(~bad[person]) for person, track in kept.items()}
+        frames = {person: track.frames[bad[person]] for person, track in kept.items()}
+        is_single = len(tracks) == 1
+        notes[space] = gap_notes(source, {None if is_single else p: f for p, f in frames.items()})
+        n_points = sum(track.n_unseen for track in people[space].values())
+        people[space] = {person: track.seen() for person, track in people[space].items()}
+        if n_points:
+            values = {"n": n_points, "problem": problem}
+            notes[space].append(Diagnostic("F007.points-lost", source.path, values=values))
+        for person in lost:
+            values = {"person": person_label(person), "n": len(bad[person]), "problem": problem}
+            notes[space].append(Diagnostic("F007.person-lost", source.path, values=values))
+    cameras: dict[str, Cameras] = {}
+    for space, camera in results.cameras.items():
+        held, gaps = _held(camera), camera.frames[camera.invalid]
+        if held is None:
+            notes.setdefault(space, []).append(
+                Diagnostic("F007.camera", source.path, values={"problem": problem})
+            )
+            continue
+        cameras[space] = held
+        if len(gaps):
+            values = {"n": len(gaps), "frames": frame_spans(gaps), "problem": problem}
+            notes.setdefault(space, []).append(
+                Diagnostic("F007.camera-frames", source.path, values=values)
+            )
+    return replace(results, people=people, cameras=cameras), notes
+
+
+def _held(cameras: Cameras) -> Cameras | None:
+    """Return a camera with that of the frame before in invalid frames; None if all are invalid."""
+    bad = cameras.invalid
+    if not bad.any():
+        return cameras
+    if bad.all():
+        return None
+    intrinsics, rotations, translations = (
+        table if len(table) == 1 else held_rows(table, bad)
+        for table in (cameras.intrinsics, cameras.rotations, cameras.translations)
+    )
+    return Cameras(cameras.frames, intrinsics, rotations, translations, cameras.size)
 
 
 def _shapes_vary(results: Results) -> bool:
@@ -185,9 +310,11 @@ class _Capture:
     first_frame: int
     n_frames: int
     rate: float
+    gaps: Mapping[str, list[Diagnostic]]  # notes about invalid frames, by space
 
     def in_space(self, space: str) -> Capture:
-        results, notes = self.results, self.results.notes
+        results = self.results
+        notes = (*results.notes, *self.gaps.get(space, ()))
         cameras, cameras_of = results.cameras.get(space), results.cameras_of
         shown = cameras or next(iter(results.cameras.values()), None)
         if shown is not None and (shown.intrinsics[:, [0, 1], [0, 1]] <= 0.0).any():
@@ -201,14 +328,14 @@ class _Capture:
             self.first_frame,
             partial(self.parts, space),
             self.options.up or results.ups.get(space, ""),
-            () if cameras is None else (self.view(cameras),),
+            self.views(cameras),
             results.model,
             notes,
             space=space if len(results.people) > 1 else "",
             in_space=self.in_space if len(results.people) > 1 else None,
             views_of=None
             if cameras_of is None or space != "world"
-            else lambda rest_roots: (self.view(cameras_of(rest_roots)),),
+            else lambda rest_roots: self.views(_held(cameras_of(rest_roots))),
             facts=self.facts,
         )
 
@@ -261,6 +388,9 @@ class _Capture:
             world_rotations=track.world_rotations,
             facts=self.facts,
         )
+
+    def views(self, cameras: Cameras | None) -> tuple[CameraView, ...]:
+        return () if cameras is None else (self.view(cameras),)
 
     def view(self, cameras: Cameras) -> CameraView:
         """Return the camera; frames outside the timeline are omitted."""

@@ -22,6 +22,7 @@ from collections import defaultdict
 
 import numpy as np
 
+from viewer.formats._archive.checking import within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
@@ -33,7 +34,6 @@ from viewer.formats._video_mocap.numbers import (
     places,
     rows,
     shape_of,
-    within_reach,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Floats
@@ -124,7 +124,8 @@ def _projected(image: Archive) -> Floats | None:
     points = (rows(image, _JOINTS, shape) + placed[:, None]).reshape(-1, 3)
     pixels = rows(image, _PIXELS, (*shape[:2], 2)).reshape(-1, 2)
     is_ahead = points[:, 2] > _NEAREST
-    return np.concatenate([points[:, :2] / points[:, 2:], pixels], axis=1)[is_ahead]
+    found = np.concatenate([points[:, :2] / points[:, 2:], pixels], axis=1)[is_ahead]
+    return found[np.isfinite(found).all(axis=1)]
 
 
 def _has_joints(image: Archive) -> bool:

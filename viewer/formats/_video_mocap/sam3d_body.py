@@ -26,7 +26,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
-from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.checking import archive_of, within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.mhr_points import ORIGIN, point_layout
@@ -36,7 +36,6 @@ from viewer.formats._video_mocap.numbers import (
     intrinsics_of,
     rows,
     shape_of,
-    within_reach,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.sam3d_files import frames_and_people
@@ -95,7 +94,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
     Raises
     ------
     FormatError
-        If a shape differs from the tool's, or a number is not finite.
+        If a shape differs from the tool's.
     """
     place = shape_of(archive, _PLACE)
     lead, count = place[:1] if len(place) == 2 else (), _length(archive)
@@ -134,8 +133,7 @@ def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
     if not shape_of(archive, key):
         return np.zeros((lead[0] if lead else 1, 0, 3))
     found = _framed(rows(archive, key, (*lead, None, 3)), lead)
-    within_reach(archive, key, found.reshape(found.shape[0] * found.shape[1], 3))
-    return found * [1.0, -1.0, -1.0]
+    return within_reach(archive, key, found) * [1.0, -1.0, -1.0]
 
 
 def recognises(archive: Archive) -> bool:
@@ -312,7 +310,7 @@ def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
         return None
     seen = rows(archive, _SEEN, shape)
     x, y, z = ((person.keypoints[0] + person.translations[0]) * [1.0, -1.0, -1.0]).T
-    if (z <= 0.0).any():
+    if not (z > 0.0).all() or not np.isfinite([*x, *y, *seen.ravel()]).all():
         return None
     nothing, one = np.zeros_like(x), np.ones_like(x)
     left = np.concatenate(

@@ -19,7 +19,7 @@ import re
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.formats._archive.checking import archive_of
+from viewer.formats._archive.checking import archive_of, finite, within_reach
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
@@ -29,7 +29,6 @@ from viewer.formats._video_mocap.numbers import (
     rotations_of,
     rows,
     shape_of,
-    within_reach,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.spaces import moved
@@ -71,12 +70,12 @@ def read(source: Source, archive: Archive) -> Results:
     RowBudget(archive).spend(n_people * n_frames)
     bodies = _bodies(archive, n_people, n_frames)
     ids, seen, notes = _tracks(source, n_people, n_frames)
-    world = {ids[b]: _selected(body, seen[b]) for b, body in enumerate(bodies)}
+    world = {ids[b]: body.selected(seen[b]) for b, body in enumerate(bodies)}
     spaces, cameras = {"world": world}, {}
     if n_people and has(archive, "cam_R", "cam_t"):
         turned = rotations_of(archive, "cam_R", (n_people, n_frames, 3, 3))[0]
         placed = rows(archive, "cam_t", (n_people, n_frames, 3))[0]
-        within_reach(archive, "cam_t", placed)
+        placed = within_reach(archive, "cam_t", placed)
         spaces["camera"] = {
             person: moved(track, turned[track.frames], placed[track.frames])
             for person, track in world.items()
@@ -96,7 +95,7 @@ def read(source: Source, archive: Archive) -> Results:
 
 def _intrinsics(archive: Archive) -> Floats:
     """Return fx, fy, cx and cy; if there are several frames, of the first."""
-    values = rows(archive, "intrins", archive.array("intrins").shape).reshape(-1)
+    values = finite(archive, "intrins", archive.array("intrins").values()).reshape(-1)
     if len(values) == 0 or len(values) % 4:
         raise archive.fault("F002.video-count", item="intrins", expected=4, found=len(values))
     return values[:4]
@@ -107,24 +106,15 @@ def _bodies(archive: Archive, n_people: int, n_frames: int) -> list[Track]:
     roots = rows(archive, "root_orient", (*both, 3)).reshape(*both, 1, 3)
     joints = rows(archive, "pose_body", (*both, 63)).reshape(*both, 21, 3)
     vectors = np.concatenate([roots, joints], axis=2)
-    shape = rows(archive, "betas", (n_people, None)) if archive.has("betas") else None
-    placed = rows(archive, "trans", (*both, 3))
-    within_reach(archive, "trans", placed.reshape(n_people * n_frames, 3))
+    shape = None
+    if archive.has("betas"):
+        shape = finite(archive, "betas", archive.array("betas", (n_people, None)).values())
+    placed = [within_reach(archive, "trans", own) for own in rows(archive, "trans", (*both, 3))]
     frames, names = np.arange(n_frames), members_by_numbers()[66]
     return [
         Track(frames, names, vectors[b], placed[b], None if shape is None else shape[b][None])
         for b in range(n_people)
     ]
-
-
-def _selected(track: Track, seen: Bools) -> Track:
-    """Return a track without the frames in which the person is not in the scene."""
-    if seen.all() or track.vectors is None or track.translations is None:
-        return track
-    frames = np.flatnonzero(seen)
-    return Track(
-        frames, track.joint_names, track.vectors[frames], track.translations[frames], track.shape
-    )
 
 
 def _tracks(

@@ -1,0 +1,73 @@
+"""Frames of a motion whose numbers are not finite or too large: they become gaps.
+
+Readers leave NaN in place of such numbers (``finite_or_nan``, ``within_reach``), compute with it,
+and finally omit each frame in which a number of a person is NaN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from viewer.diagnostics import Diagnostic, Phrase, frame_range
+from viewer.errors import FormatError
+from viewer.formats._source import Source
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.person import person_label
+
+__all__ = ["frame_spans", "gap_notes", "invalid_rows", "no_frames"]
+
+
+def invalid_rows(*tables: Floats | None) -> Bools:
+    """Return a mask of the rows, (N,), in which any of several (N, ...) tables has NaN.
+
+    >>> invalid_rows(np.array([[1.0], [np.nan]]), None).tolist()
+    [False, True]
+    """
+    found = [table for table in tables if table is not None]
+    bad: Bools = np.zeros(len(found[0]) if found else 0, dtype=np.bool_)
+    for table in found:
+        if np.isnan(table.sum()):  # most files have no gaps, so this test must be cheap
+            bad |= np.isnan(table).reshape(len(table), -1).any(axis=1)
+    return bad
+
+
+def gap_notes(source: Source, lost: Mapping[int | None, NDArray[np.integer]]) -> list[Diagnostic]:
+    """Return a note about frames that became gaps, if there are any.
+
+    Parameters
+    ----------
+    source : Source
+        The file, whose ``frame_faults`` has the first error.
+    lost : mapping of person to (N,)
+        Numbers of the lost frames, ascending; the person is None if there is only one.
+    """
+    frames = [
+        Phrase("frames-of", person="" if person is None else person_label(person), frames=span)
+        for person, numbers in lost.items()
+        for span in frame_spans(numbers)
+    ]
+    if not frames:
+        return []
+    count = sum(map(len, lost.values()))
+    values = {"n": count, "frames": frames, "problem": _problem(source)}
+    return [Diagnostic("F007.frames-lost", source.path, values=values)]
+
+
+def no_frames(source: Source, count: int) -> FormatError:
+    """Return the error for a motion in which no frame is valid."""
+    return source.fault("F003.frames-lost", n=count, problem=_problem(source))
+
+
+def _problem(source: Source) -> Any:
+    return replace(source.frame_faults[0], path=None, line=None)
+
+
+def frame_spans(numbers: NDArray[np.integer]) -> list[Phrase]:
+    """Return phrases for the runs of consecutive frames in ascending numbers."""
+    runs = np.split(numbers, np.flatnonzero(np.diff(numbers) > 1) + 1)
+    return [frame_range(int(run[0]), int(run[-1])) for run in runs if len(run)]
