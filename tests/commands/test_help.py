@@ -53,9 +53,25 @@ def test_option_groups_follow_the_order_of_work(command, titles):
     assert all(title.startswith(start) for title, start in zip(found, wanted, strict=True)), found
 
 
-@pytest.mark.parametrize("command", ["render", "convert"])
-def test_usage_is_printed_in_one_line(command, capsys):
+USAGES = {
+    "view": "[FILES ...] [options]",
+    "render": "[FILES ...] -o FILE [options]",
+    "convert": "[FILES ...] -o FILE [options]",
+    "batch": "JOB PATHS [-o OUT] [options of the job] [options]",
+    "rig": "TARGET [-o FILE] [options]",
+    "info": "FILES ... [options]",
+    "diff": "REFERENCE OTHER ... [options]",
+    "lint": "FILES ... [options]",
+    "models": "[list | add NAME] [options]",
+    "doctor": "[--bench]",
+    "help": "[TOPIC | COMMAND]",
+    "completion": "bash|zsh|tcsh",
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_begins_with_usage_in_one_line(command, capsys):
     with pytest.raises(SystemExit):
         run([command, "--help"])
     lines = capsys.readouterr().out.splitlines()
-    assert lines[0] == f"usage: viewer {command} [FILES ...] -o FILE [options]" and not lines[1]
+    assert lines[:2] == [f"usage: viewer {command} {USAGES[command]}", ""]

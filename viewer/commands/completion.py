@@ -16,6 +16,7 @@ _SHELLS = ("bash", "zsh", "tcsh")
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s bash|zsh|tcsh"
     parser.add_argument(
         "shell", choices=_SHELLS, help="the shell; see below for where to put its script"
     )

@@ -42,6 +42,7 @@ _UNREADABLE = 2
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s REFERENCE OTHER ... [options]"
     files = parser.add_argument_group("files")
     files.add_argument(
         "reference",

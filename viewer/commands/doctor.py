@@ -59,6 +59,7 @@ class Finding:
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's option."""
+    parser.usage = "%(prog)s [--bench]"
     parser.add_argument(
         "--bench",
         action="store_true",

@@ -14,6 +14,7 @@ __all__ = ["add_arguments", "run"]
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s [TOPIC | COMMAND]"
     parser.add_argument(
         "topic",
         nargs="?",

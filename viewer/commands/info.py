@@ -40,6 +40,7 @@ MOST_FREE_DOFS = 24
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s FILES ... [options]"
     add_scene_arguments(parser, default="")
     add_skinning_arguments(parser)
     parser.add_argument("--json", action="store_true", help="print everything as JSON")

@@ -44,6 +44,7 @@ _STYLES = {"error": "red", "warning": "yellow"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s FILES ... [options]"
     add_file_arguments(parser, default="")
     add_capture_arguments(parser)
     group = parser.add_argument_group("checks")

@@ -22,6 +22,7 @@ _STYLES = {"found": "green", "missing": "yellow", "bundled": "green"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s [list | add NAME] [options]"
     parser.add_argument(
         "action",
         nargs="?",

@@ -48,6 +48,7 @@ _SMOOTHING = 10  # number of iterations if --smooth has no value
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
+    parser.usage = "%(prog)s TARGET [-o FILE] [options]"
     parser.add_argument(
         "files",
         nargs="+",
