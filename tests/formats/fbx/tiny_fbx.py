@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["write_strip"]
+__all__ = ["write_humanoid", "write_strip"]
 
 _HEAD = """; FBX 7.4.0 project file
 FBXHeaderExtension:  {{
@@ -161,4 +161,76 @@ def write_strip(folder: Path, up: str = "y", unit: float = 1.0) -> Path:
     head = _HEAD.format(up=1 if up == "y" else 2, front=front, front_sign=sign, unit=unit)
     path = folder / "strip.fbx"
     path.write_text(head + _OBJECTS)
+    return path
+
+
+def write_humanoid(path: Path, bones: dict[str, tuple[str, tuple[float, float, float]]]) -> Path:
+    """Write a triangle skinned to bones, each with its name, parent and place below it in cm. Two
+    animations rotate the first bone.
+    """
+    names = list(bones)
+    eye = "1,0,0,0,0,1,0,0,0,0,1,0"
+    objects = [
+        'Geometry: 10, "Geometry::Skin", "Mesh" {',
+        "Vertices: *9 { a: 0,0,0, 50,0,0, 0,150,0 } PolygonVertexIndex: *3 { a: 0,1,-3 } }",
+        'Model: 20, "Model::Skin", "Mesh" { Version: 232 }',
+        'Deformer: 40, "Deformer::Skin", "Skin" { Version: 101 }',
+    ]
+    links: list[tuple[str, int, int | str]] = [("OO", 20, 0), ("OO", 10, 20), ("OO", 40, 10)]
+    worlds: dict[str, list[float]] = {"": [0.0, 0.0, 0.0]}
+    for number, (name, (parent, place)) in enumerate(bones.items()):
+        worlds[name] = [a + b for a, b in zip(worlds[parent], place, strict=True)]
+        x, y, z = worlds[name]
+        local = ",".join(map(str, place))
+        objects += [
+            f'Model: {1000 + number}, "Model::{name}", "LimbNode" {{ Version: 232',
+            f'Properties70: {{ P: "Lcl Translation", "Lcl Translation", "", "A",{local} }} }}',
+            f'NodeAttribute: {2000 + number}, "NodeAttribute::{name}", "LimbNode" '
+            '{ TypeFlags: "Skeleton" }',
+            f'Deformer: {3000 + number}, "SubDeformer::{name}", "Cluster" {{ Version: 100',
+            "Indexes: *1 { a: 0 } Weights: *1 { a: 1 }" if number == 0 else "",
+            "Indexes: *2 { a: 1,2 } Weights: *2 { a: 1,1 }" if number == 1 else "",
+            f"Transform: *16 {{ a: {eye},{-x},{-y},{-z},1 }}",
+            f"TransformLink: *16 {{ a: {eye},{x},{y},{z},1 }} }}",
+        ]
+        links += [
+            ("OO", 1000 + number, 1000 + names.index(parent) if parent else 0),
+            ("OO", 2000 + number, 1000 + number),
+            ("OO", 3000 + number, 40),
+            ("OO", 1000 + number, 3000 + number),
+        ]
+    for number, name in enumerate(("nod", "turn")):
+        stack, layer, node, curve = (5000 + 10 * number + part for part in range(4))
+        objects += [
+            f'AnimationStack: {stack}, "AnimStack::{name}", "" {{ Properties70: {{',
+            'P: "LocalStart", "KTime", "Time", "",0',
+            'P: "LocalStop", "KTime", "Time", "",46186158000 } }',
+            f'AnimationLayer: {layer}, "AnimLayer::Base", "" {{ }}',
+            f'AnimationCurveNode: {node}, "AnimCurveNode::R", "" {{ Properties70: {{',
+            'P: "d|Y", "Number", "", "A",0 } }',
+            f'AnimationCurve: {curve}, "AnimCurve::", "" {{ Default: 0',
+            "KeyVer: 4008",
+            "KeyTime: *2 { a: 0,46186158000 }",
+            "KeyValueFloat: *2 { a: 0,90 }",
+            "KeyAttrFlags: *1 { a: 4 }",
+            "KeyAttrDataFloat: *4 { a: 0,0,0,0 }",
+            "KeyAttrRefCount: *1 { a: 2 } }",
+        ]
+        links += [
+            ("OO", layer, stack),
+            ("OO", node, layer),
+            ("OP", node, '1000, "Lcl Rotation"'),
+            ("OP", curve, f'{node}, "d|Y"'),
+        ]
+    lines = [
+        _HEAD.format(up=1, front=2, front_sign=1, unit=1),
+        "Objects:  {",
+        *objects,
+        "}",
+        "Connections:  {",
+        *(f'    C: "{kind}",{child},{parent}' for kind, child, parent in links),
+        "}",
+        "",
+    ]
+    path.write_text("\n".join(lines))
     return path
