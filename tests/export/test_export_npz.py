@@ -2,6 +2,7 @@
 
 import zipfile
 
+import faults
 import numpy as np
 import pytest
 from formats.pig_text import write as write_pig
@@ -12,13 +13,15 @@ from seamed import POSITIONS, TRIANGLES, UV_TRIANGLES, UVS, seamed_actor, seamed
 
 import viewer
 from viewer.errors import RigError
-from viewer.export import MotionOptions, export
+from viewer.export import MotionOptions, export, export_animation
 from viewer.export.npz import export_points
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.figure import Figure
+from viewer.rig.motion.single_frame import single_frame
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skinning import Skinning
 
 EXACT = 1e-12  # metres; sums of a few dozen values below 2
 
@@ -43,6 +46,19 @@ def test_every_part_has_its_key(tmp_path):
     assert_array_equal(arrays["joints"], [[0, 0, 0], [1, 0, 0]])
     assert arrays["vertices"].dtype == arrays["world"].dtype == np.float64
     assert arrays["own_numbers"].tolist() == [0] * 6  # without a pose layout, these are the DOFs
+
+
+def test_reduced_weights_are_reported(tmp_path):
+    """The tip turns vertex 3 from (1, 2, 1) to (1, -2, 1): all influences put it at (1, 1, 1)."""
+    actor = seamed_actor(weights=((1, 0), (0, 1), (1, 0), (0.75, 0.25), (1, 0)), unit="m")
+    actor.pose.dofs[5] = np.pi
+    path, how = tmp_path / "out.npz", Skinning(max_influences=1)
+    still = f"{path}: vertices differ from the pose by up to 1 m (vertex 3): only the strongest "
+    assert faults.lines(export(actor, path, how))[1].startswith(still)
+    animation, options = single_frame(actor, number=7), MotionOptions(up="z", skinning=how)
+    _, note = faults.lines(export_animation(animation, path, "npz", options))
+    moving = "vertices differ from the motion by up to 1 m (vertex 3, frame 7): only the strongest"
+    assert note.startswith(f"{path}: {moving}")
 
 
 def test_world_matrices_are_those_of_the_joints(tmp_path):

@@ -20,9 +20,11 @@ from seamed import (
     seamed_mesh,
 )
 
+import viewer
 from viewer.errors import RigError
 from viewer.export import export
 from viewer.rig.figure import Figure
+from viewer.rig.material import Material
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -168,8 +170,8 @@ def test_texture_is_written_next_to_the_mesh(tmp_path):
     obj, notes = write(tmp_path, textured(PICTURE))
     assert names(tmp_path) == ["out.mtl", "out.obj", "out_0.png"]
     assert obj.libraries == ["out.mtl"]
-    assert [material for material, _ in obj.faces] == ["material0"] * 3
-    material = read_mtl(tmp_path / "out.mtl")["material0"]
+    assert [material for material, _ in obj.faces] == ["cloth 0"] * 3
+    material = read_mtl(tmp_path / "out.mtl")["cloth 0"]
     assert material == {"Kd": "1 1 1", "map_Kd": "out_0.png"}
     assert_array_equal(pixels(tmp_path / "out_0.png"), PICTURE)
     assert f"{tmp_path / 'out_0.png'}: its texture" in notes
@@ -178,16 +180,16 @@ def test_texture_is_written_next_to_the_mesh(tmp_path):
 def test_each_run_of_triangles_states_its_material(tmp_path):
     actor = textured(PICTURE, OTHER_PICTURE, None, of_triangle=(1, 0, 1))
     obj, _ = write(tmp_path, actor)
-    assert [material for material, _ in obj.faces] == ["material1", "material0", "material1"]
+    assert [material for material, _ in obj.faces] == ["cloth 1", "cloth 0", "cloth 1"]
     materials = read_mtl(tmp_path / "out.mtl")
-    assert list(materials) == ["plain", "material0", "material1", "material2"]
-    assert "map_Kd" not in materials["material2"]
-    assert_array_equal(pixels(tmp_path / materials["material1"]["map_Kd"]), OTHER_PICTURE)
+    assert list(materials) == ["plain", "cloth 0", "cloth 1", "cloth 2"]
+    assert "map_Kd" not in materials["cloth 2"]
+    assert_array_equal(pixels(tmp_path / materials["cloth 1"]["map_Kd"]), OTHER_PICTURE)
 
 
 def test_triangles_without_material_do_not_inherit_one(tmp_path):
     obj, _ = write(tmp_path, textured(PICTURE, of_triangle=(0, -1, 0)))
-    assert [material for material, _ in obj.faces] == ["material0", "plain", "material0"]
+    assert [material for material, _ in obj.faces] == ["cloth 0", "plain", "cloth 0"]
     assert read_mtl(tmp_path / "out.mtl")["plain"] == {"Kd": "1 1 1"}
 
 
@@ -196,7 +198,8 @@ def test_file_without_a_texture_has_no_material(tmp_path, pictures):
     of_triangle = [len(pictures) - 1] * 3
     obj, _ = write(tmp_path, textured(*pictures, of_triangle=of_triangle))
     assert names(tmp_path) == ["out.obj"] and obj.libraries == []
-    assert [material for material, _ in obj.faces] == [None] * 3
+    name = "cloth 0" if pictures else None  # kept, although no library describes it
+    assert [material for material, _ in obj.faces] == [name] * 3
 
 
 def test_existing_files_are_not_replaced(tmp_path):
@@ -206,7 +209,7 @@ def test_existing_files_are_not_replaced(tmp_path):
     assert (tmp_path / "out.mtl").read_bytes() == b"precious"
     assert (tmp_path / "out_0.png").read_bytes() == b"precious"
     (library,) = obj.libraries
-    picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
+    picture = read_mtl(tmp_path / library)["cloth 0"]["map_Kd"]
     assert_array_equal(pixels(tmp_path / picture), PICTURE)
 
 
@@ -223,7 +226,7 @@ def test_long_names_of_two_textures_are_distinct(tmp_path):
     obj, _ = write(tmp_path, textured(PICTURE, OTHER_PICTURE), f"{'x' * 200}.obj")
     materials = read_mtl(tmp_path / obj.libraries[0])
     for index, picture in enumerate((PICTURE, OTHER_PICTURE)):
-        found = pixels(tmp_path / materials[f"material{index}"]["map_Kd"])
+        found = pixels(tmp_path / materials[f"cloth {index}"]["map_Kd"])
         assert_array_equal(found, picture)
 
 
@@ -231,7 +234,7 @@ def test_long_names_of_two_textures_are_distinct(tmp_path):
 def test_companion_files_have_names_without_spaces(tmp_path, stem):
     obj, _ = write(tmp_path, textured(PICTURE), f"{stem}.obj")
     (library,) = obj.libraries  # a name without spaces
-    picture = read_mtl(tmp_path / library)["material0"]["map_Kd"]
+    picture = read_mtl(tmp_path / library)["cloth 0"]["map_Kd"]
     assert len(picture.split()) == 1
     assert names(tmp_path) == sorted([f"{stem}.obj", library, picture])
 
@@ -260,3 +263,66 @@ def test_figure_without_mesh_is_refused(tmp_path):
 
 def test_suffix_may_have_capitals(tmp_path):
     assert len(write(tmp_path, seamed_actor(), "OUT.OBJ")[0].v) == 5
+
+
+# Names and precision
+
+
+def test_names_of_objects_and_materials_are_kept(tmp_path):
+    mesh = replace(
+        textured(PICTURE, None, of_triangle=(0, 0, 1)).figure.mesh,
+        parts=("left glove", "hat"),
+        triangle_parts=np.array([1, 0, 0]),
+    )
+    _, notes = write(tmp_path, Actor(Figure("roof", mesh)))
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    kept = [line for line in lines if line.startswith(("o ", "usemtl ", "f "))]
+    assert [line.split(" ", 1)[1] if line[0] != "f" else "f" for line in kept] == [
+        *("roof", "hat", "cloth 0", "f", "left glove", "f", "cloth 1", "f")
+    ]
+    assert len(notes) == 2  # the mesh and its texture: nothing is lost
+    again = viewer.load(tmp_path / "out.obj").actors[0].figure.mesh
+    assert [again.parts[part] for part in again.part_indices] == ["hat", *["left glove"] * 2]
+    names = [again.materials[index].name for index in again.material_indices]
+    assert names == ["cloth 0", "cloth 0", "cloth 1"]
+
+
+def test_equal_names_of_materials_are_replaced_and_said(tmp_path):
+    mesh = replace(seamed_mesh(), materials=(Material("skin"), Material("skin"), Material("nail")))
+    _, notes = write(tmp_path, Actor(Figure("roof", replace(mesh, triangle_materials=[0, 1, 2]))))
+    lines = (tmp_path / "out.obj").read_text().splitlines()
+    used = [line for line in lines if line.startswith("usemtl")]
+    assert used == ["usemtl material0", "usemtl material1", "usemtl nail"]
+    assert notes[1] == (
+        "2 materials have another name in the file, because names must be unique: skin, skin"
+    )
+
+
+def test_polygons_and_the_name_of_a_single_object_of_another_file(tmp_path):
+    text = "o Roof tile\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
+    (tmp_path / "quad.obj").write_text(text)
+    _, notes = write(tmp_path, viewer.load(tmp_path / "quad.obj").actors[0])
+    assert "\no Roof tile\n" in (tmp_path / "out.obj").read_text()
+    assert notes[1] == (
+        "polygons of the original file are written as triangles (1 quad: 2 triangles in all)"
+    )
+
+
+def test_meshes_far_from_the_origin_are_written_with_all_digits(tmp_path):
+    """At 1e9 metres, nine digits would round to metres; halves need one digit more."""
+    far = replace(seamed_mesh(), positions=POSITIONS / 2 + np.array([1e9, 0, 0]))
+    obj, notes = write(tmp_path, Actor(Figure("roof", far)))
+    assert_array_equal(obj.v, far.positions)
+    assert len(notes) == 1
+
+
+def test_reduced_weights_are_reported(tmp_path):
+    """The tip turns vertex 3 from (1, 2, 1) to (1, -2, 1): all influences put it at (1, 1, 1)."""
+    actor = seamed_actor(weights=((1, 0), (0, 1), (1, 0), (0.75, 0.25), (1, 0)), unit="m")
+    actor.pose.dofs[5] = np.pi
+    obj, notes = write(tmp_path, actor, max_influences=1)
+    assert_allclose(obj.v[3], [1, 2, 1], rtol=0, atol=1e-8)
+    assert notes[1] == (
+        f"{tmp_path}/out.obj: vertices differ from the pose by up to 1 m (vertex 3): only the "
+        "strongest influence of each vertex is written, as requested"
+    )

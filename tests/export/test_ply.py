@@ -18,6 +18,7 @@ from seamed import (
     seamed_mesh,
 )
 
+import viewer
 from viewer.diagnostics import Phrase
 from viewer.errors import RigError
 from viewer.export import export
@@ -25,6 +26,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
+from viewer.rig.skinning import Skinning
 
 FLOAT32 = 2.0**-24  # half a unit in the last place, relative
 
@@ -140,3 +142,28 @@ def test_hidden_parts_are_written_and_reported(tmp_path):
     notes = export(actor, tmp_path / "parts.ply")
     assert [note.values for note in notes if note.key == "X005.hidden-parts"] == [{"n": 1}]
     assert len(read_ply(tmp_path / "parts.ply").elements["face"]) == mesh.n_triangles
+
+
+def test_meshes_far_from_the_origin_are_written_in_double_precision(tmp_path):
+    """Single precision keeps multiples of 64 at 1e9: all corners of the roof would be one point."""
+    far = replace(seamed_mesh(), positions=POSITIONS + np.array([1e9, 0, 0]))
+    ply, notes = write(tmp_path, Actor(Figure("roof", far, up="z", unit="cm")))
+    assert_array_equal(columns(ply.elements["vertex"], "x", "y", "z"), far.positions)
+    assert notes[1].endswith(
+        "positions are written in double precision: single precision would move vertices by more "
+        "than a millionth of the size"
+    )
+    assert len(notes) == 2
+    again = viewer.load(tmp_path / "out.ply").actors[0].figure
+    assert (again.up, again.unit) == ("z", "cm")
+
+
+def test_reduced_weights_are_reported(tmp_path):
+    """The tip turns vertex 3 from (1, 2, 1) to (1, -2, 1): all influences put it at (1, 1, 1)."""
+    actor = seamed_actor(weights=((1, 0), (0, 1), (1, 0), (0.75, 0.25), (1, 0)), unit="m")
+    actor.pose.dofs[5] = np.pi
+    notes = faults.lines(export(actor, tmp_path / "out.ply", Skinning(max_influences=1)))
+    assert notes[1] == (
+        f"{tmp_path}/out.ply: vertices differ from the pose by up to 1 m (vertex 3): only the "
+        "strongest influence of each vertex is written, as requested"
+    )

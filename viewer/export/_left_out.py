@@ -28,15 +28,15 @@ def extra_parts(figure: Figure) -> list[Phrase]:
     return [Phrase(name) for name, part in extras.items() if part is not None]
 
 
-def surface_parts(mesh: Mesh, has_colors: bool = False) -> list[Phrase]:
+def surface_parts(mesh: Mesh, has_colors: bool = False, has_parts: bool = False) -> list[Phrase]:
     """Return the data of a mesh that formats with one set of texture coordinates cannot hold.
 
-    ``has_colors`` tells whether the format holds vertex colours.
+    ``has_colors``, ``has_parts``: whether the format holds vertex colours, and names of parts.
     """
     extras = {
         "part-second-uvs": bool(mesh.other_uvs),
         "part-vertex-colors": mesh.colors is not None and not has_colors,
-        "part-mesh-parts": bool(mesh.parts),
+        "part-mesh-parts": bool(mesh.parts) and not has_parts,
     }
     return [Phrase(name) for name, is_lost in extras.items() if is_lost]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,14 +11,18 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.formats import free_path
 from viewer.media.image import encode_png
+from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
 from viewer.rig.material import Material, Texture
 from viewer.rig.mesh import Mesh
 
-__all__ = ["PLAIN", "library_losses", "material_library"]
-
-PLAIN = "plain"
-"""Material of triangles without a material."""
+__all__ = [
+    "library_losses",
+    "material_library",
+    "material_names",
+    "part_name",
+    "plain_name",
+]
 
 _MAPS = {
     "base_texture": ("map_Kd", ""),
@@ -30,17 +36,43 @@ _MAPS = {
 _ONE_NUMBER = ("metallic_texture", "roughness_texture")
 
 
-def material_library(mesh: Mesh, path: Path) -> dict[Path, bytes]:
-    """Return the images, followed by the ``.mtl`` that refers to them; empty for plain meshes."""
+def part_name(name: str) -> str:
+    """Return a name as a reader of ``.obj`` returns it: white space is only kept inside."""
+    return " ".join(printable(name, 200).split(" ")).strip() or "unnamed"
+
+
+def material_names(mesh: Mesh) -> list[str]:
+    """Return a name for each material: its own, if it has one that no other material has."""
+    names = [part_name(material.name) if material.name else "" for material in mesh.materials]
+    known = Counter(names)
+    return [
+        name if name and known[name] == 1 else f"material{index}"
+        for index, name in enumerate(names)
+    ]
+
+
+def plain_name(names: Sequence[str]) -> str:
+    """Return the name of the material of triangles without a material."""
+    name = "plain"
+    while name in names:
+        name += "_"
+    return name
+
+
+def material_library(mesh: Mesh, path: Path, names: Sequence[str]) -> dict[Path, bytes]:
+    """Return the images, followed by the ``.mtl`` that refers to them; empty for plain meshes.
+
+    ``names``: the name of each material.
+    """
     uvs = mesh.uvs if mesh.uvs is not None else np.zeros((0, 2))
     materials = mesh.materials if any(map(_has_look, mesh.materials)) else ()
     files: dict[Path, bytes] = {}
-    parts = [f"newmtl {PLAIN}\nKd 1 1 1\n"]
+    parts = [f"newmtl {plain_name(names)}\nKd 1 1 1\n"]
     stem = path.stem[:80]  # leaves room for the number, which must not be truncated
     # Some programs do not support options before the name, so only necessary ones are written.
     clamps = bool(((uvs < 0.0) | (uvs > 1.0)).any())
     for index, material in enumerate(materials):
-        parts.append(f"newmtl material{index}\n{_numbers(material)}")
+        parts.append(f"newmtl {names[index]}\n{_numbers(material)}")
         pictures = _pictures(material) if len(uvs) else {}
         for statement, (texture, image, ending) in pictures.items():
             data = encode_png(image)
@@ -51,7 +83,7 @@ def material_library(mesh: Mesh, path: Path) -> dict[Path, bytes]:
                 options += f"-bm {material.normal_scale:.9g} "
             parts.append(f"{statement} {options}{picture.name}\n")
     if files or materials:
-        library = "".join(parts).encode()
+        library = "".join(parts).encode("utf-8", "surrogateescape")
         files[free_path(path.parent, stem, ".mtl", library)] = library
     return files
 

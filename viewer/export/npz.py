@@ -30,9 +30,12 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export import MotionOptions
 from viewer.export._gaps import kept_gaps
+from viewer.export._losses.posed import PoseLosses
 from viewer.export._options import QUATERNIONS
-from viewer.formats import save_arrays
-from viewer.rig.arrays import Bools, Floats
+from viewer.formats import Source, all_or_none, keeping_written, save_arrays
+from viewer.formats._archive.opening import open_archive
+from viewer.formats._archive.values import Archive
+from viewer.rig.arrays import Bools, Deferred, Floats
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.captures.sampled_points import SampledPoints
 from viewer.rig.geometry.quaternion import rotation_vector_to_quaternion
@@ -74,8 +77,13 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         confidences = actor.points[:, 3]
         places = np.where(confidences[:, None] > 0.0, actor.points[:, :3], np.nan)
         arrays |= _point_arrays(figure.points, places, confidences)
-    save_arrays(path, arrays)
-    return [Diagnostic("X001.arrays", path, values={"names": [*arrays]})]
+    with keeping_written() as saved, all_or_none([path]):
+        save_arrays(path, arrays)
+        again = open_archive(Source(path, saved[path]))
+        losses = PoseLosses(figure, skinning)
+        losses.look(pose, _read(again, "vertices"), _read(again, "joints"))
+    notes = losses.notes(path)
+    return [Diagnostic("X001.arrays", path, values={"names": [*arrays]}), *notes]
 
 
 def export_animation(
@@ -120,9 +128,37 @@ def export_animation(
             pose = pose_of(figure, frames, int(frame))
             vertices[frame] = deform(figure, pose, options.skinning)[0]
         arrays["vertices"] = vertices
-    save_arrays(path, arrays)
+    with keeping_written() as saved, all_or_none([path]):
+        save_arrays(path, arrays)
+        errors = _motion_losses(animation, open_archive(Source(path, saved[path])), path, options)
     values = {**_counts(frames.present, animation.frame_rate), "names": [*arrays]}
-    return [Diagnostic("X001.motion-arrays", path, values=values), *filling]
+    return [Diagnostic("X001.motion-arrays", path, values=values), *filling, *errors]
+
+
+def _motion_losses(
+    animation: SampledAnimation, again: Archive, path: Path, options: MotionOptions
+) -> list[Diagnostic]:
+    """Return a note with the largest errors of a file that was read back, in its own frames."""
+    figure, frames, up = animation.figure, animation.frames, options.up or options.world_up
+    turned = np.eye(3)
+    if up != options.world_up:
+        turned = np.round(rotation_vector_to_matrix(_turn(up)))
+    vertices, joints = _read(again, "vertices"), _read(again, "joints")
+    losses = PoseLosses(figure, options.skinning)
+    for frame in np.flatnonzero(frames.present).tolist():
+        own = None if vertices is None else vertices[frame] @ turned
+        places = None if joints is None else joints[frame] @ turned
+        losses.look(pose_of(figure, frames, frame), own, places, frame=frame)
+    return losses.notes(path, animation.first_frame)
+
+
+def _read(archive: Archive, key: str) -> Floats | None:
+    """Return an array that was read back; None if the file does not have it."""
+    if key not in archive.keys:
+        return None
+    values = archive.get(key)
+    assert isinstance(values, Deferred)  # every value of the file is an array
+    return np.asarray(values.values(), dtype=np.float64)
 
 
 def export_points(animation: SampledPoints, path: Path, options: MotionOptions) -> list[Diagnostic]:

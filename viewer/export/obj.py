@@ -6,8 +6,7 @@ Vertices keep their numbering: along seams faces refer to several ``vt`` for one
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from itertools import chain
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +16,22 @@ from viewer.export import MotionOptions
 from viewer.export._exporter import require_mesh
 from viewer.export._gaps import kept_gaps
 from viewer.export._left_out import not_held_note, surface_parts
+from viewer.export._losses.posed import PoseLosses, look_at_mesh
 from viewer.export._motion_paths import numbered_paths
-from viewer.export._obj_materials import PLAIN, library_losses, material_library
-from viewer.formats import all_or_none, save_bytes, save_parts
-from viewer.formats._text.decimals import integers, significant
-from viewer.formats._text.number_text import row_texts
+from viewer.export._obj_materials import (
+    library_losses,
+    material_library,
+    material_names,
+    part_name,
+    plain_name,
+)
+from viewer.formats import Source, all_or_none, save_bytes, save_parts
+from viewer.formats._text.decimals import integers, shortest, significant
+from viewer.formats._text.number_text import Digits, row_texts
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats, Ints
-from viewer.rig.mesh import Mesh
+from viewer.rig.figure import Figure
+from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.motion.evaluation import pose_of
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.scene import Actor
@@ -34,38 +41,19 @@ from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["export", "export_animation"]
 
+_DIGITS = 9  # significant digits of a number, as most programs read and write
+_PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size
+_NO_PART = "other"  # object of triangles without a part
+
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     """Write ``v``, ``vt``, ``vn`` and triangles; see ``viewer.export.export``."""
-    require_mesh(actor, ".obj")
-    mesh = actor.figure.require_mesh()
-    positions, normals = deform(actor.figure, actor.pose, skinning)
-    name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
-    beside = material_library(mesh, path)
-    unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
-    head = f"# {name}: {actor.figure.up} up{unit}\n"
-    head += f"mtllib {list(beside)[-1].name}\n" if beside else ""
-    head += f"o {name}\n"
-    parts = chain(
-        [head.encode("utf-8", "surrogateescape")],
-        _rows("v", _colored(positions, mesh.colors)),
-        () if mesh.uvs is None else _rows("vt", mesh.uvs),
-        _rows("vn", normals),
-        _faces(mesh, bool(beside)),
-    )
-    n_uvs = 0 if mesh.uvs is None else len(mesh.uvs)
-    # Files that are not missing already have the same content.
-    missing = [file for file in beside if not os.path.lexists(file)]
-    with all_or_none(missing):
-        for file in missing:
-            save_bytes(file, beside[file])
-        save_parts(path, parts, 2 * mesh.n_vertices + n_uvs + mesh.n_triangles)
+    losses = PoseLosses(actor.figure, skinning)
+    odd, textures = _write(actor, path, skinning, losses)
+    figure, mesh = actor.figure, actor.figure.require_mesh()
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
-    textures = [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
-    lost = library_losses(mesh)
-    lost += [part for part in surface_parts(mesh, has_colors=True) if part not in lost]
-    notes = not_held_note(".obj and .mtl", lost)
-    return [Diagnostic("X001.mesh", path, values=counts), *textures, *notes]
+    notes = [Diagnostic("X001.mesh", path, values=counts), *textures, *odd, *losses.notes(path)]
+    return notes + _changed(figure)
 
 
 def export_animation(
@@ -76,13 +64,15 @@ def export_animation(
     ``{frame}`` in the name is replaced by the frame number, as in ``walk_{frame:05}.obj``. Missing
     frames have no file unless ``options.gaps`` requests holding or interpolation.
     """
+    figure = animation.figure
     poses, filling = kept_gaps(animation.frames, options.gaps, animation.first_frame)
     frames = np.flatnonzero(poses.present)
     files = numbered_paths(path, animation.first_frame + frames)
+    losses, odd = PoseLosses(figure, options.skinning), list[Diagnostic]()
     with all_or_none(files):
-        for frame, file in zip(frames, files, strict=True):
-            pose = pose_of(animation.figure, poses, int(frame))
-            export(Actor(animation.figure, pose), file, options.skinning)
+        for frame, file in zip(frames.tolist(), files, strict=True):
+            actor = Actor(figure, pose_of(figure, poses, frame))
+            odd += _write(actor, file, options.skinning, losses, frame)[0]
     if not files:
         return [Diagnostic("X001.no-meshes", path)]
     values = {
@@ -92,7 +82,78 @@ def export_animation(
         "missing": poses.n_frames - len(files),
     }
     key = "X001.meshes" if len(files) > 1 else "X001.one-mesh"
-    return [Diagnostic(key, path, values=values), *filling]
+    errors = losses.notes(path, animation.first_frame)
+    written = Diagnostic(key, path, values=values)
+    return [written, *filling, *odd[:1], *errors, *_changed(figure)]
+
+
+def _write(
+    actor: Actor, path: Path, skinning: Skinning, losses: PoseLosses, frame: int = 0
+) -> tuple[list[Diagnostic], list[Diagnostic]]:
+    """Write one pose and compare the file with it; return notes about triangles and textures."""
+    require_mesh(actor, ".obj")
+    mesh = actor.figure.require_mesh()
+    positions, normals = deform(actor.figure, actor.pose, skinning)
+    name = "_".join(printable(actor.figure.name, 100).split()) or "figure"
+    names = material_names(mesh)
+    beside = material_library(mesh, path, names)
+    unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
+    head = f"# {name}: {actor.figure.up} up{unit}\n"
+    library = f"mtllib {list(beside)[-1].name}\n" if beside else ""
+    parts = [
+        f"o {dict(actor.figure.facts).get('object', name)}\n".encode("utf-8", "surrogateescape"),
+        *_rows("v", _colored(positions, mesh.colors), _keeps_places(positions)),
+        *(() if mesh.uvs is None else _rows("vt", mesh.uvs)),
+        *_rows("vn", normals),
+        *_faces(mesh, names if beside or _names_only(mesh) else (), bool(beside)),
+    ]
+    first, text = head.encode("utf-8", "surrogateescape"), b"".join(parts)
+    # Without the library: its images would be decoded again.
+    odd = look_at_mesh(losses, actor, Source(path, first + text), frame)
+    n_uvs = 0 if mesh.uvs is None else len(mesh.uvs)
+    # Files that are not missing already have the same content.
+    missing = [file for file in beside if not os.path.lexists(file)]
+    with all_or_none(missing):
+        for file in missing:
+            save_bytes(file, beside[file])
+        n_lines = 2 * mesh.n_vertices + n_uvs + mesh.n_triangles
+        save_parts(path, [first, library.encode(), text], n_lines)
+    return odd, [Diagnostic("X001.texture", file) for file in beside if file.suffix == ".png"]
+
+
+def _changed(figure: Figure) -> list[Diagnostic]:
+    """Return notes about data that is written in another form, or not at all."""
+    mesh, notes = figure.require_mesh(), list[Diagnostic]()
+    polygons = dict(figure.facts).get("polygons")
+    if polygons is not None:
+        notes.append(Diagnostic("X005.polygons", values={"polygons": polygons}))
+    renamed = [
+        material.name
+        for material, name in zip(mesh.materials, material_names(mesh), strict=True)
+        if material.name and material.name != name
+    ]
+    if renamed:
+        notes.append(
+            Diagnostic("X005.material-names", values={"n": len(renamed), "names": renamed})
+        )
+    lost = library_losses(mesh)
+    extra = surface_parts(mesh, has_colors=True, has_parts=True)
+    lost += [part for part in extra if part not in lost]
+    return notes + not_held_note(".obj and .mtl", lost)
+
+
+def _names_only(mesh: Mesh) -> bool:
+    """Return whether materials without a look have names, other than those of the parts."""
+    names = {material.name for material in mesh.materials if material.name}
+    return bool(names) and not names <= set(mesh.parts)
+
+
+def _keeps_places(positions: Floats) -> bool:
+    """Return whether nine digits move a vertex by less than a millionth of the size."""
+    if len(positions) == 0:
+        return True
+    farthest, size = float(np.abs(positions).max()), box_size(bounding_box(positions))
+    return 0.5 * 10.0 ** (1 - _DIGITS) * farthest <= _PRECISE * size
 
 
 def _colored(positions: Floats, colors: Floats | None) -> Floats:
@@ -103,14 +164,22 @@ def _colored(positions: Floats, colors: Floats | None) -> Floats:
     return np.hstack([positions, encode_srgb(colors[:, :3]), np.clip(opacity, 0.0, 1.0)])
 
 
-def _rows(keyword: str, rows: Floats) -> Iterator[bytes]:
+def _rows(keyword: str, rows: Floats, is_short: bool = True) -> Iterator[bytes]:
+    """Yield lines of numbers, with nine digits or with all."""
+
+    def digits(numbers: Floats) -> Digits:
+        return significant(numbers, _DIGITS) if is_short else shortest(numbers)
+
     # Adding 0 makes -0 positive.
-    start = f"{keyword} ".encode()
-    return row_texts(rows + 0.0, lambda numbers: significant(numbers, 9), start=start)
+    return row_texts(rows + 0.0, digits, start=f"{keyword} ".encode())
 
 
-def _faces(mesh: Mesh, with_materials: bool) -> Iterator[bytes]:
-    """Yield the lines of triangles, with ``usemtl`` before each run of a material."""
+def _faces(mesh: Mesh, materials: Sequence[str], has_library: bool) -> Iterator[bytes]:
+    """Yield the lines of triangles; ``o`` and ``usemtl`` precede each run of a part or material.
+
+    ``materials``: names of the materials; none are written if it is empty.
+    ``has_library``: whether a library defines them, and a material for all other triangles.
+    """
     corners = [mesh.triangles + 1]
     if mesh.uvs is not None:
         uv = mesh.triangles if mesh.uv_triangles is None else mesh.uv_triangles
@@ -119,9 +188,18 @@ def _faces(mesh: Mesh, with_materials: bool) -> Iterator[bytes]:
     within = [b"/" if mesh.uvs is not None else b"//"] * (len(corners) - 1)
     between = [*within, b" ", *within, b" ", *within]
     table: Ints = np.stack(corners, axis=2).reshape(mesh.n_triangles, 3 * len(corners))
-    edges = np.flatnonzero(np.diff(mesh.material_indices)) + 1
+    of_material = mesh.material_indices if materials else np.full(mesh.n_triangles, -1)
+    kinds = np.stack([mesh.part_indices, of_material], axis=1)
+    edges = np.flatnonzero((kinds[1:] != kinds[:-1]).any(axis=1)) + 1
+    names = [part_name(part) for part in mesh.parts]
+    now = [-1, -2 if has_library else -1]
     for first, last in zip([0, *edges], [*edges, mesh.n_triangles], strict=True):
-        index = int(mesh.material_indices[first]) if mesh.n_triangles else -1
-        if with_materials:
-            yield f"usemtl {f'material{index}' if index >= 0 else PLAIN}\n".encode()
+        part, material = kinds[first].tolist() if mesh.n_triangles else now
+        if part != now[0]:
+            name = names[part] if part >= 0 else _NO_PART
+            yield f"o {name}\n".encode("utf-8", "surrogateescape")
+        if material != now[1]:
+            name = materials[material] if material >= 0 else plain_name(materials)
+            yield f"usemtl {name}\n".encode("utf-8", "surrogateescape")
+        now = [part, material]
         yield from row_texts(table[first:last], integers, between, start=b"f ")

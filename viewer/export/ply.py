@@ -9,63 +9,88 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export._exporter import require_mesh
 from viewer.export._left_out import not_held_note, surface_parts
-from viewer.formats import save_bytes
+from viewer.export._losses.posed import mesh_losses
+from viewer.formats import Source, save_bytes
 from viewer.phrases import printable
 from viewer.rig.arrays import Floats
-from viewer.rig.mesh import Mesh
+from viewer.rig.mesh import Mesh, bounding_box, box_size
 from viewer.rig.scene import Actor
 from viewer.rig.skinning import Skinning, deform
 from viewer.rig.srgb import encode_srgb
+from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["export"]
 
+_PRECISE = 1e-6  # largest rounding of positions, as a fraction of the figure's size
+_TYPES = {"float": "<f4", "double": "<f8"}
 _COLORS = ("red", "green", "blue", "alpha")
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
-    """Write positions and normals as float32, and triangles; see ``viewer.export.export``."""
+    """Write positions, normals and triangles; see ``viewer.export.export``.
+
+    Numbers are single precision, unless that moves a vertex by more than a millionth of the
+    figure's size: far from the origin, positions are written in double precision.
+    """
     require_mesh(actor, ".ply")
     mesh = actor.figure.require_mesh()
     positions, normals = deform(actor.figure, actor.pose, skinning)
-    vertices = _vertices(np.concatenate([positions, normals], axis=1), mesh.colors)
-    faces = _faces(mesh)
+    size = box_size(bounding_box(positions)) if mesh.n_vertices else 0.0
+    kind = _number_kind(positions, size)
+    uv_kind = "float" if mesh.uvs is None else _number_kind(mesh.uvs, 1.0)
+    vertices = _vertices(positions, normals, mesh.colors, kind)
+    faces = _faces(mesh, uv_kind)
+    unit = f", {UNIT_NAMES[actor.figure.unit]}" if actor.figure.unit in UNIT_NAMES else ""
     header = [
         "ply",
         "format binary_little_endian 1.0",
-        f"comment {printable(actor.figure.name, 60)}, {actor.figure.up} up",
+        f"comment {printable(actor.figure.name, 60)}, {actor.figure.up} up{unit}",
         f"element vertex {mesh.n_vertices}",
-        *(f"property float {name}" for name in ("x", "y", "z", "nx", "ny", "nz")),
+        *(f"property {kind} {name}" for name in ("x", "y", "z")),
+        *(f"property float {name}" for name in ("nx", "ny", "nz")),
         *(f"property uchar {name}" for name in _COLORS if mesh.colors is not None),
         f"element face {mesh.n_triangles}",
         "property list uchar int vertex_indices",
-        *(["property list uchar float texcoord"] if mesh.uvs is not None else []),
+        *([f"property list uchar {uv_kind} texcoord"] if mesh.uvs is not None else []),
         "end_header\n",
     ]
     text = "\n".join(header).encode("ascii", "backslashreplace")
-    save_bytes(path, text + vertices.tobytes() + faces.tobytes())
+    data = text + vertices.tobytes() + faces.tobytes()
+    errors = mesh_losses(actor, skinning, Source(path, data))
+    save_bytes(path, data)
     counts = {"vertices": mesh.n_vertices, "triangles": mesh.n_triangles}
     lost = [Phrase("part-all-materials")] if mesh.materials else []
     lost += surface_parts(mesh, has_colors=True)
-    return [Diagnostic("X001.mesh", path, values=counts), *not_held_note(".ply", lost)]
+    notes = [Diagnostic("X001.mesh", path, values=counts), *errors]
+    if kind == "double":
+        notes.append(Diagnostic("X005.double-positions", path))
+    return notes + not_held_note(".ply", lost)
 
 
-def _vertices(numbers: Floats, colors: Floats | None) -> np.ndarray:
+def _number_kind(numbers: Floats, size: float) -> str:
+    """Return the PLY type that keeps numbers to within a millionth of a size."""
+    with np.errstate(over="ignore"):
+        single = numbers.astype(np.float32)
+    return "float" if np.abs(numbers - single).max(initial=0.0) <= _PRECISE * size else "double"
+
+
+def _vertices(positions: Floats, normals: Floats, colors: Floats | None, kind: str) -> np.ndarray:
     """Return the rows of vertices; colours become sRGB bytes."""
-    fields: list[tuple[str, str, int]] = [("numbers", "<f4", 6)]
+    fields = [("position", _TYPES[kind], 3), ("normal", "<f4", 3)]
     if colors is not None:
         fields.append(("color", "u1", 4))
-    rows = np.zeros(len(numbers), dtype=fields)
-    rows["numbers"] = numbers
+    rows = np.zeros(len(positions), dtype=fields)
+    rows["position"], rows["normal"] = positions, normals
     if colors is not None:
         encoded = np.column_stack([encode_srgb(colors[:, :3]), np.clip(colors[:, 3], 0.0, 1.0)])
         rows["color"] = np.rint(255.0 * encoded)
     return rows
 
 
-def _faces(mesh: Mesh) -> np.ndarray:
+def _faces(mesh: Mesh, uv_kind: str) -> np.ndarray:
     fields: list[tuple[str, str] | tuple[str, str, int]] = [("n", "u1"), ("corners", "<i4", 3)]
     if mesh.uvs is not None:
-        fields += [("n_uv", "u1"), ("uv", "<f4", 6)]
+        fields += [("n_uv", "u1"), ("uv", _TYPES[uv_kind], 6)]
     faces = np.zeros(mesh.n_triangles, dtype=fields)
     faces["n"], faces["corners"] = 3, mesh.triangles
     if mesh.uvs is not None:

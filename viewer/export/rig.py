@@ -11,19 +11,18 @@ from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.export._course_rig import course_skeleton
 from viewer.export._left_out import extra_parts, not_held_note
-from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
+from viewer.export._losses.posed import PoseLosses
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.formats.skin import lost_parts
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import without_seams
-from viewer.rig.motion.single_frame import pose_frames
 from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skin import skin_rows
-from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
+from viewer.rig.skinning import Skinning, deform, skin_used
 
 __all__ = ["export"]
 
@@ -117,21 +116,15 @@ def _error(
     figure, pose = actor.figure, actor.require_pose()
     skeleton = read(files[0])
     assert isinstance(skeleton, Figure) and skeleton.skeleton is not None
-    there = world_matrices(skeleton.skeleton, rest_pose(skeleton.skeleton))[:, :3, 3]
+    joints = np.empty((figure.require_skeleton().n_joints, 3))
     order = depth_first(figure.require_skeleton().parents)
-    off = np.linalg.norm(there - joint_matrices(figure, pose)[order, :3, 3], axis=1)
-    joint = int(off.argmax())
-    one, first = pose_frames(figure, pose)
-    least = negligible(one, first, np.zeros(1, dtype=np.intp))
-    joints = Farthest(float(off[joint]), int(order[joint]), 0) if off[joint] > least else None
-    if sources is None:
-        return apart_notes(files[0].path, figure, Apart(joints, None, 1, 1), None)
-    mesh = read(files[1])
-    assert isinstance(mesh, Figure)
-    again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
-    found = deform(again, rest_pose(skeleton.skeleton))[0]
-    apart = np.linalg.norm(found - deform(figure, pose, skinning)[0][sources], axis=1)
-    vertex = int(apart.argmax()) if len(apart) else -1
-    far = len(apart) > 0 and apart[vertex] > least
-    vertices = Farthest(float(apart[vertex]), int(sources[vertex]), 0) if far else None
-    return apart_notes(files[1].path, figure, Apart(joints, vertices, 1, 1), None)
+    joints[order] = world_matrices(skeleton.skeleton, rest_pose(skeleton.skeleton))[:, :3, 3]
+    vertices = None
+    if sources is not None:
+        mesh = read(files[1])
+        assert isinstance(mesh, Figure)
+        again = Figure("again", mesh.mesh, skeleton.skeleton, mesh.skin)
+        vertices = deform(again, rest_pose(skeleton.skeleton))[0]
+    losses = PoseLosses(figure, skinning)
+    losses.look(pose, vertices, joints, sources)
+    return losses.notes(files[-1].path)

@@ -106,6 +106,9 @@ def _facts(parts: ObjParts, mesh: Mesh, has_normals: bool) -> tuple[tuple[str, s
         facts.append(("polygons", polygon_text(parts.counts, mesh.n_triangles)))
     if not has_normals:
         facts.append(("normals", "none in the file: computed from the triangles"))
+    objects = {name for _, name in parts.runs[b"o"]}
+    if len(objects) == 1 and "" not in objects:
+        facts.append(("object", objects.pop()))
     names = {name for word in (b"g", b"o") for _, name in parts.runs[word]}
     if len(names) > 1:
         facts.append(("parts", f"{len(names)} groups and objects"))

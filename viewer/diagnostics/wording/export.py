@@ -59,6 +59,8 @@ MESSAGES = {
     "X002.vertices": f"{{vertices}} differ from {{original}} by {{vertex}}{_LIMITS}",
     "X002.both": f"joints differ from {{original}} by {{joint}}; {{vertices}} by {{vertex}}"
     f"{_LIMITS}",
+    "X002.topology": "{n:#triangle} on {vertices:#vertex} were read back instead of the "
+    "{all:#triangle} of the figure",
     "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
     "to {length}{extent:+ ({})}",
     "X002.quantized": "quantised with rounding errors of up to {parts:all}",
@@ -123,6 +125,11 @@ MESSAGES = {
     "X004.of-person": "{person}: {remark}",
     "X004.of-figure": "{figure:text}: {remark}",
     # Changed data
+    "X005.double-positions": "positions are written in double precision: single precision would "
+    "move vertices by more than a millionth of the size",
+    "X005.polygons": "polygons of the original file are written as triangles ({polygons})",
+    "X005.material-names": "{n:#material|has|have} another name in the file, because names must "
+    "be unique: {names:list8}",
     "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
     "X005.unit-unknown": "lengths are unchanged: the unit of {figure:text} is unknown",
@@ -228,6 +235,7 @@ PHRASES = {
     # Causes of vertex errors
     "requested-influences": "only the {n:?strongest influence|{n} strongest influences} of each "
     "vertex {n:?is|are} written, as requested",
+    "requested-correctives": "pose correctives are left out, as requested",
     "requested-normalization": "weights are scaled to a sum of 1, as requested",
     "weights-unnormalized": "weights of {n:#vertex} do not add up to 1: scaled, as glTF requires",
     "weights-negative": "weights of {negative:#vertex} are negative: omitted and the others "

@@ -16,6 +16,7 @@ from viewer.export._gltf.shape import Shape
 from viewer.export._gltf.skin import PER_SET, Influences
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.apart import apart, apart_notes, extent_of, negligible, with_values
+from viewer.export._losses.posed import requested_causes
 from viewer.export._losses.skinned import Rows, Side, body_rows, changing, figure_side
 from viewer.rig.arrays import Ints
 from viewer.rig.figure import Figure
@@ -163,11 +164,7 @@ def causes_of(
     least: float,
 ) -> list[Phrase]:
     """Return the causes of vertex errors."""
-    found = []
-    if influences is not None and how.max_influences:
-        found.append(Phrase("requested-influences", n=how.max_influences))
-    if influences is not None and how.normalize and not how.max_influences:
-        found.append(Phrase("requested-normalization"))
+    found = requested_causes(figure, replace(how, correctives=True))
     if influences is not None and (influences.n_scaled or influences.n_negative):
         found.append(_weights_phrase(influences))
     if influences is not None and how.method != "lbs":

@@ -12,6 +12,7 @@ from viewer.formats._source import Source
 from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.mesh import vertex_normals
+from viewer.rig.units import UNIT_NAMES
 
 __all__ = ["filled_normals", "polygon_text", "stated_unit", "stated_up"]
 
@@ -65,5 +66,7 @@ def stated_up(comment: str) -> Literal["y", "z"]:
 
 
 def stated_unit(comment: str) -> str:
-    """Return ``"m"`` if a comment written by this program states metres."""
-    return "m" if re.search(r"\b[yz] up, metres\b", comment) else ""
+    """Return the unit that a comment written by this program states; empty without one."""
+    stated = re.search(r"\b[yz] up, (\w+)", comment)
+    names = {name: unit for unit, name in UNIT_NAMES.items()}
+    return "" if stated is None else names.get(stated[1], "")
