@@ -11,6 +11,7 @@ from viewer.rendering.camera import camera_from_view, eye, follow_view
 from viewer.rendering.camera_views import drawn_cameras, with_cameras
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.recorder import Recording, _Cameras
+from viewer.rig.captures.camera_view import view_at
 from viewer.rig.scene import Scene
 
 POINT = np.array([0.3, 0.7, -0.4])
@@ -28,7 +29,7 @@ def drawn_pixel(camera) -> np.ndarray:
 @pytest.mark.parametrize("frame", range(FILMED))
 def test_point_is_drawn_at_its_pixel_in_every_frame(frame):
     view = moving_camera()
-    camera = camera_from_view(view, SIZE, "y", seconds=frame / RATE)
+    camera = camera_from_view(view, SIZE, "y", seen=view_at(view, frame / RATE))
     assert_allclose(drawn_pixel(camera), pixel(view, frame, POINT), atol=1e-9)
     assert camera.fixed is view
 
@@ -36,7 +37,7 @@ def test_point_is_drawn_at_its_pixel_in_every_frame(frame):
 def test_time_moves_the_camera_and_released_camera_keeps_the_position():
     view = moving_camera()
     camera = camera_from_view(view, SIZE, "y")
-    follow_view(camera, SIZE, 0.4, BOX)
+    follow_view(camera, SIZE, Scene([], time=0.4), BOX)
     assert_allclose(drawn_pixel(camera), pixel(view, 4, POINT), atol=1e-9)
     camera.fixed = None
     assert_allclose(eye(camera), [0.8, 0.5, 5.0], atol=1e-9)
@@ -49,7 +50,7 @@ def test_released_camera_keeps_its_position():
     camera = camera_from_view(moving_camera(), SIZE, "y")
     camera.fixed = None
     before = camera.view_matrix()
-    follow_view(camera, SIZE, 0.4, BOX)
+    follow_view(camera, SIZE, Scene([], time=0.4), BOX)
     assert_allclose(camera.view_matrix(), before, atol=0)
 
 

@@ -184,7 +184,9 @@ def camera_of(
     """Return the requested camera; it frames the points unless its distance is given."""
     if arguments.view is not None:
         view = _find_view(scene, arguments.view)
-        camera = camera_from_view(view, size, scene.up, seconds=scene.time or 0.0)
+        from viewer.rig.captures.carried_view import view_in
+
+        camera = camera_from_view(view, size, scene.up, seen=view_in(view, scene))
         camera.front = front_azimuth(_front_of(arguments, scene), scene.up)
         return camera
     camera = facing_camera(_front_of(arguments, scene), scene.up, arguments.orthographic)

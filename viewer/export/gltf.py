@@ -106,7 +106,7 @@ def export_figures(
         to_file = to_metres(scene.up, scene_unit(scene))
     built = [each.built for each in added]
     placing = place_figures(document, actors, built, to_file) if len(actors) > 1 else []
-    lenses = add_cameras(document, views, to_file)
+    lenses = add_cameras(document, views, to_file, [*zip(actors, built, strict=True)])
     extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]
@@ -253,14 +253,15 @@ def export_animations(
         add_figure(document, actor, how, None, together, options.optimizes) for actor in others
     ]
     to_file = to_metres(scene.up, scene_unit(scene))
-    placing = place_figures(document, actors, [*built, *(each.built for each in added)], to_file)
-    lenses = add_cameras(document, scene.views, to_file)
+    built += [each.built for each in added]
+    placing = place_figures(document, actors, built, to_file)
+    lenses = add_cameras(document, scene.views, to_file, [*zip(actors, built, strict=True)])
     (data,) = _files([(path, document)])
     seconds = max(each.start + each.seconds for each in parts) - begin
     notes = [_motions_written(path, actors, seconds, len(scene.views), len(data[path]))]
     notes += _beside(data, path, document)
     file = _unplaced(data, placing)
-    for part, sampled, made in zip(parts, found, built, strict=True):
+    for part, sampled, made in zip(parts, found, built, strict=False):
         own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
         own += motion_remarks(sampled, options)
         own += sampled_losses(written_part(path, file, made), sampled, options)

@@ -15,6 +15,7 @@ from viewer.rig.mesh import bounding_box, box_size
 
 if TYPE_CHECKING:
     from viewer.rig.captures.camera_view import CameraView
+    from viewer.rig.scene import Scene
 
 __all__ = [
     "VIEWS",
@@ -72,8 +73,8 @@ class Camera:
         effect only while this field is None.
     front : float
         Azimuth of the front view; named views are relative to it.
-    seconds : float
-        Time of the scene, which determines the position of a moving calibrated camera.
+    seen : CameraView or None
+        ``fixed`` at the time and in the pose of the scene; None if it does not move.
     """
 
     target: Floats = field(default_factory=lambda: np.zeros(3))
@@ -85,7 +86,7 @@ class Camera:
     up: Literal["y", "z"] = "y"
     fixed: CameraView | None = None
     front: float = 0.0
-    seconds: float = 0.0
+    seen: CameraView | None = None
 
     def copy(self) -> Camera:
         """Return an independent copy."""
@@ -99,17 +100,13 @@ class Camera:
             self.up,
             self.fixed,
             self.front,
-            self.seconds,
+            self.seen,
         )
 
     @property
     def pinhole(self) -> CameraView | None:
-        """The calibrated camera to look through, at ``seconds``; None if there is none."""
-        if self.fixed is None:
-            return None
-        from viewer.rig.captures.camera_view import view_at
-
-        return view_at(self.fixed, self.seconds)
+        """The calibrated camera to look through, where it is now; None if there is none."""
+        return None if self.fixed is None else self.seen or self.fixed
 
     @property
     def is_parallel(self) -> bool:
@@ -235,7 +232,7 @@ def camera_from_view(
     size: tuple[int, int],
     up: Literal["y", "z"],
     box: Floats | None = None,
-    seconds: float = 0.0,
+    seen: CameraView | None = None,
 ) -> Camera:
     """Return a camera that looks through a calibrated one.
 
@@ -252,8 +249,8 @@ def camera_from_view(
         The scene's up axis.
     box : (2, 3), optional
         Bounds of the objects to orbit, scene space; the origin if omitted.
-    seconds : float
-        Time of the scene, for a moving camera.
+    seen : CameraView, optional
+        The camera at the time and in the pose of the scene, from ``view_in``, if it moves.
 
     Raises
     ------
@@ -261,13 +258,12 @@ def camera_from_view(
         If the size of the camera's images is unknown.
     """
     from viewer.rendering.pinhole import picture_size
-    from viewer.rig.captures.camera_view import view_at
 
-    fixed, view = view, view_at(view, seconds)
+    fixed, view = view, seen or view
     width, height = picture_size(view)
     aspect = size[0] / size[1]
     # Number of rows of the image, including the margins above and below.
-    seen = max(height, width / aspect)
+    rows = max(height, width / aspect)
     backward = -view.rotation[2]
     place = -view.rotation.T @ view.translation
     middle = np.zeros(3) if box is None else box.mean(axis=0)
@@ -281,33 +277,37 @@ def camera_from_view(
         distance=distance,
         azimuth=math.degrees(math.atan2(x, z)),
         inclination=math.degrees(math.atan2(y, math.hypot(x, z))),
-        fov=math.degrees(2.0 * math.atan2(0.5 * seen, focal)),
+        fov=math.degrees(2.0 * math.atan2(0.5 * rows, focal)),
         up=up,
         fixed=fixed,
-        seconds=seconds,
+        seen=seen,
     )
 
 
 def follow_view(
-    camera: Camera, size: tuple[int, int], seconds: float, box: Floats | None = None
+    camera: Camera, size: tuple[int, int], scene: Scene, box: Floats | None = None
 ) -> None:
-    """Move a camera, and the calibrated camera it looks through, to a time of the scene, in place.
+    """Move a camera together with the calibrated camera that it looks through, in place.
 
-        If ``fixed`` is later reset to None, the camera continues from the current position.
+    If ``fixed`` is later reset to None, the camera continues from the current position.
 
     Parameters
     ----------
     camera : Camera
-        Any camera; unless it looks through a moving calibrated camera, only its time changes.
-    size, seconds, box
+        Any camera; unless it looks through a calibrated camera that moves, it does not change.
+    size, box
         As for ``camera_from_view``.
+    scene : Scene
+        The scene, posed at its time.
     """
-    camera.seconds, fixed = seconds, camera.fixed
-    if fixed is None or fixed.motion is None:
+    fixed = camera.fixed
+    if fixed is None or (fixed.motion is None and fixed.mount is None):
         return
-    seen = camera_from_view(fixed, size, camera.up, box, seconds)
-    camera.target, camera.distance = seen.target, seen.distance
-    camera.azimuth, camera.inclination, camera.fov = seen.azimuth, seen.inclination, seen.fov
+    from viewer.rig.captures.carried_view import view_in
+
+    there = camera_from_view(fixed, size, camera.up, box, view_in(fixed, scene))
+    camera.target, camera.distance, camera.seen = there.target, there.distance, there.seen
+    camera.azimuth, camera.inclination, camera.fov = there.azimuth, there.inclination, there.fov
 
 
 def fit(camera: Camera, points: Floats, aspect: float, free_height: float = 1.0) -> None:

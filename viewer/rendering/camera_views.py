@@ -38,10 +38,9 @@ def drawn_cameras(
     """Return the cameras whose frusta are drawn, at the scene's time: all except the one in use."""
     if not options.cameras or not scene.views:
         return []
-    from viewer.rig.captures.camera_view import view_at
+    from viewer.rig.captures.carried_view import view_in
 
-    seconds = scene.time or 0.0
-    return [view_at(camera, seconds) for camera in scene.views if camera is not view_through]
+    return [view_in(camera, scene) for camera in scene.views if camera is not view_through]
 
 
 def reach_of(
@@ -91,15 +90,17 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
 def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
     """Return the points to frame: the figures' points, and the corners of drawn frusta.
 
-    Moving cameras are framed along their whole path.
+    Cameras that move in frames are framed along their whole path, those that a joint carries where
+    they are now.
     """
     if not options.cameras or not scene.views:
         return points
     from viewer.rendering.overlay.frusta import frusta_points
     from viewer.rig.captures.camera_view import motion_times, view_at
+    from viewer.rig.captures.carried_view import view_in
 
     cameras = [
-        view_at(camera, seconds)
+        view_at(view_in(camera, scene) if camera.mount else camera, seconds)
         for camera in scene.views
         for seconds in motion_times(camera, _FRAMED).tolist()
     ]

@@ -27,7 +27,7 @@ from typing import Protocol
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.camera import Camera
+from viewer.rendering.camera import Camera, follow_view
 from viewer.rendering.gpu.target import Target, picture_rows, straight
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.gpu.waiting import Waiter
@@ -358,7 +358,7 @@ class _Cameras:
     def at(self, frame: int, scene: Scene) -> Camera:
         recording = self._recording
         camera, follow = recording.camera.copy(), recording.follow
-        camera.seconds = scene.time or 0.0
+        follow_view(camera, recording.size, scene)
         if recording.turntable:
             rotated = camera.azimuth + recording.turntable * frame / recording.n_frames
             camera.azimuth = (rotated + 180.0) % 360.0 - 180.0

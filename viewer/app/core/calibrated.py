@@ -5,6 +5,7 @@ from __future__ import annotations
 from viewer.app.core.state import AppState
 from viewer.rendering.camera import Camera, camera_from_view, follow_view
 from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.carried_view import view_in
 
 __all__ = ["follow_calibrated", "look_through_view"]
 
@@ -17,7 +18,8 @@ def look_through_view(state: AppState, view: CameraView) -> None:
     RigError
         If the size of the camera's images is unknown.
     """
-    seen = camera_from_view(view, _size(state), state.scene.up, state.box, state.clock.time)
+    scene = state.scene
+    seen = camera_from_view(view, _size(state), scene.up, state.box, view_in(view, scene))
     seen.front = state.camera.front
     for name in Camera.__slots__:
         setattr(state.camera, name, getattr(seen, name))
@@ -25,7 +27,7 @@ def look_through_view(state: AppState, view: CameraView) -> None:
 
 def follow_calibrated(state: AppState) -> None:
     """Update the view through a moving calibrated camera, if it looks through one."""
-    follow_view(state.camera, _size(state), state.clock.time, state.box)
+    follow_view(state.camera, _size(state), state.scene, state.box)
 
 
 def _size(state: AppState) -> tuple[int, int]:

@@ -190,7 +190,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
             if key == "easymocap":
                 return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
             with all_or_none(files):
-                if is_one_file(path) and len(parts) + len(still) > 1:
+                if is_one_file(path) and (len(parts) + len(still) > 1 or scene.views):
                     notes = _write_together(scene, parts, still, path, options)
                 else:
                     notes = _write(scene, parts, key, options)

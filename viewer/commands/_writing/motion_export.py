@@ -180,7 +180,8 @@ def write_motions(
     if not there:
         raise RigError(f"no person is present in {parts[0].span}: there is nothing to write")
     still = [each for each in scene.actors if is_one and each.clip is None and each not in actors]
-    if is_one and len(there) + len(still) > 1:
+    # The cameras of a scene are written together with the joints that carry them.
+    if is_one and (len(there) + len(still) > 1 or scene.views):
         notes = _write_together(there, scene, output, options, still, check)
     else:
         notes = _write(there, output, key, options, check)

@@ -9,28 +9,40 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
+from viewer.export._gltf.body import Built
 from viewer.export._gltf.document import Document, text_of
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_view import CameraView
+from viewer.rig.captures.carried_view import carrier_of
 from viewer.rig.geometry.rotation import matrix_to_quaternion, nearest_rotations
+from viewer.rig.scene import Actor
 
 __all__ = ["add_cameras"]
 
 # OpenCV's cameras look along z with y down, those of glTF along -z with y up.
 _FLIP = np.diag([1.0, -1.0, -1.0])
 _NEAR = 0.01  # distance of the near plane, which glTF requires, in metres: closer than any figure
-_CENTRED = 1e-6  # tolerance for a centred principal point, as a fraction of the width
+# Largest distance of the principal point from the centre that is not reported, pixels: calibrations
+# of a centred lens state W / 2 or, in OpenCV's coordinates, (W - 1) / 2.
+_CENTRED = 0.5 + 1e-6
+_EXACT = 1e-9  # tolerance for a matrix that is a rotation
 
 
 def add_cameras(
-    document: Document, views: Sequence[CameraView], to_file: Floats
+    document: Document,
+    views: Sequence[CameraView],
+    to_file: Floats,
+    written: Sequence[tuple[Actor, Built]],
 ) -> list[Diagnostic]:
     """Add the cameras of a scene; return notes about what glTF cannot store.
 
     ``document``: modified in place; already has a scene.
     ``views``: the cameras, in the space of the scene.
     ``to_file`` (4, 4): scene space to the space of the file.
+    ``written``: the figures of the file, whose joints carry some of the cameras.
     """
+    nodes = document.root["nodes"]
+    built, actors = dict(written), [actor for actor, _ in written]
     for view in views:
         camera: dict[str, Any] = {"name": text_of(view.name)} if view.name else {}
         focal_x, focal_y = float(view.intrinsic[0, 0]), float(view.intrinsic[1, 1])
@@ -39,13 +51,18 @@ def add_cameras(
         aspect = (width / focal_x) / (height / focal_y)
         lens = {"yfov": angle, "aspectRatio": aspect, **_planes(view, to_file)}
         index = document.add("cameras", {**camera, "type": "perspective", "perspective": lens})
+        item = {**camera, "camera": index}
+        carrier, mount = carrier_of(view, actors), view.mount
+        if carrier is not None and mount is not None:
+            node = document.add("nodes", {**item, **_placed(mount.matrix)})
+            joint = built[carrier].tree.joints[mount.joint]
+            nodes[joint].setdefault("children", []).append(node)
+            continue
         center = to_file @ np.append(-view.rotation.T @ view.translation, 1.0)
         turned = nearest_rotations(to_file[:3, :3])[0] @ view.rotation.T @ _FLIP
-        place = {
-            "translation": center[:3].tolist(),
-            "rotation": matrix_to_quaternion(turned).tolist(),
-        }
-        node = document.add("nodes", {**camera, "camera": index, **place})
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = turned, center[:3]
+        node = document.add("nodes", {**item, **_placed(matrix)})
         document.root["scenes"][0]["nodes"].append(node)
     bent = [view.name for view in views if _is_bent(view)]
     moving = [view.name for view in views if view.motion is not None]
@@ -55,6 +72,15 @@ def add_cameras(
         for key, names in found.items()
         if names
     ]
+
+
+def _placed(matrix: Floats) -> dict[str, list[float]]:
+    """Return the members of a node with a transform."""
+    linear = matrix[:3, :3]
+    if np.abs(linear @ linear.T - np.eye(3)).max() > _EXACT or np.linalg.det(linear) < 0.0:
+        return {"matrix": matrix.T.ravel().tolist()}
+    rotation = matrix_to_quaternion(linear)
+    return {"translation": matrix[:3, 3].tolist(), "rotation": rotation.tolist()}
 
 
 def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
@@ -74,6 +100,6 @@ def _size(view: CameraView) -> tuple[float, float]:
 def _is_bent(view: CameraView) -> bool:
     """Return whether a lens is distorted, skewed or off centre."""
     width, height = _size(view)
-    apart = view.intrinsic[:2, 2] - (0.5 * width, 0.5 * height)
-    is_off = bool((np.abs(apart) > _CENTRED * width).any()) or view.intrinsic[0, 1] != 0.0
+    apart = view.intrinsic[:2, 2] - (0.5 * (width - 1.0), 0.5 * (height - 1.0))
+    is_off = bool((np.abs(apart) > _CENTRED).any()) or view.intrinsic[0, 1] != 0.0
     return is_off or bool(view.distortion.any())

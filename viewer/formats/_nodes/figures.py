@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.bindings import bind_rigid, bind_skins, inverse_binds
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._nodes.facts import facts_of
 from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, scene_order
-from viewer.formats._nodes.joints import make_joints, skeleton_of
+from viewer.formats._nodes.joints import Joints, make_joints, skeleton_of
 from viewer.formats._nodes.motions import Reader, animations_of, read_once
 from viewer.formats._nodes.pointers import remember_pointers
 from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
-from viewer.formats._nodes.views import views_of
+from viewer.formats._nodes.views import Carrier, views_of
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
+from viewer.rig.file_record import FileRecord
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source
@@ -50,15 +52,16 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     found = [_figure(file, members, readers, source) for members in groups]
-    _note_normals([piece for _, pieces, _ in found for piece in pieces], source)
-    _note_weights([piece for _, pieces, _ in found for piece in pieces], source)
-    _note_others(file, {node for _, _, nodes in found for node in nodes}, source)
+    _note_normals([piece for each in found for piece in each.pieces], source)
+    _note_weights([piece for each in found for piece in each.pieces], source)
+    _note_others(file, {node for each in found for node in each.moved}, source)
     order = scene_order(file) if file.cameras else []
     _note_methods(file, groups, source)
-    views, left_out = views_of(file.tree, order, file.cameras)
+    carriers = [Carrier(each.record, each.joints) for each in found]
+    views, left_out = views_of(file.tree, order, file.cameras, carriers)
     if left_out:
         source.warn("F007.orthographic", names=left_out)
-    return FigureGroup(file.name, tuple(figure for figure, _, _ in found), views)
+    return FigureGroup(file.name, tuple(each.figure for each in found), views)
 
 
 def _is_undrawn(file: NodeFile, source: Source) -> bool:
@@ -67,15 +70,25 @@ def _is_undrawn(file: NodeFile, source: Source) -> bool:
     return bool(file.meshes) and not has_triangles and not source.diagnostics.errors
 
 
-def _figure(
-    file: NodeFile, members: Members, readers: list[Reader], source: Source
-) -> tuple[Figure, list[Piece], set[int]]:
-    """Return one figure, the primitives of which it consists, and the nodes that move it."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Made:
+    """A figure, its record and joints, its primitives, and the nodes that move it."""
+
+    figure: Figure
+    record: FileRecord
+    joints: Joints
+    pieces: list[Piece]
+    moved: set[int]
+
+
+def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Source) -> _Made:
+    """Return one figure."""
     joints = make_joints(file.tree, members.nodes)
     bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
     pieces = pieces_of(file, members.meshes, bindings)
     columns = shape_columns(file, members.meshes, readers)
+    record = record_of(file, joints, members.meshes, columns, pieces)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
@@ -86,10 +99,10 @@ def _figure(
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
         facts=facts_of(file, pieces),
         animations=animations_of(file.animations, readers, joints.own, columns),
-        record=record_of(file, joints, members.meshes, columns, pieces),
+        record=record,
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)
-    return figure, pieces, joints.own.keys() | columns.keys()
+    return _Made(figure, record, joints, pieces, joints.own.keys() | columns.keys())
 
 
 def _is_skinned(file: NodeFile, node: int) -> bool:

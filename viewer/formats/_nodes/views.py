@@ -1,29 +1,39 @@
-"""Cameras of a file of nodes, as camera views in the rest pose."""
+"""Cameras of a file of nodes, as camera views that the joints above them carry."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from collections.abc import Sequence
 
 import numpy as np
 
+from viewer.data_classes import dataclass
 from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.content import NodeCamera, NodeTree
-from viewer.formats._nodes.joints import make_joints, rest_worlds
+from viewer.formats._nodes.joints import Joints, make_joints, rest_worlds
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
-from viewer.rig.geometry.rotation import nearest_rotations
+from viewer.rig.captures.camera_view import CameraMount, CameraView, extrinsics
+from viewer.rig.file_record import FileRecord
 
-__all__ = ["views_of"]
+__all__ = ["Carrier", "views_of"]
 
 _HEIGHT = 1080  # height of a view, pixels
 _ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none
-# Converts x right, y up, z backwards to x right, y down, z forward.
-_TO_OPENCV = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Carrier:
+    """A figure whose joints can carry cameras."""
+
+    record: FileRecord
+    joints: Joints
 
 
 def views_of(
-    tree: NodeTree, order: list[int], cameras: tuple[NodeCamera, ...]
+    tree: NodeTree,
+    order: list[int],
+    cameras: tuple[NodeCamera, ...],
+    carriers: Sequence[Carrier] = (),
 ) -> tuple[tuple[CameraView, ...], list[str]]:
     """Return the perspective cameras of a scene.
 
@@ -35,6 +45,8 @@ def views_of(
         Nodes of the scene, parents first.
     cameras : tuple of NodeCamera
         The file's cameras.
+    carriers : sequence of Carrier
+        The figures of the file.
 
     Returns
     -------
@@ -57,22 +69,47 @@ def views_of(
             left_out.append(name)
         else:
             world = worlds[joints.carrier[node]]
-            view = _view(name, world, camera.vertical_angle, camera.aspect or _ASPECT)
-            views.append(replace(view, near=camera.near, far=camera.far))
+            mount = _mount(tree, node, carriers)
+            views.append(_view(name, world, camera.vertical_angle, camera, mount))
     return tuple(views), left_out
 
 
-def _view(name: str, world: Floats, vertical_angle: float, aspect: float) -> CameraView:
-    """Return a view with square pixels; scales of the node's ancestors are ignored."""
-    size = max(1, round(_HEIGHT * aspect)), _HEIGHT
-    focal = 0.5 * _HEIGHT / math.tan(0.5 * vertical_angle)
-    rotation = _TO_OPENCV @ nearest_rotations(world[:3, :3])[0].T
+def _mount(tree: NodeTree, node: int, carriers: Sequence[Carrier]) -> CameraMount | None:
+    """Return the nearest joint at or above a camera's node; None if no figure has one."""
+    below: list[int] = []
+    while node >= 0:
+        for carrier in carriers:
+            joint = carrier.joints.carrier.get(node)
+            if joint is not None:
+                # Without the nodes above, the rest transforms are relative to the joint.
+                chain = make_joints(tree, below[::-1])
+                matrix = rest_worlds(chain)[chain.carrier[below[0]]] if below else np.eye(4)
+                return CameraMount(carrier.record, joint, matrix)
+        below.append(node)
+        node = int(tree.parents[node])
+    return None
+
+
+def _view(
+    name: str, world: Floats, angle: float, camera: NodeCamera, mount: CameraMount | None
+) -> CameraView:
+    """Return a view with square pixels; scales of the node's ancestors are ignored.
+
+    glTF projects the axis of the camera to the centre of the picture. Pixel coordinates begin at
+    the centre of the first pixel, so the principal point is at (W - 1) / 2, (H - 1) / 2.
+    """
+    aspect = camera.aspect or _ASPECT
+    width, height = max(1, round(_HEIGHT * aspect)), _HEIGHT
+    focal = 0.5 * height / math.tan(0.5 * angle)
+    across, down = 0.5 * (width - 1.0), 0.5 * (height - 1.0)
+    rotation, translation = extrinsics(world)
     return CameraView(
         name=name,
-        intrinsic=np.array(
-            [[focal, 0.0, 0.5 * size[0]], [0.0, focal, 0.5 * size[1]], [0.0, 0.0, 1.0]]
-        ),
+        intrinsic=np.array([[focal, 0.0, across], [0.0, focal, down], [0.0, 0.0, 1.0]]),
         rotation=rotation,
-        translation=-rotation @ world[:3, 3],
-        size=size,
+        translation=translation,
+        size=(width, height),
+        near=camera.near,
+        far=camera.far,
+        mount=mount,
     )

@@ -1,18 +1,37 @@
-"""Calibrated cameras that recorded a motion, fixed or moving."""
+"""Calibrated cameras: fixed, moving in frames, or carried by a joint of a figure."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Floats, frozen
 from viewer.rig.geometry.quaternion import slerp
-from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
+from viewer.rig.geometry.rotation import (
+    matrix_to_quaternion,
+    nearest_rotations,
+    quaternion_to_matrix,
+)
 from viewer.rig.motion.timing import Timing
 
-__all__ = ["CameraMotion", "CameraView", "motion_times", "placed_view", "view_at"]
+if TYPE_CHECKING:
+    from viewer.rig.file_record import FileRecord
+
+__all__ = [
+    "CameraMotion",
+    "CameraMount",
+    "CameraView",
+    "extrinsics",
+    "motion_times",
+    "placed_view",
+    "view_at",
+]
+
+# OpenCV's cameras look along z with y down, those of glTF along -z with y up.
+_FLIP = np.diag([1.0, -1.0, -1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,6 +65,28 @@ class CameraMotion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CameraMount:
+    """The joint that carries a camera.
+
+    Attributes
+    ----------
+    record : FileRecord
+        Record of the figure with the joint. Edits of the figure keep it.
+    joint : int
+        Index of the joint.
+    matrix : (4, 4)
+        Camera to joint space; here the camera looks along -z with y up, as in glTF.
+    """
+
+    record: FileRecord
+    joint: int
+    matrix: Floats
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", frozen("matrix", self.matrix, (4, 4)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CameraView:
     """A pinhole camera in OpenCV's convention: x right, y down, z forward.
 
@@ -69,6 +110,8 @@ class CameraView:
         Its placement over time if it moves; the fields above then apply to the first frame.
     near, far : float or None
         Distances of the clipping planes that its file states, scene units. They are not used.
+    mount : CameraMount or None
+        The joint that carries it; rotation and translation then apply to the rest pose.
     """
 
     name: str
@@ -80,6 +123,7 @@ class CameraView:
     motion: CameraMotion | None = None
     near: float | None = None
     far: float | None = None
+    mount: CameraMount | None = None
 
     def __post_init__(self) -> None:
         shapes = {"intrinsic": (3, 3), "rotation": (3, 3), "translation": (3,)}
@@ -121,6 +165,18 @@ def view_at(view: CameraView, seconds: float) -> CameraView:
     return replace(
         view, intrinsic=intrinsic, rotation=rotation, translation=-rotation @ center, motion=None
     )
+
+
+def extrinsics(world: Floats) -> tuple[Floats, Floats]:
+    """Return R and T of a camera that looks along -z with y up, without its scale.
+
+    Parameters
+    ----------
+    world : (4, 4)
+        Camera to scene space.
+    """
+    rotation = _FLIP @ nearest_rotations(world[:3, :3])[0].T
+    return rotation, -rotation @ world[:3, 3]
 
 
 def motion_times(view: CameraView, most: int) -> Floats:
