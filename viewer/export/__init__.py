@@ -338,10 +338,12 @@ def export_animation(
         Options of the export.
     """
     module = import_module(f"{__name__}.{key}")
+    from viewer.export._losses.between import rate_note
+
     notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
     if len(animation.frames.present) == 1:
         return notes  # a pose was requested
-    return notes + other_animations_note(animation.figure, animation.motion)
+    return notes + rate_note(animation) + other_animations_note(animation.figure, animation.motion)
 
 
 def animation_for(

@@ -35,7 +35,7 @@ from viewer.export._family_frames import (
 )
 from viewer.export._family_reading import Records, read_frames
 from viewer.export._gaps import kept_gaps, kept_note
-from viewer.export._losses.between import resampling_losses
+from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._losses.lines import frames_losses
 from viewer.export._options import MotionOptions
 from viewer.formats._text.decimals import fixed
@@ -165,7 +165,7 @@ class _Person:
         found = read_frames(self.again.motion(self.animation.frame_rate), self.original, options)
         how = options.skinning
         lines = frames_losses(path, self.original, frames_between(found, place), how)
-        return lines + resampling_losses(path, self.original, how)
+        return lines + resampling_losses(path, self.original, how) + rate_note(self.original)
 
 
 def _check(animations: Sequence[SampledAnimation], persons: Sequence[int]) -> None:

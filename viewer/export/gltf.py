@@ -36,7 +36,7 @@ from viewer.export._gltf.sampled import (
     written_part,
 )
 from viewer.export._left_out import other_animations_note
-from viewer.export._losses.between import resampling_losses
+from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import MotionOptions
 from viewer.formats import all_or_none, save_bytes
@@ -265,7 +265,7 @@ def export_animations(
         own = _quantization(path, made, sampled.animation.figure) + _remarks(sampled.body, part.up)
         own += motion_remarks(sampled, options)
         own += sampled_losses(written_part(path, file, made), sampled, options)
-        own += resampling_losses(path, sampled.animation, how)
+        own += resampling_losses(path, sampled.animation, how) + rate_note(sampled.animation)
         own += not_held(sampled.animation.figure, sampled.body.shape)
         own += other_animations_note(part.animation.figure, part.animation.motion)
         notes += [_of_figure(part.actor, note) for note in own]

@@ -8,7 +8,7 @@ from rig.animated import HALF, about, channel, clip_of, plain_value
 from viewer.errors import RigError
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.rate import is_regular, key_rate
 from viewer.rig.transforms.sampling import sample_transforms
 
 EXACT = 1e-14  # a few rounding errors of numbers near 1
@@ -145,9 +145,26 @@ def test_zero_quaternion_is_not_a_rotation():
         (np.float32(np.arange(1000) / 60.0), 60.0),
         ([0.0, 1.0], 30.0),
         ([0.04, 0.08], 25.0),
-        ([0.0, 0.0123], 30.0),
+        (np.float32(np.arange(524) / 120.0), 120.0),
+        (0.5 + np.arange(90) / 90.0, 90.0),
+        (1.0 / 60.0 + np.arange(90) / 30.0, 30.0),
+        (np.float32(np.arange(2000) * 1001.0 / 120000.0), 120000.0 / 1001.0),
+        (np.float32(1000.0 + np.arange(200) / 120.0), 120.0),
+        (np.arange(200) / 83.3, 83.3),
+        # Six frames between keys that are 0.2313 s apart.
+        (np.arange(20) * 0.2313, 6.0 / 0.2313),
+        (np.arange(20) / 30.0 + 0.01 * np.arange(20) ** 2, 30.0),
+        ([0.0, 0.1, 0.10001, 1.0], 30.0),
     ],
 )
 def test_frame_rate_is_estimated_from_the_keys(times, rate):
     clip = clip_of(channel(0, "translation", times, np.zeros((len(times), 3))))
-    assert key_rate(clip) == rate
+    assert key_rate(clip) == pytest.approx(rate, rel=1e-5)
+
+
+def test_keys_at_irregular_times_are_recognised():
+    regular, odd = np.arange(9) / 120.0, np.array([0.0, 0.1, 0.2345])
+    clips = [
+        clip_of(channel(0, "translation", at, np.zeros((len(at), 3)))) for at in (regular, odd)
+    ]
+    assert [is_regular(clip) for clip in clips] == [True, False]

@@ -16,7 +16,7 @@ from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion
-from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.rate import is_regular, key_rate
 
 _SHOWN_GAPS = 6
 _NO_NAME = "(no name)"
@@ -49,6 +49,7 @@ def _describe_transforms(clip: TransformClip) -> dict[str, Any]:
     return {
         "kind": "transforms",
         "frame_rate": key_rate(clip),
+        "regular": is_regular(clip),
         "channels": len(clip.channels),
         "paths": _counts(channel.path for channel in clip.channels),
         "interpolation": _counts(channel.interpolation for channel in clip.channels),
@@ -138,7 +139,7 @@ def _transform_lines(head: str, clip: dict[str, Any]) -> list[str]:
     lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
     if clip["key_times"]:
         first, last = map(number_text, clip["key_times"])
-        rate = f"{clip['frame_rate']:g} fps"
+        rate = f"{clip['frame_rate']:g} fps" if clip["regular"] else "irregular times"
         lines.append(f"    keys from {first} to {last} s at {rate}; {paths}; {modes}")
     return lines
 

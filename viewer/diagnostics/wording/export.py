@@ -137,6 +137,8 @@ MESSAGES = {
     "programs interpret glTF lengths as metres",
     "X005.unit-scaled": "lengths are in {unit}: a node above the figure scales them to metres by "
     "{factor:g}",
+    "X005.irregular-keys": "the keys are at irregular times, so the motion is sampled at {rate:g} "
+    "frames per second",
     "X005.unit-converted": "lengths were converted from {unit} to metres",
     "X005.z-up": "z is up: a node above the figure rotates it by -90 degrees about x",
     "X005.position-channels": "{n:#joint} below the root {n:?translates and has|translate and "

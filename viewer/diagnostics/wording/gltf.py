@@ -30,6 +30,8 @@ MESSAGES = {
     "F002.vrma-animation": "expected an animation of human bones, found none",
     "F002.vrma-long": "expected at most {most} frames, found {found}",
     "F007.vrma-animations": "{n:#further animation} ignored: only the first is played",
+    "F007.vrma-rate": "the keys are at irregular times, so the motion is sampled at {rate:g} "
+    "frames per second",
     "F007.vrma-look": "gaze direction is not shown",
     "F007.expressions-unmatched": "the figure lacks expressions: {names:list12}",
     "F007.vrm-materials": "material changes by expressions have no effect: {names:list12}",

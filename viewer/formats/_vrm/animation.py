@@ -30,7 +30,7 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing, frame_at, frame_times
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.transforms.rate import key_rate
+from viewer.rig.transforms.rate import is_regular, key_rate
 
 __all__ = ["EXTENSION", "read_motion"]
 
@@ -70,6 +70,8 @@ def read_motion(file: NodeFile, source: Source) -> SkeletonMotion:
     if not clip.channels:
         raise source.fault("F002.vrma-animation")
     rate = key_rate(clip)
+    if not is_regular(clip):
+        source.warn("F007.vrma-rate", "/animations/0", rate=rate)
     count = frame_at(clip.end - clip.start, rate) + 1
     if count > _MOST_FRAMES:
         raise source.fault("F002.vrma-long", "/animations/0", most=_MOST_FRAMES, found=count)
