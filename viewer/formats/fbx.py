@@ -2,8 +2,9 @@
 
 The format belongs to Autodesk and is not published. ufbx (github.com/ufbx/ufbx) reads versions 3.0
 to 7.7, ASCII and binary, in a child process, because its Python binding can crash. Transforms with
-pivots are folded into translation, rotation and scale, which is exact. Animations are baked at the
-file's frame rate and at their keys. Right-handed axes with y or z up and units of m, cm, mm or
+pivots are folded into translation, rotation and scale, which is exact. Animations are sampled at
+the file's frame rate and at their keys, beyond their keys if curves are extrapolated, and more
+densely in fast spins. Right-handed axes with y or z up and units of m, cm, mm or
 inches are preserved; others are converted to y up and metres.
 """
 

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-__all__ = ["write_humanoid", "write_strip"]
+__all__ = ["QUAD_5000", "SECOND", "write_humanoid", "write_joints", "write_strip"]
+
+SECOND = 46186158000
+"""Ticks of one second."""
 
 _HEAD = """; FBX 7.4.0 project file
 FBXHeaderExtension:  {{
@@ -155,12 +158,18 @@ Connections:  {
 """
 
 
-def write_strip(folder: Path, up: str = "y", unit: float = 1.0) -> Path:
-    """Write the file; ``unit`` is in centimetres per unit."""
+def write_strip(
+    folder: Path, up: str = "y", unit: float = 1.0, edits: dict[str, str] | None = None
+) -> Path:
+    """Write the file; ``unit`` is in centimetres per unit, ``edits`` replace parts of the text."""
     front, sign = (2, 1) if up == "y" else (1, -1)
-    head = _HEAD.format(up=1 if up == "y" else 2, front=front, front_sign=sign, unit=unit)
+    text = _HEAD.format(up=1 if up == "y" else 2, front=front, front_sign=sign, unit=unit)
+    text += _OBJECTS
+    for old, new in (edits or {}).items():
+        assert old in text, old
+        text = text.replace(old, new)
     path = folder / "strip.fbx"
-    path.write_text(head + _OBJECTS)
+    path.write_text(text)
     return path
 
 
@@ -234,3 +243,96 @@ def write_humanoid(path: Path, bones: dict[str, tuple[str, tuple[float, float, f
     ]
     path.write_text("\n".join(lines))
     return path
+
+
+def write_joints(folder: Path, curves: dict[str, tuple[str, str, int, str]], stop: float) -> Path:
+    """Write joints that rotate about z, each by a curve.
+
+    ``curves`` are, by name of the joint: times in seconds, angles in degrees, the flag of all keys
+    (2 for steps, 4 for lines), and further entries of the curve. ``stop`` is the end in seconds.
+    """
+    objects, connections = _STACK.replace("STOP", f"{stop * SECOND:.0f}"), _LINK.format(51, 50)
+    for row, (name, (times, angles, key, more)) in enumerate(curves.items()):
+        node, value, curve = 100 + row, 200 + row, 300 + row
+        ticks = [f"{float(time) * SECOND:.0f}" for time in times.split()]
+        objects += _JOINT.format(
+            node=node, name=name, value=value, curve=curve, count=len(ticks), key=key, more=more,
+            times=",".join(ticks), angles=",".join(angles.split()),
+        )  # fmt: skip
+        connections += _LINK.format(node, 0) + _LINK.format(value, 51)
+        connections += f'    C: "OP",{value},{node}, "Lcl Rotation"\n'
+        connections += f'    C: "OP",{curve},{value}, "d|Z"\n'
+    path = folder / "joints.fbx"
+    head = _HEAD.format(up=1, front=2, front_sign=1, unit=1.0)
+    path.write_text(f"{head}Objects:  {{\n{objects}}}\nConnections:  {{\n{connections}}}\n")
+    return path
+
+
+_STACK = """    AnimationStack: 50, "AnimStack::Bend", "" {
+        Properties70:  {
+            P: "LocalStart", "KTime", "Time", "",0
+            P: "LocalStop", "KTime", "Time", "",STOP
+        }
+    }
+    AnimationLayer: 51, "AnimLayer::Base", "" { }
+"""
+
+_LINK = """    C: "OO",{},{}
+"""
+
+_JOINT = """    Model: {node}, "Model::{name}", "LimbNode" {{ Version: 232 }}
+    AnimationCurveNode: {value}, "AnimCurveNode::R", "" {{
+        Properties70:  {{ P: "d|Z", "Number", "", "A",0 }}
+    }}
+    AnimationCurve: {curve}, "AnimCurve::", "" {{
+        Default: 0
+        KeyVer: 4008
+        KeyTime: *{count} {{ a: {times} }}
+        KeyValueFloat: *{count} {{ a: {angles} }}
+        KeyAttrFlags: *1 {{ a: {key} }}
+        KeyAttrDataFloat: *4 {{ a: 0,0,0,0 }}
+        KeyAttrRefCount: *1 {{ a: {count} }}
+        {more}
+    }}
+"""
+
+
+QUAD_5000 = """; FBX 5.0.0 project file
+FBXHeaderExtension:  {
+    FBXHeaderVersion: 1003
+    FBXVersion: 5000
+    Creator: "by hand"
+}
+Model: "Model::Quad" {
+    Version: 100
+    Type: "Mesh"
+    Vertices: 0,0,0,1,0,0,1,1,0,0,1,0
+    PolygonVertexIndex: 0,1,2,-4
+    GeometryVersion: 124
+    MaterialAssignation: "AllSame"
+    Materials: 0
+    Shape: "wide" {
+        Indexes: 1,2
+        Vertices: 0.5,0,0,0.5,0,0
+        Normals: 0,0,0,0,0,0
+    }
+}
+Takes:  {
+    Current: "Move"
+    Take: "Move" {
+        LocalTime: 0,46186158000
+        ReferenceTime: 0,46186158000
+        Model: "Model::Quad" {
+            Version: 1.1
+            Channel: "wide" {
+                Default: 0
+                KeyVer: 4005
+                KeyCount: 2
+                Key: 0,0,L,46186158000,100,L
+                Color: 1,1,1
+            }
+        }
+    }
+}
+"""
+"""A quad with an animated blend shape, in the oldest version."""

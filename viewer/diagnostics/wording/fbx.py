@@ -8,7 +8,10 @@ MESSAGES = {
     "F007.fbx-converted": "unsupported {what:list} converted to {to:list}",
     "F007.fbx-unused": "not used: {items:list12}",
     "F007.fbx-warning": "FBX library: {text:text}",
-    "F007.fbx-in-betweens": "blend shape {shape:quoted}: {n:#in-between target} ignored",
+    "F007.fbx-in-betweens": "blend shape {shape:quoted}: {n:#in-between target} "
+    "{n:?is a blend shape|are blend shapes} of {n:?its|their} own; animations set all weights",
+    "F007.fbx-continued": "{n:#curve} that {n:?continues|continue} before or after {n:?its|their} "
+    "keys {n:?is|are} held after 20000 frames",
     "F007.fbx-skins": "mesh {mesh:quoted}: only the first of {n} skin deformers is used",
     "F007.fbx-no-bone": "mesh {mesh:quoted}: {n:#skin cluster} without a joint ignored",
     "F007.fbx-mixed": "mesh {mesh:quoted} blends both skinning methods per vertex: shown with a "

@@ -25,9 +25,7 @@ from viewer.phrases import counted
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.units import METRES, UNIT_NAMES
 
-__all__ = ["node_file"]
-
-_PERCENT = 100.0  # full weight of a blend channel
+__all__ = ["node_file", "target_weights"]
 
 
 def node_file(source: Source) -> NodeFile:
@@ -111,56 +109,109 @@ def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, An
     if mesh["color_sets"] > 1:
         source.warn("F007.fbx-color-sets", mesh=mesh["name"], n=mesh["color_sets"])
     for shape in mesh["shapes"]:
-        if shape["in_betweens"] > 0:
-            source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["in_betweens"])
+        if shape["place"] == len(shape["targets"]) - 1 > 0:
+            source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["place"])
 
 
 def _animations(source: Source, told: dict[str, Any], tree: NodeTree) -> tuple[NodeAnimation, ...]:
     everything = frozenset(range(tree.n_nodes))
-    shapes = {
-        shape["element"]: (at, row)
-        for at, mesh in enumerate(told["meshes"])
-        for row, shape in enumerate(mesh["shapes"])
-    }
+    meshes: dict[int, int] = {}  # mesh of each blend channel
+    for at, mesh in enumerate(told["meshes"]):
+        meshes |= dict.fromkeys((shape["element"] for shape in mesh["shapes"]), at)
     return tuple(
         NodeAnimation(
             stack["name"],
             stack["start"],
             stack["end"],
             everything,
-            partial(_channels, source, told, shapes, number),
+            partial(_channels, source, told, meshes, number),
         )
         for number, stack in enumerate(told["stacks"])
     )
 
 
 def _channels(
-    source: Source, told: dict[str, Any], shapes: dict[int, tuple[int, int]], stack: int
+    source: Source, told: dict[str, Any], meshes: dict[int, int], stack: int
 ) -> tuple[NodeChannel, ...]:
-    """Bake one animation stack in another child process."""
+    """Sample one animation stack in another child process."""
     arrays, keys = run_worker(source, str(stack))
+    if keys["cut"]:
+        source.warn("F007.fbx-continued", n=keys["cut"])
     channels: list[NodeChannel] = []
-    weights: dict[int, dict[int, Floats]] = {}  # weights by mesh, then by row of its shapes
+    weights: dict[int, dict[int, Floats]] = {}  # weights by mesh, then by blend channel
     for each in keys["keys"]:
         table = arrays[each["keys"]]
         if each["path"] == "weight":
-            at, row = shapes.get(each["element"], (-1, -1))
-            if at >= 0:
-                weights.setdefault(at, {})[row] = table[:, :2]
-            continue
-        values = table[:, 1:]
-        channels.append(NodeChannel(each["node"], each["path"], table[:, 0], values))
-    for at, rows in weights.items():
+            if each["element"] in meshes:
+                weights.setdefault(meshes[each["element"]], {})[each["element"]] = table
+        else:
+            values = table[:, 1:]
+            channels.append(NodeChannel(each["node"], each["path"], table[:, 0], values))
+    for at, tables in weights.items():
         mesh = told["meshes"][at]
-        times, values = _joined(rows, [shape["weight"] for shape in mesh["shapes"]])
+        times, values = _joined(tables, mesh["shapes"])
         channels += [NodeChannel(node, "weights", times, values) for node in mesh["nodes"]]
     return tuple(channels)
 
 
-def _joined(rows: dict[int, Floats], still: list[float]) -> tuple[Floats, Floats]:
+def _joined(tables: dict[int, Floats], shapes: list[dict[str, Any]]) -> tuple[Floats, Floats]:
     """Return all key times of a mesh's shapes, (N,), and the weights at these times, (N, S)."""
-    times = np.unique(np.concatenate([table[:, 0] for table in rows.values()]))
-    values = np.tile(still, (len(times), 1))
-    for row, table in rows.items():
-        values[:, row] = np.interp(times, table[:, 0], table[:, 1]) / _PERCENT
-    return times, values
+    targets = {shape["element"]: shape["targets"] for shape in shapes}
+    times = [_crossings(table, targets[element]) for element, table in tables.items()]
+    times += [table[:, 0] for table in tables.values()]
+    joined = np.unique(np.concatenate(times))
+    values = np.tile([shape["weight"] for shape in shapes], (len(joined), 1))
+    effective = {
+        element: target_weights(np.interp(joined, table[:, 0], table[:, 1]), targets[element])
+        for element, table in tables.items()
+    }
+    for row, shape in enumerate(shapes):
+        if shape["element"] in effective:
+            values[:, row] = effective[shape["element"]][:, shape["place"]]
+    return joined, values
+
+
+def target_weights(weights: Floats, targets: list[float]) -> Floats:
+    """Return the weights of the targets of a blend channel.
+
+    The channel interpolates between the two targets around its weight, and between the mesh
+    itself, at 0, and the first target. Beyond the last target, it extrapolates.
+
+    Parameters
+    ----------
+    weights : (N,)
+        Weights of the channel.
+    targets : list of K float
+        Weights of the channel at which a target is fully on.
+
+    Returns
+    -------
+    (N, K)
+        Weights of the targets.
+
+    >>> target_weights(np.array([0.25, 0.75, 1.25]), [0.5, 1.0]).tolist()
+    [[0.5, 0.0], [0.5, 0.5], [-0.5, 1.5]]
+    """
+    stops = np.unique([0.0, *targets])
+    if len(stops) < 2:
+        return np.zeros((len(weights), len(targets)))
+    low = np.clip(np.searchsorted(stops, weights, side="right") - 1, 0, len(stops) - 2)
+    fractions = (weights - stops[low]) / (stops[low + 1] - stops[low])
+    found = np.zeros((len(weights), len(stops)))
+    rows = np.arange(len(weights))
+    found[rows, low], found[rows, low + 1] = 1.0 - fractions, fractions
+    # The mesh itself needs no weight.
+    found[:, np.searchsorted(stops, 0.0)] = 0.0
+    return found[:, np.searchsorted(stops, targets)]
+
+
+def _crossings(table: Floats, targets: list[float]) -> Floats:
+    """Return the times at which the weight of a channel passes 0 or one of its targets."""
+    times, weights = table.T
+    found = [np.zeros(0)]
+    for stop in {0.0, *targets} if len(targets) > 1 or min(targets) < 0.0 else ():
+        above, below = weights[:-1] - stop, weights[1:] - stop
+        passed = above * below < 0.0
+        fractions = above[passed] / (above[passed] - below[passed])
+        found.append(times[:-1][passed] + fractions * np.diff(times)[passed])
+    return np.concatenate(found)

@@ -112,7 +112,7 @@ class _Scene:
         if stack:
             from viewer.formats._fbx.worker_keys import keys_of
 
-            return self.arrays, {"keys": keys_of(self, int(stack[0]))}
+            return self.arrays, keys_of(self, int(stack[0]))
         from viewer.formats._fbx.worker_contents import contents_of
 
         return self.arrays, contents_of(self)

@@ -176,24 +176,34 @@ def _skin(kept: KeptScene, skin: Any, put: Any) -> dict[str, Any]:
 
 
 def _shapes(kept: KeptScene, mesh: Any, put: Any) -> list[dict[str, Any]]:
+    """Return every target of the blend channels: the last of each channel, and in-between ones."""
     told: list[dict[str, Any]] = []
     for deformer in kept.items(mesh, "blend_deformers"):
         for channel in kept.items(deformer, "channels"):
-            target = kept.get(channel, "target_shape")
-            if target is None:
-                continue
-            row = len(told)
-            put(f"shape{row}.vertices", integers(kept.get(target, "offset_vertices")))
-            put(f"shape{row}.offsets", _numbers(kept.get(target, "position_offsets"), 3))
-            put(f"shape{row}.normals", _numbers(kept.get(target, "normal_offsets"), 3))
-            told.append(
-                {
-                    "name": str(kept.get(channel, "name")) or str(kept.get(target, "name")),
-                    "element": int(channel.element_id),
-                    "weight": float(channel.weight),
-                    "in_betweens": len(kept.get(channel, "keyframes")) - 1,
-                }
-            )
+            targets = kept.items(channel, "keyframes")
+            stops = [float(target.target_weight) for target in targets]
+            for place, target in enumerate(targets):
+                row, shape = len(told), kept.get(target, "shape")
+                name = str(kept.get(channel, "name")) or str(kept.get(shape, "name"))
+                offsets = _numbers(kept.get(shape, "position_offsets"), 3)
+                normals = _numbers(kept.get(shape, "normal_offsets"), 3)
+                # Blender writes a weight for each vertex.
+                weights = _numbers(kept.get(shape, "offset_weights"), 1)
+                if len(weights) == len(offsets):
+                    offsets = offsets * weights
+                    normals = normals * weights if len(normals) == len(weights) else normals
+                put(f"shape{row}.vertices", integers(kept.get(shape, "offset_vertices")))
+                put(f"shape{row}.offsets", offsets)
+                put(f"shape{row}.normals", normals)
+                told.append(
+                    {
+                        "name": name if target is targets[-1] else f"{name} {stops[place]:.0%}",
+                        "element": int(channel.element_id),
+                        "weight": float(target.effective_weight),
+                        "targets": stops,
+                        "place": place,
+                    }
+                )
     return told
 
 

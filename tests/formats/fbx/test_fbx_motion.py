@@ -1,0 +1,162 @@
+"""Curves of ``.fbx``: extrapolation, fast rotations, weights of blend shapes."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats.fbx.tiny_fbx import QUAD_5000, write_joints, write_strip
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.formats._fbx.contents import target_weights
+from viewer.rig.kinematics import world_matrices
+from viewer.rig.motion.instances import pose_actors
+from viewer.rig.scene import Actor
+
+pytestmark = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
+
+
+def posed(actor: Actor, time: float) -> np.ndarray:
+    """Return the vertices of an actor at one time of its clip."""
+    actor.clip = actor.figure.animations[0].clip()
+    pose_actors([actor], time)
+    return viewer.deform(actor.figure, actor.pose)[0]
+
+
+def continued(side: str, kind: str) -> str:
+    return f"{side}-Extrapolation:  {{\n Type: {kind}\n Repetition: -1\n }}"
+
+
+CURVES = {
+    "hold": ("0 0.5", "0 40", 4, ""),
+    "repeat": ("0 0.5", "0 40", 4, continued("Post", "R")),
+    "mirror": ("0 0.5", "0 40", 4, continued("Post", "M")),
+    "slope": ("0 0.5", "0 40", 4, continued("Post", "K")),
+    "relative": ("0 0.5", "0 40", 4, continued("Post", "A")),
+    "before": ("1.6 2", "0 40", 4, continued("Pre", "R")),
+    "spin": ("0 2", "0 14400", 4, ""),
+    "step": ("0 0.5 1", "0 40 40", 2, ""),
+}
+
+
+@pytest.fixture(scope="module")
+def joints(tmp_path_factory: pytest.TempPathFactory) -> Actor:
+    """Return joints that rotate by the curves above for 2 seconds."""
+    (actor,) = viewer.load(write_joints(tmp_path_factory.mktemp("fbx"), CURVES, 2.0)).actors
+    return actor
+
+
+def angle(actor: Actor, name: str, time: float) -> float:
+    """Return the angle of a joint about z, in degrees."""
+    actor.clip = actor.figure.animations[0].clip()
+    pose_actors([actor], time)
+    skeleton = actor.figure.require_skeleton()
+    world = world_matrices(skeleton, actor.pose)[skeleton.names.index(name)]
+    return float(np.degrees(np.arctan2(world[1, 0], world[0, 0])))
+
+
+@pytest.mark.parametrize(
+    ("name", "angles"),
+    [
+        # 80 degrees per second up to 0.5 s; then as the curve says.
+        ("hold", [40.0, 40.0, 40.0, 40.0]),
+        ("repeat", [8.0, 8.0, 32.0, 16.0]),
+        ("mirror", [32.0, 8.0, 32.0, 24.0]),
+        ("slope", [48.0, 88.0, 112.0, 136.0]),
+        ("relative", [48.0, 88.0, 112.0, 136.0]),
+        # 100 degrees per second from 1.6 to 2 s, and the same before.
+        ("before", [20.0, 30.0, 20.0, 10.0]),
+        ("step", [40.0, 40.0, 40.0, 40.0]),
+    ],
+)
+def test_curves_continue_as_they_say(joints: Actor, name: str, angles: list[float]) -> None:
+    # Keys are in single precision, and slopes of lines are measured over 1 ms.
+    found = [angle(joints, name, time) for time in (0.6, 1.1, 1.4, 1.7)]
+    assert_allclose(found, angles, atol=1e-4)
+
+
+def test_a_spin_of_more_than_a_half_rotation_per_frame_keeps_its_direction(joints: Actor) -> None:
+    # 20 rotations per second are 300 degrees per frame.
+    assert angle(joints, "spin", 0.25 / 24) == pytest.approx(75.0, abs=1e-3)
+    assert angle(joints, "spin", 10.5 / 24) == pytest.approx(-90.0, abs=1e-3)
+
+
+def test_steps_jump_at_their_keys(joints: Actor) -> None:
+    assert_allclose([angle(joints, "step", t) for t in (0.499, 0.501)], [0.0, 40.0], atol=1e-4)
+
+
+def test_blend_shapes_of_the_oldest_version_move(tmp_path: Path) -> None:
+    path = tmp_path / "quad.fbx"
+    path.write_text(QUAD_5000)
+    (actor,) = viewer.load(path).actors
+    assert posed(actor, 0.5)[:, 0].max() == pytest.approx(1.25)
+
+
+def test_weights_per_vertex_scale_a_blend_shape(tmp_path: Path) -> None:
+    edits = {
+        "by hand": "Blender (stable FBX IO) - 2.79 (sub 0) - 3.7.13",
+        "FullWeights: *1 { a: 100 }": "FullWeights: *2 { a: 100,20 }",
+    }
+    (actor,) = viewer.load(write_strip(tmp_path, edits=edits)).actors
+    rest = actor.figure.require_mesh().positions
+    moved = posed(actor, 1.0)
+    foot = np.flatnonzero((rest == [1.0, 0.0, 0.0]).all(axis=1))[0]
+    assert moved[foot].tolist() == pytest.approx([1.5, 0.0, 0.0])
+    # The other vertex is halfway between both joints, and the upper one is at 90 degrees.
+    knee = np.flatnonzero((rest == [1.0, 1.0, 0.0]).all(axis=1))[0]
+    assert moved[knee].tolist() == pytest.approx([0.55, 1.0 + 0.55, 0.0], abs=1e-6)
+
+
+def test_a_full_weight_below_100_scales_a_blend_shape(tmp_path: Path) -> None:
+    edits = {"FullWeights: *1 { a: 100 }": "FullWeights: *1 { a: 50 }"}
+    (actor,) = viewer.load(write_strip(tmp_path, edits=edits)).actors
+    assert actor.figure.rest_shape_weights.tolist() == [0.5]  # 25 of 50
+    assert posed(actor, 0.5)[:, 0].max() == pytest.approx(1.5, abs=1e-6)
+
+
+IN_BETWEEN = {
+    'Geometry: 11, "Geometry::wide"': """Geometry: 12, "Geometry::half", "Shape" {
+        Version: 100
+        Indexes: *1 { a: 1 }
+        Vertices: *3 { a: 0,-0.5,0 }
+        Normals: *3 { a: 0,0,0 }
+    }
+    Geometry: 11, "Geometry::wide\"""",
+    'C: "OO",11,44': 'C: "OO",12,44\n    C: "OO",11,44',
+    "FullWeights: *1 { a: 100 }": "FullWeights: *2 { a: 60,100 }",
+}
+
+
+def test_in_between_targets_are_reached_on_the_way(tmp_path: Path) -> None:
+    (actor,) = viewer.load(write_strip(tmp_path, edits=IN_BETWEEN)).actors
+    assert actor.figure.blend_shapes is not None
+    assert actor.figure.blend_shapes.names == ("wide 60%", "wide")
+    rest = actor.figure.require_mesh().positions
+    foot = np.flatnonzero((rest == [1.0, 0.0, 0.0]).all(axis=1))[0]
+    # The weight is the time: at 0.3 half of the first target, at 0.8 half of both.
+    assert posed(actor, 0.3)[foot].tolist() == pytest.approx([1.0, -0.25, 0.0], abs=1e-6)
+    assert posed(actor, 0.6)[foot].tolist() == pytest.approx([1.0, -0.5, 0.0], abs=1e-6)
+    assert posed(actor, 0.8)[foot].tolist() == pytest.approx([1.25, -0.25, 0.0], abs=1e-6)
+
+
+def test_weights_beyond_the_targets_are_extrapolated() -> None:
+    found = target_weights(np.array([-0.5, 1.5]), [0.5, 1.0])
+    assert_allclose(found, [[-1.0, 0.0], [-1.0, 2.0]])
+
+
+def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path: Path) -> None:
+    edits = {
+        # The upper two vertices have no weights, and the node of the mesh moves instead of a joint.
+        "Indexes: *4 { a: 2,3,4,5 }": "Indexes: *2 { a: 2,3 }",
+        "Weights: *4 { a: 0.5,0.5,1,1 }": "Weights: *2 { a: 0.5,0.5 }",
+        'C: "OP",52,22, "Lcl Rotation"': 'C: "OP",52,20, "Lcl Rotation"',
+    }
+    (actor,) = viewer.load(write_strip(tmp_path, edits=edits)).actors
+    rest = actor.figure.require_mesh().positions
+    moved = posed(actor, 1.0)
+    for at, expected in (([1.0, 2.0, 0.0], [-2.0, 1.0, 0.0]), ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])):
+        (found, *_) = moved[(rest == at).all(axis=1)]
+        assert_allclose(found, expected, atol=1e-6)
