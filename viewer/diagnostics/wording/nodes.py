@@ -6,6 +6,8 @@ MESSAGES = {
     "F002.many-vertices": "expected at most {most} vertices, found {found} over all nodes",
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",
+    "W004.mesh-node": "mesh {mesh:quoted}: {n:#vertex} without weights {n:?follows|follow} the "
+    "node of the mesh instead of a joint",
     "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
     "F007.animated-others": "animations of {n:#node} that {n:?belongs|belong} to no figure are "
     "omitted: {names:list}",

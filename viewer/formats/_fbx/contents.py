@@ -10,7 +10,7 @@ import numpy as np
 from viewer.diagnostics import Phrase
 from viewer.formats._fbx.child import run_worker
 from viewer.formats._fbx.materials import materials_of
-from viewer.formats._fbx.meshes import Placed, mesh_on_node, skin_of
+from viewer.formats._fbx.meshes import Placed, mesh_on_node, on_nodes, skin_of
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._nodes.content import (
     NodeAnimation,
@@ -41,9 +41,12 @@ def node_file(source: Source) -> NodeFile:
         prefix = f"mesh{at}"
         _say_reduced(source, arrays, prefix, mesh)
         skin = skin_of(source, arrays, prefix, mesh)
+        first_skin = len(skins)
         if skin is not None:
-            skins.append(skin)
-        for node, materials in zip(mesh["nodes"], mesh["materials"], strict=True):
+            skins += on_nodes(arrays, prefix, skin, mesh["nodes"])
+        for at_node, (node, materials) in enumerate(
+            zip(mesh["nodes"], mesh["materials"], strict=True)
+        ):
             placement = np.eye(4) if skin is not None else arrays["geometry"][node]
             key = (at, tuple(materials), placement.tobytes())
             if key not in first_mesh:
@@ -51,7 +54,8 @@ def node_file(source: Source) -> NodeFile:
                 placed = Placed(prefix, mesh, materials, placement)
                 meshes.append(mesh_on_node(arrays, placed))
             of_node[node] = first_mesh[key]
-            skin_of_node[node] = len(skins) - 1 if skin is not None else -1
+            if skin is not None:
+                skin_of_node[node] = min(first_skin + at_node, len(skins) - 1)
     tree = _tree(told["names"], arrays, of_node, skin_of_node)
     return NodeFile(
         source.path.stem,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,7 @@ from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.formats._source import Source
 from viewer.rig.arrays import Floats, Ints
 
-__all__ = ["Placed", "mesh_on_node", "skin_of"]
+__all__ = ["Placed", "mesh_on_node", "on_nodes", "skin_of"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,16 +202,48 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
     vertices, weights = get("vertices"), get("weights")
     used = kept[cluster] & (weights != 0.0)
     cluster, vertices, weights = cluster[used], vertices[used], weights[used]
+    # The last joint is the node of the mesh; see ``on_nodes``.
+    alone = _without_weights(arrays, placed.prefix)
+    vertices = np.concatenate([vertices, alone])
+    weights = np.concatenate([weights, np.ones(len(alone))])
+    slots = np.concatenate([numbers[cluster], np.full(len(alone), kept.sum())])
     order = np.argsort(vertices, kind="stable")
-    cluster, vertices, weights = cluster[order], vertices[order], weights[order]
+    slots, vertices, weights = slots[order], vertices[order], weights[order]
     count = len(arrays[f"{placed.prefix}.vertices"])
     counts = np.bincount(vertices, minlength=count)
     slot = np.arange(len(vertices)) - np.repeat(np.cumsum(counts) - counts, counts)
     width = max(int(counts.max(initial=0)), 1)
     joints, table = np.zeros((count, width), dtype=np.int32), np.zeros((count, width))
-    joints[vertices, slot] = numbers[cluster]
+    joints[vertices, slot] = slots
     table[vertices, slot] = weights
     return joints, table
+
+
+def _without_weights(arrays: Arrays, prefix: str) -> Ints:
+    """Return the vertices that no joint moves: (M,)."""
+    get = _getter(arrays, f"{prefix}.skin")
+    cluster = np.repeat(np.arange(len(get("counts"))), get("counts"))
+    is_used = _with_bone(get)[cluster] & (get("weights") != 0.0)
+    count = len(arrays[f"{prefix}.vertices"])
+    found: Ints = np.setdiff1d(np.arange(count, dtype=np.int32), get("vertices")[is_used])
+    return found
+
+
+def on_nodes(arrays: Arrays, prefix: str, skin: NodeSkin, nodes: list[int]) -> list[NodeSkin]:
+    """Return the skin of a mesh at each of its nodes: one for all if every vertex has weights.
+
+    Vertices without weights follow the node of their mesh, which becomes the last joint.
+    """
+    if not len(_without_weights(arrays, prefix)):
+        return [skin]
+    return [
+        replace(
+            skin,
+            joints=np.append(skin.joints, node).astype(np.int32),
+            inverse_bind=np.concatenate([skin.inverse_bind, arrays["geometry"][node][None]]),
+        )
+        for node in nodes
+    ]
 
 
 def _with_bone(get: Any) -> NDArray[np.bool_]:
@@ -230,6 +263,9 @@ def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -
         source.warn("F007.fbx-skins", mesh=told["name"], n=told["n_skins"])
     if not kept.any():
         return None
+    alone = len(_without_weights(arrays, prefix))
+    if alone:
+        source.warn("W004.mesh-node", mesh=told["name"], n=alone)
     method, blend = told["skin"]["method"], get("blend")
     if method == "mix":
         values = blend if len(blend) else np.zeros(1)
