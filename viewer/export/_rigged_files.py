@@ -76,8 +76,8 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     with all_or_none(files):
         notes += export(Actor(figure, figure_pose(figure)), skel)
         notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
-        notes += export(Actor(figure, rigged.pose), json)
-    notes[-1] = replace(notes[-1], key="X001.target-pose")
+        written, *lost = export(Actor(figure, rigged.pose), json)
+    notes += [replace(written, key="X001.target-pose"), *lost]
     if rigged.figure.correctives is not None:
         notes.append(Diagnostic("X003.rigged-correctives"))
     return notes

@@ -4,20 +4,65 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viewer.diagnostics import Diagnostic
+import numpy as np
+
+from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.formats import write
-from viewer.rig.posing.pose_record import record_of
-from viewer.rig.scene import Actor
-from viewer.rig.skinning import Skinning
+from viewer.export._left_out import not_held_note
+from viewer.export._losses.posed import PoseLosses
+from viewer.formats import Source, all_or_none, keeping_written, write
+from viewer.formats.pose import read
+from viewer.rig.arrays import Floats
+from viewer.rig.pose import Pose, joint_rotations
+from viewer.rig.posing.pose_record import apply_record, record_of
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import Skeleton
+from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 __all__ = ["export"]
 
+_TURNED = 1e-6  # difference of rotation matrices, larger than the rounding of angles
+_SAME = 1e-9  # difference of a number up to which it counts as stored
+
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
-    """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``."""
+    """Write a pose that ``--pose`` and the window read; see ``viewer.export.export``.
+
+    The file is read back and applied to the figure at rest. ``.json`` holds the whole pose,
+    ``.txt`` only the numbers of the model's pose vector.
+    """
     figure, pose = actor.figure, actor.pose
     if figure.skeleton is None or pose is None:
         raise RigError(f"figure {figure.name} has no skeleton and therefore no pose")
-    write(record_of(figure, pose), path)
-    return [Diagnostic("X001.pose", path, values={"n": figure.skeleton.n_dofs})]
+    again = figure_pose(figure)
+    with keeping_written() as saved, all_or_none([path]):
+        write(record_of(figure, pose), path)
+        apply_record(read(Source(path, saved[path])), figure, again)
+    losses, how = PoseLosses(figure, skinning.unreduced()), skinning.unreduced()
+    vertices = None if figure.mesh is None else deform(figure, again, how)[0]
+    losses.look(pose, vertices, joint_matrices(figure, again)[:, :3, 3])
+    notes = [Diagnostic("X001.pose", path, values={"n": figure.skeleton.n_dofs})]
+    notes += losses.notes(path)
+    return notes + not_held_note(path.suffix.lower(), _lost(figure.skeleton, pose, again))
+
+
+def _lost(skeleton: Skeleton, pose: Pose, again: Pose) -> list[Phrase]:
+    """Return the parts of a pose that another one, read from its file, does not have."""
+    count = max(len(pose.shape_weights), len(again.shape_weights))
+    shapes = np.zeros((2, count))  # missing weights are 0
+    shapes[0, : len(pose.shape_weights)] = pose.shape_weights
+    shapes[1, : len(again.shape_weights)] = again.shape_weights
+    turned = np.abs(joint_rotations(skeleton, pose) - joint_rotations(skeleton, again))
+    lost = {
+        "part-pose-rotations": bool((turned > _TURNED).any()),
+        "part-pose-shape": _differ(*shapes),
+        "part-pose-translations": _differ(pose.translations, again.translations),
+        "part-pose-scales": _differ(pose.scales, again.scales),
+        "part-pose-placement": _differ(pose.figure_translation, again.figure_translation),
+        "part-pose-size": abs(pose.figure_scale - again.figure_scale) > _SAME,
+    }
+    return [Phrase(key) for key, is_lost in lost.items() if is_lost]
+
+
+def _differ(one: Floats, other: Floats) -> bool:
+    return bool((np.abs(one - other) > _SAME).any())

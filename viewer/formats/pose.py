@@ -5,15 +5,15 @@
     .json  {"viewer_pose": 1, "figure": name, "dofs": {"left_knee.x": radians, …},
             "shape": […], "expression": […], "translation": [x, y, z], "scale": s,
             "own_numbers": […], "joint_names": […], "joint_turns": [[x, y, z, w], …],
-            "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …], "up": "y",
-            "dof_layout": word}
+            "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …],
+            "joint_scales": [[x, y, z], …], "up": "y", "dof_layout": word}
     .npz   the same arrays, with separate dof_names and dofs
     .txt   the model's own pose vector, separated by white space: 190 values for PIG, 72 for SMPL …
 
 ``joint_turns`` are rotations as quaternions in the figure's axes, for figures whose DOFs differ
 from those that ``dof_layout`` identifies. Figures with the same DOFs use ``dofs``, edited or not,
-and the transforms below them, ``joint_rotations`` and ``joint_shifts``: joint rotations and
-translations relative to the parents, written only if not at rest.
+and the transforms below them, ``joint_rotations``, ``joint_shifts`` and ``joint_scales``: joint
+rotations and translations relative to the parents, and scales, written only if not at rest.
 
 Both formats with named values may instead contain one frame of smplx's parameters:
 ``global_orient``, ``body_pose``, ``left_hand_pose``, ``right_hand_pose``, ``jaw_pose``,

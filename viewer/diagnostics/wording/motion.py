@@ -105,6 +105,7 @@ PHRASES = {
     "left-moves": "joint translations",
     "left-place": "figure translation",
     "left-size": "figure scale",
+    "left-scales": "joint scales",
     "left-shape": "figure shape",
     "t-pose": "a T-pose",
     "a-pose": "an A-pose",

@@ -20,6 +20,7 @@ KEYS = (
     "joint_names",
     "joint_rotations",
     "joint_shifts",
+    "joint_scales",
     "joint_meanings",
     "left",
     "up",
@@ -52,7 +53,7 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
     names = _names(named)
     turns = _quaternions(named, "joint_turns", names)
     rotations = values.get("joint_rotations")
-    shifts = values.get("joint_shifts")
+    shifts, scales = values.get("joint_shifts"), values.get("joint_scales")
     return JointRotations(
         _word(named, "figure", ""),
         names,
@@ -65,6 +66,7 @@ def read_rotations(named: NamedValues) -> JointRotations | None:
         None if rotations is None else _quaternions(named, "joint_rotations", names),
         _meanings(named, len(names)),
         _left(named),
+        None if scales is None else _rows(named, "joint_scales", len(names), 3),
     )
 
 
@@ -84,6 +86,8 @@ def named_rotations(rotations: JointRotations) -> dict[str, Any]:
         named["left"] = rotations.left[None].tolist()
     if rotations.shifts.any():
         named["joint_shifts"] = rotations.shifts.tolist()
+    if rotations.scales is not None:
+        named["joint_scales"] = rotations.scales.tolist()
     return named
 
 

@@ -216,13 +216,15 @@ def _left_as_they_were(record: PoseRecord) -> list[Diagnostic]:
     """Return a message about parts of a record that do not apply if the DOFs differ."""
     moves = DOF_KINDS[:3]
     moved = [label for label, value in record.dofs.items() if value and label.endswith(moves)]
-    shifts = record.joint_rotations is not None and record.joint_rotations.shifts.any()
+    rotations = record.joint_rotations
+    shifts = rotations is not None and rotations.shifts.any()
     place = record.translation is not None and np.any(record.translation)
     shapes = (values is not None and np.any(values) for values in (record.shape, record.expression))
     left = {
         "left-moves": bool(moved) or shifts,
         "left-place": place,
         "left-size": record.scale not in (None, 1.0),
+        "left-scales": rotations is not None and rotations.scales is not None,
         "left-shape": any(shapes),
     }
     names = [Phrase(key) for key, says in left.items() if says]

@@ -78,6 +78,8 @@ class JointRotations:
         For a figure whose file states human bones, their names in the SMPL family; otherwise empty.
     left : (3,)
         The figure's left, a horizontal direction; measured for figures with meanings.
+    scales : (J, 3) or None
+        Local scale factors, as in ``Pose``; None for the rest pose's.
     """
 
     figure: str
@@ -89,6 +91,7 @@ class JointRotations:
     rotations: Floats | None = None
     meanings: tuple[str, ...] = ()
     left: Floats = field(default_factory=lambda: np.array([1.0, 0.0, 0.0]))
+    scales: Floats | None = None
 
 
 def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
@@ -115,6 +118,7 @@ def relative_rotations(figure: Figure, pose: Pose) -> JointRotations:
         None if np.array_equal(pose.rotations, skeleton.rest_rotations) else pose.rotations.copy(),
         () if skeleton.humanoid is None else joint_meanings(skeleton),
         left_of(figure),
+        None if np.array_equal(pose.scales, skeleton.rest_scales) else pose.scales.copy(),
     )
 
 
@@ -158,9 +162,10 @@ def has_layout_of(source: JointRotations, figure: Figure) -> bool:
 
 
 def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_whole: bool) -> None:
-    """Restore the base rotations and translations beneath the DOFs, in place.
+    """Restore the base rotations, translations and scales beneath the DOFs, in place.
 
-    They differ from the rest pose if a motion rotates a joint about axes for which it has no DOFs.
+    They differ from the rest pose if a motion scales a joint, or rotates it about axes for which
+    it has no DOFs.
     The stored world rotations are ignored: they are out of date once the DOFs are edited.
 
     Parameters
@@ -170,7 +175,7 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
     pose : Pose
         Pose whose DOFs are not changed.
     source : JointRotations
-        Provides the base rotations and translations.
+        Provides the base rotations, translations and scales.
     is_whole : bool
         Whether all DOFs of the source's pose are applied: joints that it does not contain are then
         reset to the rest pose; by default, their values are unchanged.
@@ -181,6 +186,10 @@ def restore_beneath(skeleton: Skeleton, pose: Pose, source: JointRotations, is_w
         pose.rotations[:] = skeleton.rest_rotations
     if is_whole or source.shifts.any():
         pose.translations[:] = source.shifts
+    if source.scales is not None:
+        pose.scales[:] = source.scales
+    elif is_whole:
+        pose.scales[:] = skeleton.rest_scales
 
 
 def joints_by_name(source: Sequence[str], target: Sequence[str]) -> Ints:
