@@ -77,3 +77,40 @@ def test_conversion_to_frames_names_the_animations_that_are_not_written(
     # One pose is requested: nothing that was asked for is missing.
     assert run(["convert", box, "--time", "0.5", "-o", str(tmp_path / "pose.bvh")]) == 0
     assert "other animation" not in capsys.readouterr().out
+
+
+@pytest.fixture
+def still(tmp_path) -> str:
+    """A file of a triangle without a motion."""
+    file = File(nodes=[{"mesh": 0, "name": "still"}])
+    file.mesh()
+    path = tmp_path / "still.glb"
+    path.write_bytes(file.glb())
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("time", "y", "held"),
+    [("0", 0.0, "first"), ("0.99", 0.0, ""), ("3.01", 2.0, ""), ("7", 2.0, "last")],
+)
+def test_poses_are_held_outside_the_keys(capsys, box, time, y, held):
+    assert run(["info", "--json", box, "--animation", "rise", "--time", time]) == 0
+    captured = capsys.readouterr()
+    (actor,) = json.loads(captured.out)["actors"]
+    assert actor["box"][0][1] == pytest.approx(y, abs=1e-6)
+    message = f"the motion has keys from 1 to 3 seconds, so its {held} pose is held"
+    expected = f"warning: --time {time}: {message}\n" if held else ""
+    assert captured.err == expected
+
+
+@pytest.mark.parametrize("option", ["time", "frame"])
+def test_still_files_have_one_pose(capsys, still, option):
+    assert run(["info", still, f"--{option}", "0"]) == 0
+    error = capsys.readouterr().err
+    assert error == f"warning: --{option} has no effect: no file has a motion\n"
+
+
+def test_still_and_moving_files_are_opened_without_an_animation(capsys, box, still):
+    for files in ([still], [box], [still, box]):
+        assert run(["info", *files, "--animation", "none"]) == 0
+        assert capsys.readouterr().err == ""

@@ -105,7 +105,6 @@ NUMBERS_WANTED = "expected numbers separated by commas, found"
             '--dof: "figure.rx": expected JOINT.KIND with KIND one of tx, ty, tz, x, y, z',
         ),
         # Clips
-        ("arms.skel --time 1", "--time: no file has a motion"),
         ("arms.skel --frame 1", "--frame: no file has a motion"),
         ("twist.skel move.anim --frame -1", "--frame: expected 0 or more, found -1"),
         (

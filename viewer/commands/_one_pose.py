@@ -54,8 +54,10 @@ def animation_of_pose(
     return upright_single_frame(scene, actor, frames.rate, number, time, keeps_world)
 
 
-def pose_note(arguments: argparse.Namespace) -> Diagnostic:
+def pose_note(arguments: argparse.Namespace, scene: Scene) -> Diagnostic:
     """Return the note that explains why there is only one frame."""
+    if not _moving(scene):
+        return Diagnostic("X001.current-pose")
     if arguments.frame is not None:
         return Diagnostic("X001.pose-at-frame", values={"frame": arguments.frame})
     if arguments.time is not None:

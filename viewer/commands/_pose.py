@@ -110,8 +110,7 @@ def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagno
     Returns: messages about what could not be applied exactly.
     Raises ViewerError if an option does not apply to the scene.
     """
-    apply_time(scene, arguments)
-    notes: list[str | Diagnostic] = []
+    notes = apply_time(scene, arguments)
     if arguments.hands:
         _apply_hands(scene, arguments.hands)
     if arguments.pose:

@@ -9,6 +9,7 @@ from viewer.errors import FormatError, RigError
 from viewer.loading.cast import Cast
 from viewer.rig.motion.animation import Animation
 from viewer.rig.motion.animation_choice import (
+    NONE,
     chosen_animation,
     counterpart,
     own_first,
@@ -32,11 +33,13 @@ def animate(cast: Cast, wanted: str) -> None:
     Raises
     ------
     RigError
-        If no file has the requested animation.
+        If no file has the requested animation; every file can be shown without one.
     FormatError
         If the keys of a requested animation are invalid; for others, this is only a warning.
     """
     files = _files(cast)
+    if not files and wanted.lower() == NONE:
+        return
     if wanted and not files:
         raise RigError(Diagnostic("F004.no-animations", values={"name": wanted}))
     refusals = []

@@ -351,7 +351,7 @@ def test_invalid_output_name_is_exit_code_5(tmp_path, capsys, out):
         (["arms.skel", "-o", "x.ply"], "viewer: figure arms has no mesh to write as .ply"),
         (["twist.skin", "-o", "x.skel"], "viewer: figure twist has no skeleton to write as .skel"),
         (["missing.npz", "-o", "x.obj"], "missing.npz: MISSING"),
-        (["arms.skel", "--time", "1", "-o", "x.npz"], "viewer: --time: no file has a motion"),
+        (["arms.skel", "--frame", "1", "-o", "x.npz"], "viewer: --frame: no file has a motion"),
         (["arms.skel", "--pose", "no.json", "-o", "x.npz"], "no.json: MISSING"),
     ],
 )

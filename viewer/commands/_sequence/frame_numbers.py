@@ -8,6 +8,7 @@ from collections.abc import Sequence
 
 from viewer.commands._numbers import number
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
 from viewer.errors import ViewerError
 from viewer.phrases import printable
 from viewer.rig.scene import Actor, Scene
@@ -45,6 +46,9 @@ class Numbering:
         Frames per second of the numbering.
     runs_on : bool
         Whether frames beyond the last one exist: keyframed clips extrapolate, captures do not.
+    holds : bool
+        Whether the first and last pose are held outside the motions, as keys of glTF and FBX files
+        are.
     """
 
     first: int
@@ -53,6 +57,7 @@ class Numbering:
     end: float
     rate: float
     runs_on: bool
+    holds: bool = False
 
     @property
     def last(self) -> int:
@@ -75,7 +80,7 @@ class Numbering:
         return self.start + (frame - self.first) / self.rate
 
     def checked_time(self, time: float) -> float:
-        """Return a time after checking that it is within the motions.
+        """Return a time within the motions.
 
         A capture's last frame is extended by half a frame's duration, because users rarely enter
         its exact time.
@@ -84,12 +89,16 @@ class Numbering:
         """
         if self.runs_on:
             return time
-        half = 0.5 / self.rate
-        if not self.start - half <= time <= self.end + half:
+        if not self.holds and self.is_outside(time):
             raise ViewerError(
                 f"--time: expected {self.start:.6g} to {self.end:.6g} seconds, found {time:g}"
             )
         return min(max(time, self.start), self.end)
+
+    def is_outside(self, time: float) -> bool:
+        """Return whether a time is more than half a frame outside the motions."""
+        half = 0.5 / self.rate
+        return not self.start - half <= time <= self.end + half
 
     def span(self, asked: Range | None) -> tuple[int, int]:
         """Return the first frame of a range and the frame after its last, counted from 0.
@@ -131,7 +140,7 @@ def numbering_of(actors: Sequence[Actor], rate: float | None = None) -> Numberin
     start, end = time_span(actors)
     count = frame_at(end - start, counted) + 1
     runs_on = any(isinstance(actor.clip, Clip) for actor in actors)
-    return Numbering(first, count, start, end, counted, runs_on)
+    return Numbering(first, count, start, end, counted, runs_on, holds=not captures and not runs_on)
 
 
 def add_frame_arguments(parser: argparse.ArgumentParser, many: str = "") -> None:
@@ -190,24 +199,37 @@ def rate(text: str) -> float:
     return value
 
 
-def apply_time(scene: Scene, arguments: argparse.Namespace) -> None:
+def apply_time(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:
     """Pose every actor that has a motion at the requested frame or time, in place.
 
-    Raises ViewerError if there is no motion, or the time is outside the captures.
+    A scene without a motion has one pose, which is its frame 0 and the pose at all times.
+
+    Returns: messages about times outside the motions.
+    Raises ViewerError if there is no such frame, or the time is outside the captures.
     """
     if arguments.frame is None and arguments.time is None:
-        return
+        return []
     from viewer.rig.motion.evaluation import pose_actor
 
     option = "--time" if arguments.frame is None else arguments.frame_option
     if arguments.frame is not None and arguments.time is not None:
         raise ViewerError(f"{option} and --time: expected one of them, found both")
     if all(actor.clip is None for actor in scene.actors):
-        raise ViewerError(f"{option}: no file has a motion")
+        if arguments.frame:
+            raise ViewerError(f"{option}: no file has a motion")
+        return [f"{option} has no effect: no file has a motion"]
     frames = numbering_of(scene.actors, arguments.fps)
     if arguments.frame is not None:
         scene.time = frames.time_of(arguments.frame, option)
     else:
         scene.time = frames.checked_time(arguments.time)
+    notes: list[str | Diagnostic] = []
+    if arguments.time is not None and frames.holds and frames.is_outside(arguments.time):
+        held = "first" if arguments.time < frames.start else "last"
+        notes.append(
+            f"--time {arguments.time:g}: the motion has keys from {frames.start:.6g} to "
+            f"{frames.end:.6g} seconds, so its {held} pose is held"
+        )
     for actor in scene.actors:
         pose_actor(actor, scene.time, arguments.interpolate_gaps)
+    return notes

@@ -190,7 +190,11 @@ def write_motions(
         if not part.present.any():
             values = {"figure": part.animation.name, "frames": part.span}
             notes.append(Diagnostic("X003.absent", values=values))
-    return [*notes, *[pose_note(arguments)] * is_pose, *left_out_notes(scene, actors + still)]
+    return [
+        *notes,
+        *[pose_note(arguments, scene)] * is_pose,
+        *left_out_notes(scene, actors + still),
+    ]
 
 
 def _whole_animation(
