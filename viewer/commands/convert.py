@@ -35,7 +35,11 @@ from viewer.commands._writing.motion_export import (
 from viewer.commands._writing.saved_joint_map import add_joint_map_argument, saving_joint_map
 from viewer.commands._writing.streamed_bvh import convert_streamed
 from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
-from viewer.commands._writing.written_actors import left_out_notes, pose_or_point_actors
+from viewer.commands._writing.written_actors import (
+    able_actors,
+    left_out_notes,
+    pose_or_point_actors,
+)
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
@@ -171,7 +175,8 @@ def _write_actors(
     clips_of: Callable[[Actor], Sequence[TransformClip] | None],
 ) -> list[Diagnostic]:
     """Write the actors that are present, to one file each unless the format holds several."""
-    shown = pose_or_point_actors(scene)
+    all_shown = pose_or_point_actors(scene)
+    shown, lacking = able_actors(all_shown, exporter_for(output))
     actors = [actor for actor in shown if actor.is_present]
     if not actors:
         raise RigError("no person is present at that time: there is nothing to write")
@@ -183,7 +188,7 @@ def _write_actors(
         notes = _write_apart(arguments, scene, skinning, found, clips_of)
     away = [actor.name for actor in shown if not actor.is_present]
     notes += [Diagnostic("X003.absent-now", values={"figure": name}) for name in away]
-    return notes + left_out_notes(scene, shown)
+    return notes + lacking + left_out_notes(scene, all_shown)
 
 
 def _write_together(

@@ -46,12 +46,14 @@ EXPORTERS = {
         "the posed mesh, textures",
         "joints, weights",
         writes_motion=True,
+        needs="mesh",
     ),
     "ply": Exporter(
         "PLY: the posed mesh",
         (".ply",),
         "the posed mesh, texture coordinates",
         "joints, weights, textures",
+        needs="mesh",
     ),
     "npz": Exporter(
         "NumPy arrays: posed vertices and joints",
@@ -65,12 +67,14 @@ EXPORTERS = {
         (".json", ".txt"),
         "rotations of joints, shape",
         "mesh, weights",
+        needs="skeleton",
     ),
     "rig": Exporter(
         "course rig: .skel and .skin",
         (".skel", ".skin"),
         "mesh, joints, limits, weights, texture",
         "blend shapes, pose correctives",
+        needs="skeleton",
     ),
     "anim": Exporter(
         "clip: keys of a course rig",
@@ -79,6 +83,7 @@ EXPORTERS = {
         "mesh, shape, scale",
         writes_pose=False,
         writes_motion=True,
+        needs="skeleton",
     ),
     "gltf": Exporter(
         "glTF: mesh, skin and motion",
@@ -94,6 +99,7 @@ EXPORTERS = {
         (".vrm",),
         "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
         "pose, motion, joint limits, pose correctives",
+        needs="skeleton",
     ),
     "vrma": Exporter(
         "VRM animation: motion of a humanoid",
@@ -102,6 +108,7 @@ EXPORTERS = {
         "mesh, other joints",
         writes_pose=False,
         writes_motion=True,
+        needs="skeleton",
     ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
@@ -110,6 +117,7 @@ EXPORTERS = {
         "mesh, weights, changes of shape",
         writes_pose=False,
         writes_motion=True,
+        needs="skeleton",
     ),
     "amass": Exporter(
         "AMASS: parameters of the SMPL family",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.scene import Actor
@@ -32,6 +34,8 @@ class Exporter:
         animations of a figure with their own keys.
     writes_several : bool
         Whether its module has ``export_figures``, which writes several figures to one file.
+    needs : "mesh", "skeleton" or ""
+        The part without which nothing of a figure can be written.
     """
 
     title: str
@@ -43,6 +47,11 @@ class Exporter:
     keeps_world: bool = False
     writes_keys: bool = False
     writes_several: bool = False
+    needs: Literal["mesh", "skeleton", ""] = ""
+
+    def holds(self, actor: Actor) -> bool:
+        """Return whether the actor's figure has the part that the format needs."""
+        return not self.needs or getattr(actor.figure, self.needs) is not None
 
 
 def require_mesh(actor: Actor, what: str) -> None:

@@ -14,7 +14,9 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 
 from viewer.cli import run
-from viewer.export import EXPORTERS
+from viewer.errors import OutputError
+from viewer.export import EXPORTERS, obj
+from viewer.formats import save_parts
 
 DIGITS = 5e-9  # half of the ninth digit of numbers below 10
 EXACT = 1e-12
@@ -236,6 +238,17 @@ def test_rig_is_written_from_a_body_and_read_back(tmp_path, capsys):
     assert_allclose(found["vertices"], vertices, rtol=0, atol=EXACT)
 
 
+def test_skeletons_without_a_mesh_do_not_stop_the_other_figures(tmp_path, capsys):
+    rig, bare, out = write_twist(tmp_path), tmp_path / "bare.skel", tmp_path / "out.ply"
+    bare.write_text("balljoint root { balljoint tip { offset 1 0 0 } }")
+    assert run(["convert", *rig, str(bare), "-o", str(out)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines == [f"{out}: 3 vertices, 1 triangle", "bare: no mesh, not written"]
+    # Alone, it is an error.
+    assert run(["convert", str(bare), "-o", str(tmp_path / "bare.ply")]) == 2
+    assert "figure bare has no mesh to write as .ply" in capsys.readouterr().err
+
+
 def test_existing_file_is_replaced_only_with_force(tmp_path, capsys):
     rig = write_twist(tmp_path)
     out = tmp_path / "out.obj"
@@ -297,15 +310,20 @@ def test_existing_numbered_file_is_refused_before_any_is_written(tmp_path, capsy
     assert (tmp_path / "out-2.obj").read_text() == "precious"
 
 
-def test_actor_that_cannot_be_written_reverts_all_files(tmp_path, capsys):
-    rig = write_twist(tmp_path)
-    (tmp_path / "arms.skel").write_text(ARMS_SKEL)
+def test_actor_that_cannot_be_written_reverts_all_files(tmp_path, capsys, monkeypatch):
+    rig = [*write_twist(tmp_path), *write_twist(tmp_path, "second")]
     (tmp_path / "out.obj").write_text("precious")
     before = sorted(tmp_path.iterdir())
-    files = [*rig, str(tmp_path / "arms.skel")]
-    assert run(["convert", *files, "-o", str(tmp_path / "out.obj"), "--force"]) == 2
+
+    def fails_at_the_second(path, *rest):
+        if path.name == "out-2.obj":
+            raise OutputError(f"{path.name}: no space")
+        save_parts(path, *rest)
+
+    monkeypatch.setattr(obj, "save_parts", fails_at_the_second)
+    assert run(["convert", *rig, "-o", str(tmp_path / "out.obj"), "--force"]) == 5
     captured = capsys.readouterr()
-    assert captured.err == "viewer: figure arms has no mesh to write as .obj\n"
+    assert captured.err == "viewer: out-2.obj: no space\n"
     assert captured.out == "" and sorted(tmp_path.iterdir()) == before
     assert (tmp_path / "out.obj").read_text() == "precious"
 

@@ -10,7 +10,7 @@ from viewer.commands._numbers import number
 from viewer.commands._one_pose import animation_of_pose, asks_one_pose, pose_note
 from viewer.commands._sequence.frame_numbers import numbering_of, parse_range
 from viewer.commands._writing.baked_springs import add_spring_argument
-from viewer.commands._writing.written_actors import left_out_notes, written_actors
+from viewer.commands._writing.written_actors import able_actors, left_out_notes, written_actors
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, Phrase, frame_range
 from viewer.errors import RigError, UnsupportedFormatError, ViewerError
@@ -164,7 +164,8 @@ def write_motions(
     """
     options = motion_options(arguments, skinning)
     key = _exporter(arguments, output, scene)
-    actors = written_actors(arguments, output, scene)
+    all_written = written_actors(arguments, output, scene)
+    actors, lacking = able_actors(all_written, key)
     is_pose = asks_one_pose(arguments, output, scene)
     is_one = EXPORTERS[key].writes_several and is_together(output, options)
     paths = [output] * len(actors) if is_one else motion_paths(output, actors)
@@ -179,7 +180,8 @@ def write_motions(
     there = [part for part in parts if part.present.any()]
     if not there:
         raise RigError(f"no person is present in {parts[0].span}: there is nothing to write")
-    still = [each for each in scene.actors if is_one and each.clip is None and each not in actors]
+    others = [each for each in scene.actors if each not in all_written]
+    still = [each for each in others if is_one and each.clip is None]
     # The cameras of a scene are written together with the joints that carry them.
     if is_one and (len(there) + len(still) > 1 or scene.views):
         notes = _write_together(there, scene, output, options, still, check)
@@ -190,11 +192,8 @@ def write_motions(
         if not part.present.any():
             values = {"figure": part.animation.name, "frames": part.span}
             notes.append(Diagnostic("X003.absent", values=values))
-    return [
-        *notes,
-        *[pose_note(arguments, scene)] * is_pose,
-        *left_out_notes(scene, actors + still),
-    ]
+    left = left_out_notes(scene, all_written + still)
+    return [*notes, *[pose_note(arguments, scene)] * is_pose, *lacking, *left]
 
 
 def _whole_animation(

@@ -89,6 +89,8 @@ MESSAGES = {
     "X003.absent": "{figure:text}: absent in {frames}, not written",
     "X003.absent-now": "{figure:text}: absent at that time, not written",
     "X003.absent-in-range": "{figure:text}: absent throughout the range, not exported",
+    "X003.no-mesh": "{figure:text}: no mesh, not written",
+    "X003.no-skeleton": "{figure:text}: no skeleton, not written",
     "X003.no-motion": "{figure:text}: no motion, not written",
     "X003.no-joints": "{figure:text}: no joints, not written",
     "X003.json-numbers": "{n:#infinite or undefined number} of the original file {n:?is|are} "
