@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 __all__ = ["TABLES"]
 
 MIXAMO = """
@@ -342,6 +344,434 @@ Hips = pelvis
 """
 
 
+SOMA = """
+Root = -
+ Hips = pelvis
+  Spine1 = spine1
+   Spine2 = spine2
+    Chest = spine3
+     Neck1 = neck
+      Neck2 = -
+       Head = head
+        HeadEnd = -
+        Jaw = jaw
+        LeftEye = left_eye
+     LeftShoulder = left_collar
+      LeftArm = left_shoulder
+       LeftForeArm = left_elbow
+        LeftHand = left_wrist
+         LeftHandThumb1 = left_thumb1
+          LeftHandThumb2 = left_thumb2
+           LeftHandThumb3 = left_thumb3
+            LeftHandThumbEnd = -
+         LeftHandIndex1 = -
+          LeftHandIndex2 = left_index1
+           LeftHandIndex3 = left_index2
+            LeftHandIndex4 = left_index3
+             LeftHandIndexEnd = -
+  LeftLeg = left_hip
+   LeftShin = left_knee
+    LeftFoot = left_ankle
+     LeftToeBase = left_foot
+      LeftToeEnd = -
+  RightLeg = right_hip
+   RightShin = right_knee
+"""
+MAKEHUMAN_BVH = """
+Root = pelvis
+ Spine1 = spine1
+  Spine2 = spine2
+   Spine3 = spine3
+    Neck = neck
+     Head = head
+      __Jaw = -
+       Jaw = jaw
+      __Eye_L = -
+       Eye_L = left_eye
+    __Clavicle_L = -
+     Clavicle_L = left_collar
+      UpArm_L = left_shoulder
+       LoArm_L = left_elbow
+        Hand_L = left_wrist
+         __Thumb1_L = -
+          Thumb1_L = left_thumb1
+           Thumb2_L = left_thumb2
+         Middle1_L = left_middle1
+ __UpLeg_L = -
+  UpLeg_L = left_hip
+   LoLeg_L = left_knee
+    Foot_L = left_ankle
+     Toe_L = left_foot
+ __UpLeg_R = -
+  UpLeg_R = right_hip
+   LoLeg_R = right_knee
+"""
+MMD = """
+全ての親 = -
+ センター = -
+  グルーブ = -
+   腰 = -
+    上半身 = spine1
+     上半身2 = spine3
+      首 = neck
+       頭 = head
+        左目 = left_eye
+        両目 = -
+      左肩P = -
+       左肩 = left_collar
+        左肩C = -
+         左腕 = left_shoulder
+          左腕捩 = -
+           左ひじ = left_elbow
+            左手捩 = -
+             左手首 = left_wrist
+              左親指０ = left_thumb1
+               左親指１ = left_thumb2
+                左親指２ = left_thumb3
+              左人指１ = left_index1
+               左人指２ = left_index2
+              左中指３ = left_middle3
+              左薬指１ = left_ring1
+              左小指２ = left_pinky2
+    下半身 = pelvis
+     左足 = left_hip
+      左ひざ = left_knee
+       左足首 = left_ankle
+        左つま先 = left_foot
+     左足D = -
+     右足 = right_hip
+      右ひざ = right_knee
+ 左足ＩＫ = -
+  左つま先ＩＫ = -
+"""
+MMD_LATIN = """
+sentaa = -
+ jouhanshin = spine1
+  jouhanshin2 = spine3
+   kubi = neck
+    atama = head
+   kata_L = left_collar
+    ude_L = left_shoulder
+     hiji_L = left_elbow
+      tekubi_L = left_wrist
+       oyayubi0_L = left_thumb1
+        oyayubi1_L = left_thumb2
+         oyayubi2_L = left_thumb3
+ kahanshin = pelvis
+  hidari ashi = left_hip
+   hidari hiza = left_knee
+    hidari ashikubi = left_ankle
+     hidari tsumasaki = left_foot
+  migi ashi = right_hip
+"""
+MMD_ENGLISH = """
+mother = -
+ center = -
+  groove = -
+   waist = -
+    upper body = spine1
+     upper body 2 = spine3
+      neck = neck
+       head = head
+      shoulder_L = left_collar
+       arm_L = left_shoulder
+        elbow_L = left_elbow
+         wrist_L = left_wrist
+          thumb0_L = left_thumb1
+           thumb1_L = left_thumb2
+            thumb2_L = left_thumb3
+          fore1_L = left_index1
+          third2_L = left_ring2
+    lower body = pelvis
+     leg_L = left_hip
+      knee_L = left_knee
+       ankle_L = left_ankle
+        toe_L = left_foot
+     leg_R = right_hip
+leg IK_L = -
+"""
+KINECT = """
+SpineBase = pelvis
+ SpineMid = spine1
+  SpineShoulder = spine3
+   Neck = neck
+    Head = head
+   ShoulderLeft = left_shoulder
+    ElbowLeft = left_elbow
+     WristLeft = left_wrist
+      HandLeft = left_hand
+       HandTipLeft = -
+ HipLeft = left_hip
+  KneeLeft = left_knee
+   AnkleLeft = left_ankle
+    FootLeft = left_foot
+ HipRight = right_hip
+"""
+AZURE_KINECT = """
+PELVIS = pelvis
+ SPINE_NAVEL = spine1
+  SPINE_CHEST = spine3
+   NECK = neck
+    HEAD = head
+   CLAVICLE_LEFT = left_collar
+    SHOULDER_LEFT = left_shoulder
+     ELBOW_LEFT = left_elbow
+      WRIST_LEFT = left_wrist
+       HAND_LEFT = left_hand
+ HIP_RIGHT = right_hip
+  KNEE_RIGHT = right_knee
+   ANKLE_RIGHT = right_ankle
+    FOOT_RIGHT = right_foot
+"""
+OPTITRACK = """
+Hip = pelvis
+ Ab = spine1
+  Chest = spine3
+   Neck = neck
+    Head = head
+   LShoulder = left_collar
+    LUArm = left_shoulder
+     LFArm = left_elbow
+      LHand = left_wrist
+       LThumb1 = left_thumb1
+ LThigh = left_hip
+  LShin = left_knee
+   LFoot = left_ankle
+    LToe = left_foot
+ RThigh = right_hip
+"""
+CHARACTER_CREATOR = """
+CC_Base_BoneRoot = -
+ CC_Base_Hip = pelvis
+  CC_Base_Pelvis = -
+   CC_Base_L_Thigh = left_hip
+    CC_Base_L_ThighTwist01 = -
+    CC_Base_L_Calf = left_knee
+     CC_Base_L_Foot = left_ankle
+      CC_Base_L_ToeBase = left_foot
+       CC_Base_L_BigToe1 = -
+   CC_Base_R_Thigh = right_hip
+  CC_Base_Waist = spine1
+   CC_Base_Spine01 = spine2
+    CC_Base_Spine02 = spine3
+     CC_Base_NeckTwist01 = neck
+      CC_Base_NeckTwist02 = -
+       CC_Base_Head = head
+     CC_Base_L_Clavicle = left_collar
+      CC_Base_L_Upperarm = left_shoulder
+       CC_Base_L_UpperarmTwist01 = -
+       CC_Base_L_Forearm = left_elbow
+        CC_Base_L_Hand = left_wrist
+         CC_Base_L_Thumb1 = left_thumb1
+         CC_Base_L_Mid2 = left_middle2
+"""
+SECOND_LIFE = """
+mPelvis = pelvis
+ mTorso = spine1
+  mChest = spine3
+   mNeck = neck
+    mHead = head
+   mCollarLeft = left_collar
+    mShoulderLeft = left_shoulder
+     mElbowLeft = left_elbow
+      mWristLeft = left_wrist
+       mHandIndex1Left = left_index1
+ mHipLeft = left_hip
+  mKneeLeft = left_knee
+   mAnkleLeft = left_ankle
+    mFootLeft = left_foot
+     mToeLeft = -
+ mHipRight = right_hip
+"""
+XNALARA = """
+root hips = -
+ pelvis = pelvis
+  leg left thigh = left_hip
+   leg left knee = left_knee
+    leg left ankle = left_ankle
+     leg left toes = left_foot
+  leg right thigh = right_hip
+ spine lower = -
+  arm left shoulder 1 = left_collar
+   arm left shoulder 2 = left_shoulder
+    arm left elbow = left_elbow
+     arm left wrist = left_wrist
+"""
+ARKIT = """
+root = -
+ hips_joint = pelvis
+  left_upLeg_joint = left_hip
+   left_leg_joint = left_knee
+    left_foot_joint = left_ankle
+     left_toes_joint = left_foot
+      left_toesEnd_joint = -
+  right_upLeg_joint = right_hip
+  spine_1_joint = spine1
+   spine_2_joint = -
+    spine_3_joint = -
+     spine_4_joint = spine2
+      spine_5_joint = -
+       spine_6_joint = -
+        spine_7_joint = spine3
+         left_shoulder_1_joint = left_collar
+          left_arm_joint = left_shoulder
+           left_forearm_joint = left_elbow
+            left_hand_joint = left_wrist
+             left_handIndexStart_joint = -
+              left_handIndex_1_joint = left_index1
+         neck_1_joint = neck
+          head_joint = head
+"""
+ROBLOX = """
+HumanoidRootPart = -
+ LowerTorso = pelvis
+  UpperTorso = spine1
+   Head = head
+   LeftUpperArm = left_shoulder
+    LeftLowerArm = left_elbow
+     LeftHand = left_wrist
+  LeftUpperLeg = left_hip
+   LeftLowerLeg = left_knee
+    LeftFoot = left_ankle
+  RightUpperLeg = right_hip
+"""
+MUJOCO_SMPL = """
+Pelvis = pelvis
+ L_Hip = left_hip
+  L_Knee = left_knee
+   L_Ankle = left_ankle
+    L_Toe = left_foot
+ R_Hip = right_hip
+ Torso = spine1
+  Spine = spine2
+   Chest = spine3
+    Neck = neck
+     Head = head
+    L_Thorax = left_collar
+     L_Shoulder = left_shoulder
+      L_Elbow = left_elbow
+       L_Wrist = left_wrist
+        L_Hand = left_hand
+"""
+MHR = """
+body_world = -
+ root = pelvis
+  l_upleg = left_hip
+   l_upleg_twist0_proc = -
+   l_lowleg = left_knee
+    l_foot = left_ankle
+     l_talocrural = -
+      l_ball = left_foot
+  r_upleg = right_hip
+  c_spine0 = spine1
+   c_spine1 = spine2
+    c_spine2 = -
+     c_spine3 = spine3
+      l_clavicle = left_collar
+       l_uparm = left_shoulder
+        l_lowarm = left_elbow
+         l_wrist = left_wrist
+          l_pinky0 = -
+           l_pinky1 = left_pinky1
+          l_thumb0 = -
+           l_thumb1 = left_thumb1
+            l_thumb2 = left_thumb2
+             l_thumb3 = left_thumb3
+      c_neck = neck
+       c_head = head
+        c_jaw = jaw
+"""
+VALVE = """
+ValveBiped.Bip01_Pelvis = pelvis
+ ValveBiped.Bip01_L_Thigh = left_hip
+  ValveBiped.Bip01_L_Calf = left_knee
+   ValveBiped.Bip01_L_Foot = left_ankle
+    ValveBiped.Bip01_L_Toe0 = left_foot
+ ValveBiped.Bip01_R_Thigh = right_hip
+ ValveBiped.Bip01_Spine = spine1
+  ValveBiped.Bip01_Spine1 = spine2
+   ValveBiped.Bip01_Spine2 = -
+    ValveBiped.Bip01_Spine4 = spine3
+     ValveBiped.Bip01_Neck1 = neck
+      ValveBiped.Bip01_Head1 = head
+     ValveBiped.Bip01_L_Clavicle = left_collar
+      ValveBiped.Bip01_L_UpperArm = left_shoulder
+       ValveBiped.Bip01_L_Forearm = left_elbow
+        ValveBiped.Bip01_L_Hand = left_wrist
+         ValveBiped.Bip01_L_Finger0 = left_thumb1
+         ValveBiped.Bip01_L_Finger12 = left_index3
+"""
+ROKOKO_GLOVES = """
+Hips = pelvis
+ Spine1 = spine1
+  LeftShoulder = left_collar
+   LeftArm = left_shoulder
+    LeftForeArm = left_elbow
+     LeftHand = left_wrist
+      LeftFinger1Metacarpal = left_thumb1
+       LeftFinger1Proximal = left_thumb2
+        LeftFinger1Distal = left_thumb3
+         LeftFinger1Tip = -
+      LeftFinger2Metacarpal = -
+       LeftFinger2Proximal = left_index1
+        LeftFinger2Medial = left_index2
+         LeftFinger2Distal = left_index3
+      LeftFinger5Proximal = left_pinky1
+ LeftThigh = left_hip
+  LeftShin = left_knee
+ RightThigh = right_hip
+"""
+HIP_HELPERS = """
+Hips = pelvis
+ LeftHip = -
+  LeftUpLeg = left_hip
+   LeftLeg = left_knee
+    LeftFoot = left_ankle
+ RightHip = -
+  RightUpLeg = right_hip
+   RightLeg = right_knee
+ Spine = spine1
+  LeftShoulder = left_shoulder
+   LeftElbow = left_elbow
+    LeftHand = left_wrist
+"""
+WRIST_AND_HAND = """
+Hips = pelvis
+ LeftLeg = left_hip
+  LeftFoot = left_ankle
+ RightLeg = right_hip
+ Spine = spine1
+  LeftCollar = left_collar
+   LeftShoulder = -
+    LeftArm = left_shoulder
+     LeftForeArm = left_elbow
+      LeftWrist = left_wrist
+       LeftHand = left_hand
+"""
+
+
+def changed(table: str, change: Callable[[str], str]) -> str:
+    """Return a table with other names for the same joints."""
+    lines = []
+    for line in table.strip("\n").split("\n"):
+        name, _, meaning = line.strip().partition(" = ")
+        lines.append(f"{line[: len(line) - len(line.lstrip())]}{change(name)} = {meaning}")
+    return "\n".join(["", *lines, ""])
+
+
+def shift_jis(name: str) -> str:
+    """Return a name as the reader returns it from a file in Shift JIS."""
+    return name.encode("cp932").decode("utf-8", "surrogateescape")
+
+
+def dotted(name: str) -> str:
+    """Return a name as Blender writes sides: UpArm_L becomes UpArm.L, LeftLeg becomes Leg.L."""
+    for side in ("Left", "Right", "左", "右"):
+        if name.startswith(side):
+            return f"{name.removeprefix(side).strip()}.{'L' if side in ('Left', '左') else 'R'}"
+    return name
+
+
 def numbered(table: str) -> str:
     """Return a table whose names end in the index of the joint, as programs write unique names."""
     lines = table.strip("\n").split("\n")
@@ -376,4 +806,40 @@ TABLES = {
     "poser": POSER,
     "old bvh": OLD_BVH,
     "xsens": XSENS,
-}
+    "soma": SOMA,
+    "soma in capitals": changed(SOMA, str.upper),
+    "soma prefixed": changed(SOMA, "human:{}".format),
+    "makehuman capture": MAKEHUMAN_BVH,
+    "mmd": MMD,
+    "mmd in blender": changed(MMD, dotted),
+    "mmd in katakana": MMD.replace("ひざ", "ヒザ").replace("ひじ", "ヒジ"),
+    "mmd in kanji": MMD.replace("ひざ", "膝").replace("ひじ", "肘").replace("人指", "人差し指"),
+    "mmd in shift jis": changed(MMD, shift_jis),
+    "mmd latin": MMD_LATIN,
+    "mmd english": MMD_ENGLISH,
+    "kinect": KINECT,
+    "azure kinect": AZURE_KINECT,
+    "optitrack": OPTITRACK,
+    "character creator": CHARACTER_CREATOR,
+    "second life": SECOND_LIFE,
+    "xnalara": XNALARA,
+    "arkit": ARKIT,
+    "roblox": ROBLOX,
+    "smpl in mujoco": MUJOCO_SMPL,
+    "mhr": MHR,
+    "valve": VALVE,
+    "rokoko gloves": ROKOKO_GLOVES,
+    "hip helpers": HIP_HELPERS,
+    "wrist and hand": WRIST_AND_HAND,
+    "mixamo in one word": changed(MIXAMO, lambda name: name.replace(":", "")),
+    "mixamo behind a path": changed(MIXAMO, lambda name: f"Armature|{name}"),
+    "mixamo with a suffix": changed(MIXAMO, lambda name: f"{name.split(':')[1]}_jnt"),
+    "mixamo in lower case": changed(HIK, lambda name: name[:1].lower() + name[1:]),
+    "rigify, deforming": changed(RIGIFY, "DEF-{}".format),
+    "old bvh in capitals": changed(OLD_BVH, str.upper),
+    "old bvh with dots": changed(OLD_BVH, dotted),
+    "unreal without symbols": changed(UNREAL, lambda name: name.replace("_", "")),
+    "biped in capitals": changed(BIPED, str.upper),
+    "poser in blender": changed(POSER, lambda name: f"{name[1:]}.{name[0].upper()}"
+                                if name[0] in "lr" and name[1].isupper() else name),
+}  # fmt: skip

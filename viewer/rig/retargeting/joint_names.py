@@ -1,18 +1,21 @@
-"""Rules that translate joint names of many programs to the names of the SMPL family.
+"""Meaning of joint names in the skeletons of many programs, as names of the SMPL family.
 
-The supported names are those of SMPL, SMPL+H and SMPL-X (also as exported through Maya), Mixamo,
-MotionBuilder and Rokoko, CMU (both its ``.bvh`` and its ``.asf`` names), Poser and DAZ, 3ds
-Max's Biped, Character Creator, Unreal, VRM, MakeHuman, Xsens, and Blender's Rigify and Auto-Rig
-Pro. Sides are detected as ``L``, ``R``, ``Left`` or ``Right`` at either end of a name; prefixes
-shared by most joints (``mixamorig:``, ``Bip01 ``, ``m_avg_``) and the numbers with which some
-programs make all names unique (``LeftArm_07``) are removed.
+One name means different joints in different programs: ``LeftLeg`` is the shin in Mixamo and the
+thigh in SOMA, ``LeftShoulder`` the collar bone or the upper arm. So the names are judged together:
+the family in ``_FAMILIES`` that has most of a skeleton's words says what they mean. Words that it
+lacks have the meaning that they have in other families, if no other word has it already.
+
+Sides are detected as ``L``, ``R``, ``Left``, ``Right`` and some others at either end of a name.
+Prefixes and suffixes shared by most joints (``mixamorig:``, ``Bip01 ``, ``_jnt``) and the numbers
+with which some programs make all names unique (``LeftArm_07``) are removed.
 """
 
 from __future__ import annotations
 
 import re
+import unicodedata
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 from viewer.rig.arrays import Ints
@@ -21,51 +24,104 @@ from viewer.rig.skeleton import Skeleton
 
 __all__ = ["canonical_names", "joint_meanings", "joints_by_place", "sided_words"]
 
-_WORDS = {
-    "pelvis": "pelvis hips",
-    "hip": "hip upleg upperleg thigh thighbend thighstretch femur",
-    "knee": "knee leg lowleg lowerleg legstretch shin calf tibia",
-    "ankle": "ankle",
-    "foot": "toebase toe toes ball",
-    "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper chest chestlower "
-    "chestupper upperchest torso thorax waist",
-    "neck": "neck lowerneck upperneck necklower neckupper necktwist",
-    "head": "head",
-    "collar": "collar clavicle collarbone",
-    "shoulder": "arm armstretch upperarm uparm humerus shldr shldrbend",
-    "elbow": "elbow forearm forearmbend forearmstretch lowerarm lowarm radius",
-    "wrist": "wrist",
-    "jaw": "jaw",
-    "eye": "eye eyesmplhf eyeball",
-}
-_ROLES = {word: role for role, words in _WORDS.items() for word in words.split()}
-# Words for different joints in different conventions.
-_AMBIGUOUS = {"foot", "shoulder", "hand", "leg"}
-# Prefixes that are removed before the side or word is identified.
-_PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
+_ARM = ("collar", "shoulder", "elbow", "wrist", "hand")
+_LEG = ("hip", "knee", "ankle", "foot")
 
-_SIDED = {"hip", "knee", "ankle", "foot", "collar", "shoulder", "elbow", "wrist", "hand", "eye"}
-_SIDES = {"l": "left", "left": "left", "r": "right", "right": "right"}
+# Words for the joints of _ARM and _LEG without their side, in lower case and without symbols; "-"
+# for none. If families have equally many of a skeleton's words, the first one counts.
+_FAMILIES = {
+    "Mixamo, MotionBuilder, LAFAN1": (
+        "shoulder arm forearm hand -", "upleg leg foot toebase/toe"),
+    "Rokoko": ("shoulder arm forearm hand -", "thigh shin foot toe"),
+    "SOMA": ("shoulder arm forearm hand -", "leg shin foot toebase"),
+    "Rigify, Daz Genesis 9": ("shoulder upperarm forearm hand -", "thigh shin foot toe/toes"),
+    "VRM, Unity": ("shoulder upperarm lowerarm hand -", "upperleg lowerleg foot toe/toes/toebase"),
+    "Xsens": ("shoulder upperarm forearm hand -", "upperleg lowerleg foot toe"),
+    "Unreal": ("clavicle upperarm lowerarm hand -", "thigh calf foot ball/toe"),
+    "3ds Max Biped, Character Creator": (
+        "clavicle/collarbone upperarm forearm hand -", "thigh calf foot toe/toebase"),
+    "SMPL": ("collar/thorax shoulder elbow wrist hand", "hip knee ankle foot/toe"),
+    "BioVision, AIST++": ("collar shoulder elbow wrist -", "hip knee ankle toe"),
+    "Kinect": ("clavicle shoulder elbow wrist hand", "hip knee ankle foot"),
+    "CMU in ASF": ("clavicle humerus radius wrist hand", "femur tibia foot toes"),
+    "Poser": ("collar shldr forearm hand -", "thigh shin foot toe"),
+    "Daz Genesis 3 and 8": ("collar shldrbend forearmbend hand -", "thighbend shin foot toe"),
+    "MakeHuman": ("clavicle upperarm lowerarm wrist -", "upperleg lowerleg foot toe"),
+    "MakeHuman, motion capture": ("clavicle uparm loarm hand -", "upleg loleg foot toe"),
+    "MHR": ("clavicle uparm lowarm wrist -", "upleg lowleg foot ball"),
+    "KayKit": ("- upperarm lowerarm wrist hand", "upperleg lowerleg foot toes"),
+    "Auto-Rig Pro": (
+        "shoulder armstretch forearmstretch hand -", "thighstretch legstretch foot toes"),
+    "OptiTrack": ("shoulder uarm farm hand -", "thigh shin foot toe"),
+    "XNALara": (
+        "armshoulder1 armshoulder2 armelbow armwrist -", "legthigh legknee legankle legtoes"),
+    "upper arm and arm": ("shoulder upperarm arm hand -", "thigh/upperleg leg foot toe"),
+    "MMD in English": ("shoulder arm elbow wrist -", "leg knee ankle toe"),
+    "MMD in Latin letters": ("kata ude hiji tekubi -", "ashi hiza ashikubi tsumasaki"),
+    "MMD": ("肩 腕 ひじ/ヒジ/肘 手首 -", "足 ひざ/ヒザ/膝 足首 つま先/足先ex"),
+}  # fmt: skip
+# Joints that a limb has even if it lacks others: a shoulder is no collar without an upper arm.
+_NEEDED = ("shoulder", "wrist", "hip", "ankle")
+
+# Words with the same meaning in all families.
+_TRUNK = {
+    "pelvis": "pelvis hips hip spinebase lowertorso lowerbody kahanshin 下半身",
+    "spine": "spine lowerback upperback back abdomen abdomenlower abdomenupper ab chest chestlower "
+    "chestupper upperchest torso uppertorso thorax waist spinemid spineshoulder spinechest "
+    "spinenavel upperbody jouhanshin 上半身",
+    "neck": "neck lowerneck upperneck necklower neckupper necktwist kubi 首",
+    "head": "head atama 頭",
+    "jaw": "jaw あご",
+}
+_CENTRE = {word: part for part, words in _TRUNK.items() for word in words.split()}
+_EYES = {"eye", "eyesmplhf", "eyeball", "adjfaceeye", "目"}
 _XSENS_SPINE = {"l5", "l3", "t12", "t8"}
+_CHAINS = ("spine", "neck")
+
 _FINGERS = {
     **{name: name for name in ("thumb", "index", "middle", "ring", "pinky")},
-    **{"mid": "middle", "little": "pinky"},
+    **{"mid": "middle", "little": "pinky", "fore": "index", "third": "ring"},
+    **{"oyayubi": "thumb", "hitosasiyubi": "index", "hitosashiyubi": "index"},
+    **{"nakayubi": "middle", "kusuriyubi": "ring", "koyubi": "pinky"},
+    **{"親指": "thumb", "人指": "index", "人差指": "index", "人差し指": "index"},
+    **{"中指": "middle", "薬指": "ring", "小指": "pinky"},
 }
-_PHALANX = {"proximal": 1, "intermediate": 2, "distal": 3}
+_PHALANX = {"metacarpal": 0, "proximal": 1, "intermediate": 2, "medial": 2, "distal": 3}
 _FINGER = re.compile(
-    rf"(?:hand|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
+    rf"(?:hand|finger|f)?({'|'.join(_FINGERS)})(?:finger)?({'|'.join(_PHALANX)})?(\d{{0,4}})"
 )
-_BIPED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
-_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+")
+_NUMBERED_FINGERS = ("thumb", "index", "middle", "ring", "pinky")
+_ROKOKO_FINGER = re.compile(rf"finger([1-5])({'|'.join(_PHALANX)})")
+_BIPED_FINGER = re.compile(r"finger([0-4])([12]?)")
+
+_SIDES = {
+    **dict.fromkeys(("l", "left", "lft", "lt", "hidari", "左"), "left"),
+    **dict.fromkeys(("r", "right", "rgt", "rt", "migi", "右"), "right"),
+}
+# Prefixes that are removed before the side or word is identified.
+_PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
+_HELPERS = ("__", "ORG-")  # prefixes of joints that repeat another one's name
+_TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[左右](?=\w)|[^\W\d_A-Za-z]+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
 _FEW = 8  # number of joints below which numbers at the end are part of the names
-_SHARED = 0.6  # fraction of the joints above which a shared first word is a prefix
+_SHARED = 0.6  # fraction of the joints above which a shared first or last word is removed
 _MOST = 2000  # maximum number of joints of a body
 _SPINES = ("spine1", "spine2", "spine3")
 
 _ARMS = ("left_collar", "right_collar", "left_shoulder", "right_shoulder")
 
 _Key = tuple[str, str]  # side and word, in lower case: ("left", "upleg")
+
+
+def _meanings(joints: Sequence[str], row: str) -> dict[str, str]:
+    """Return the meaning of each word of a family's arm or leg."""
+    cells = zip(joints, row.split(), strict=True)
+    return {word: joint for joint, words in cells for word in words.split("/") if word != "-"}
+
+
+_LIMBS = [(_meanings(_ARM, arm), _meanings(_LEG, leg)) for arm, leg in _FAMILIES.values()]
+_SIDED = {word for limbs in _LIMBS for limb in limbs for word in limb}
+_TOES = {word for _, leg in _LIMBS for word, joint in leg.items() if joint == "foot"} - {"foot"}
 
 
 def sided_words(names: Sequence[str]) -> list[tuple[str, str]]:
@@ -125,7 +181,7 @@ def joints_by_place(skeleton: Skeleton) -> set[int]:
     if skeleton.humanoid is not None or skeleton.n_joints > _MOST:
         return set()
     meanings = canonical_names(skeleton.names, skeleton.parents)
-    own = [_role(key) for key in _unambiguous(_keys(skeleton.names))]
+    own = _roles(skeleton.names)
     return {
         joint
         for joint, meaning in enumerate(meanings)
@@ -145,10 +201,9 @@ def _stated(humanoid: Humanoid, n_joints: int) -> tuple[str, ...]:
 def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     """Return the SMPL family's name for each joint: ``left_hip``, ``spine2`` and so on.
 
-    Words whose meaning depends on the convention are resolved by the skeleton's other names:
-    ``LeftShoulder`` is a collar if there is a ``LeftArm``, ``LeftFoot`` an ankle if there
-    is none. Chains of spine joints are numbered from the pelvis; if there are more than three, the
-    first, middle and last are used. Without a pelvis, the joint above both legs is the pelvis.
+    The names are judged together, as the module states. Chains of spine joints are numbered from
+    the pelvis; if there are more than three, the first, middle and last are used. Without a pelvis,
+    the joint above both legs is the pelvis.
 
     Parameters
     ----------
@@ -168,26 +223,22 @@ def canonical_names(names: Sequence[str], parents: Ints) -> tuple[str, ...]:
     """
     if len(names) > _MOST:
         return ("",) * len(names)
-    keys = _keys(names)
-    roles = [_role(key) for key in _unambiguous(keys)]
+    roles = _roles(names)
     chains = {chain: [j for j, role in enumerate(roles) if role == chain] for chain in _CHAINS}
     result = ["" if role in _CHAINS else role for role in roles]
     spine = chains["spine"]
     if "pelvis" not in result:
         _put_pelvis(result, parents, spine)
-    spine = _without_neck([j for j in spine if not result[j]], chains["neck"], result, parents)
+    if "pelvis" in result:
+        # A waist above both halves of the body, as in MMD, is no part of the spine.
+        above = {result.index("pelvis"), *_ancestors(result.index("pelvis"), parents)}
+        spine = [joint for joint in spine if joint not in above]
+    spine = _without_neck(spine, chains["neck"], result, parents)
     for joint, name in zip(*_numbered(spine), strict=True):
         result[joint] = name
     if chains["neck"]:
         result[chains["neck"][0]] = "neck"
-    seen: set[str] = set()
-    for joint, name in enumerate(result):
-        result[joint] = "" if name in seen else name
-        seen.add(name)
     return tuple(result)
-
-
-_CHAINS = ("spine", "neck")
 
 
 def _numbered(spine: list[int]) -> tuple[list[int], tuple[str, ...]]:
@@ -234,16 +285,109 @@ def _ancestors(joint: int, parents: Ints) -> list[int]:
     return path
 
 
+def _roles(names: Sequence[str]) -> list[str]:
+    """Return the canonical name of each joint, or the chain to which it belongs; each name once."""
+    keys = _keys(names)
+    words = [_word_of(key) for key in keys]
+    limbs, usual = _limb_words({word for (side, _), word in zip(keys, words, strict=True) if side})
+    # A helper repeats the name of another joint.
+    twice = {key for key, count in Counter(keys).items() if count > 1}
+    helpers = {
+        joint
+        for joint, name in enumerate(names)
+        if name.startswith(_HELPERS) and keys[joint] in twice
+    }
+    fingers = _fingers(keys, helpers)
+    roles = [
+        fingers.get(joint) or _role(key, word, limbs)
+        for joint, (key, word) in enumerate(zip(keys, words, strict=True))
+    ]
+    # Of several joints with one meaning, the first one counts, but words of the family precede.
+    seen: set[str] = set()
+    for joint in sorted(range(len(names)), key=lambda joint: words[joint] not in usual):
+        if roles[joint] in seen or joint in helpers:
+            roles[joint] = ""
+        elif roles[joint] not in _CHAINS:
+            seen.add(roles[joint])
+    return roles
+
+
+def _role(key: _Key, word: str, limbs: dict[str, str]) -> str:
+    """Return the canonical name of one joint other than a finger, or its chain."""
+    side, whole = key
+    if side:
+        part = limbs.get(word, "eye" if whole in _EYES else "")
+        return f"{side}_{part}" if part else ""
+    if whole in _XSENS_SPINE:
+        return "spine"
+    # Hands without a body (MANO) have no sides.
+    return "wrist" if word == "wrist" else _CENTRE.get(word, "")
+
+
+def _word_of(key: _Key) -> str:
+    """Return a word of the tables without its number; empty if it is in none."""
+    side, word = key
+    known = _SIDED if side else {*_CENTRE, "wrist"}
+    stem = word.rstrip("0123456789")
+    if word in known or stem not in known:
+        return word if word in known else ""
+    is_chain = not side and _CENTRE.get(stem) in _CHAINS
+    # Not int(number): names may have thousands of digits.
+    is_first = word[len(stem) :].lstrip("0") in ("", "1")
+    return stem if is_first or is_chain or (side and stem in _TOES) else ""
+
+
+def _limb_words(present: set[str]) -> tuple[dict[str, str], set[str]]:
+    """Return what the sided words of a skeleton mean, and those of the families that decide it."""
+
+    def fit(words: Iterable[str]) -> int:
+        return len(present.intersection(words))
+
+    by_fit = sorted(_LIMBS, key=lambda limbs: -fit([*limbs[0], *limbs[1]]))
+    found: dict[str, str] = {}
+    usual: set[str] = set()
+    for limb in range(2):
+        rows = [limbs[limb] for limbs in by_fit]
+        best = max(rows, key=fit)
+        usual |= present & best.keys()
+        meanings: dict[str, dict[str, None]] = {}
+        for row in (best, *rows):
+            for word in row:
+                if word in present:
+                    meanings.setdefault(word, {})[row[word]] = None
+        # Words with one meaning everywhere come first, then those of the family, then the others.
+        given = {word: next(iter(each)) for word, each in meanings.items() if len(each) == 1}
+        others = {meaning for word, meaning in given.items() if word not in best}
+        given |= {
+            word: best[word]
+            for word in best
+            if word in meanings and word not in given and best[word] not in others
+        }
+        for word, each in meanings.items():
+            free = [meaning for meaning in each if meaning not in given.values()]
+            if word not in given and free:
+                given[word] = free[0]
+        for needed in _NEEDED:
+            for word, each in meanings.items():
+                if needed in each and needed not in given.values():
+                    given[word] = needed
+        found |= given
+    return found, usual
+
+
 def _keys(names: Sequence[str]) -> list[_Key]:
-    """Return side and word of every name, without the prefix that most names have."""
+    """Return side and word of every name, without the first and last words that most names have."""
     split = [_tokens(name) for name in _unnumbered(names)]
-    while True:
-        first = Counter(tokens[0] for tokens in split if tokens)
-        token, count = first.most_common(1)[0] if first else ("", 0)
-        shared = count > max(2.0, _SHARED * len(split)) and token not in _SIDES
-        if not shared:
-            return [_key(tokens) for tokens in split]
-        split = [tokens[1:] if tokens[:1] == [token] else tokens for tokens in split]
+    for end in (0, -1):
+        while True:
+            ends = Counter(tokens[end] for tokens in split if tokens)
+            token, count = ends.most_common(1)[0] if ends else ("", 0)
+            is_word = token in _SIDES or (end and token in _SIDED | {*_CENTRE})
+            if is_word or count <= max(2.0, _SHARED * len(split)):
+                break
+            cut = slice(1, None) if end == 0 else slice(0, -1)
+            split = [each[cut] if each and each[end] == token else each for each in split]
+    return [_key(tokens) for tokens in split]
 
 
 def _unnumbered(names: Sequence[str]) -> list[str]:
@@ -257,7 +401,7 @@ def _unnumbered(names: Sequence[str]) -> list[str]:
 
 def _tokens(name: str) -> list[str]:
     """Split a name, without its namespace, at capitals, digits and symbols; lower case."""
-    bare = re.split(r"[:|]", name)[-1]
+    bare = re.split(r"[:|/]", unicodedata.normalize("NFKC", _decoded(name)))[-1]
     tokens = [token.lower() for token in _TOKEN.findall(bare)]
     while len(tokens) > 1 and tokens[0] in _PREFIXES:
         behind = 2 if tokens[1].isdigit() and len(tokens) > 2 else 1  # Bip01
@@ -265,12 +409,24 @@ def _tokens(name: str) -> list[str]:
     return tokens
 
 
+def _decoded(name: str) -> str:
+    """Return a name whose bytes are not UTF-8 as Shift JIS, in which MMD writes, if they are."""
+    try:
+        name.encode()
+        return name
+    except UnicodeEncodeError:
+        try:
+            return name.encode("utf-8", "surrogateescape").decode("cp932")
+        except UnicodeError:
+            return name
+
+
 def _key(tokens: list[str]) -> _Key:
     """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
-        return "", "spine"
+        return "", "".join(tokens)
     # Centre joints have the prefix c in VRM, and the suffix x in Auto-Rig Pro.
-    tokens = [token for token in tokens if token != "c"]
+    tokens = tokens[1:] if len(tokens) > 1 and tokens[0] == "c" else tokens
     tokens = tokens[:-1] if len(tokens) > 1 and tokens[-1] == "x" else tokens
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
@@ -282,69 +438,66 @@ def _key(tokens: list[str]) -> _Key:
     if len(tokens) > 2 and tokens[1] in _SIDES and not tokens[0].isdigit():
         return _SIDES[tokens[1]], _word([tokens[0], *tokens[2:]])
     word = _word(tokens)
+    # lfemur, handl: a side without a separator is recognised only next to a known word.
     for letters in ("left", "right", "l", "r"):
-        # lfemur: a lower-case side without a separator is recognised only before a known word.
-        if word.startswith(letters) and word not in _ROLES and _is_known(word[len(letters) :]):
-            return _SIDES[letters], word[len(letters) :]
+        for bare in (word.removeprefix(letters), word.removesuffix(letters)):
+            if bare != word and not _is_known(word) and _is_known(bare):
+                return _SIDES[letters], bare
     return "", word
 
 
 def _word(tokens: list[str]) -> str:
     if len(tokens) == 3 and tokens[0] == "finger" and tokens[1] in "12345":
         # finger2-1.L of MakeHuman is an index finger, Finger21 of Biped a middle one.
-        return _BIPED_FINGERS[int(tokens[1]) - 1] + tokens[2]
+        return _NUMBERED_FINGERS[int(tokens[1]) - 1] + tokens[2]
     return "".join(tokens)
 
 
 def _is_known(word: str) -> bool:
     stem = word.rstrip("0123456789")
-    return stem in _ROLES or stem in _AMBIGUOUS or _FINGER.fullmatch(word) is not None
+    return stem in _SIDED or stem in _CENTRE or stem in _EYES or _FINGER.fullmatch(word) is not None
 
 
-def _unambiguous(keys: list[_Key]) -> list[_Key]:
-    """Rename words that mean different joints in different conventions."""
-    roles = {_ROLES.get(word.rstrip("0123456789"), "") for _, word in keys}
+def _fingers(keys: Sequence[_Key], helpers: set[int]) -> dict[int, str]:
+    """Return the canonical names of finger joints, such as ``left_index2``, by joint."""
+    found: dict[tuple[str, str], dict[int, int]] = {}
+    for joint, (side, word) in enumerate(keys):
+        finger, number = _finger(word)
+        if finger and joint not in helpers:
+            found.setdefault((side, finger), {}).setdefault(number, joint)
     words = {word for _, word in keys}
-    has_arm = bool(words & set(_WORDS["shoulder"].split()))
-    renamed = {
-        "shoulder": "collar" if has_arm and "collar" not in roles else "upperarm",
-        "foot": "toebase" if "ankle" in roles else "ankle",
-        "hand": "hand" if "wrist" in roles else "wrist",
-        "leg": "thigh" if "knee" in words and "hip" not in roles else "leg",
-    }
-    return [(side, renamed.get(word, word)) for side, word in keys]
+    result = {}
+    for (side, finger), joints in found.items():
+        name = f"{side}_{finger}" if side else finger
+        numbers = sorted(number for number in joints if number <= 3)
+        has_end = any(word.endswith(f"{finger}end") for word in words)
+        if len(numbers) == 3 and numbers[0] == 0:
+            shown = numbers  # MMD counts from 0, as do names such as thumb, thumb.001, thumb.002
+        elif 4 in joints and (1 not in joints or has_end):
+            shown = [2, 3, 4]  # 1 is the metacarpal, in SOMA a joint of its own
+        else:
+            shown = [1, 2, 3]
+        for place, number in enumerate(shown):
+            if number in joints:
+                result[joints[number]] = f"{name}{place + 1}"
+    return result
 
 
-def _role(key: _Key) -> str:
-    """Return the canonical name of one joint, or the chain to which it belongs."""
-    side, word = key
-    finger = _finger(word)
-    if finger:
-        return f"{side}_{finger}" if side else finger
-    stem = word.rstrip("0123456789")
-    number = word[len(stem) :]
-    role = "hand" if stem == "hand" else _ROLES.get(stem, "")
-    if role == "hip" and not side and stem == "hip":
-        role = "pelvis"
-    if role in _CHAINS:
-        return role if not side else ""
-    # Not int(number): names may have thousands of digits.
-    is_first = number.lstrip("0") in ("", "1")
-    if not role or not (is_first or role == "foot"):
-        return ""
-    if role in _SIDED:
-        # Hands without a body (MANO) have no sides.
-        return f"{side}_{role}" if side else (role if role == "wrist" else "")
-    return "" if side else role
+def _finger(word: str) -> tuple[str, int]:
+    """Return finger and number of ``HandIndex2``, ``IndexIntermediate``, ``Finger11`` and so on.
 
-
-def _finger(word: str) -> str:
-    """Return ``index2`` of ``HandIndex2``, ``f_index.02``, ``IndexIntermediate``, ``Finger11``."""
-    biped = re.fullmatch(r"finger([0-4])([12]?)", word)
+    The finger is empty for other words, and the number 0 if there is none.
+    """
+    biped = _BIPED_FINGER.fullmatch(word)
     if biped:
-        return f"{_BIPED_FINGERS[int(biped[1])]}{int(biped[2] or 0) + 1}"
+        return _NUMBERED_FINGERS[int(biped[1])], int(biped[2] or 0) + 1
+    rokoko = _ROKOKO_FINGER.fullmatch(word)
+    if rokoko:
+        word = _NUMBERED_FINGERS[int(rokoko[1]) - 1] + rokoko[2]
     match = _FINGER.fullmatch(word)
     if match is None:
-        return ""
-    number = _PHALANX[match[2]] if match[2] else int(match[3] or 0)
-    return f"{_FINGERS[match[1]]}{number}" if 1 <= number <= 3 else ""
+        return "", 0
+    finger, phalanx = _FINGERS[match[1]], match[2]
+    if phalanx == "metacarpal" and finger != "thumb":
+        return "", 0
+    return finger, _PHALANX[phalanx] if phalanx else int(match[3] or 0)
