@@ -106,10 +106,11 @@ def test_position_channels_replace_the_offset_of_any_joint_one_axis_at_a_time() 
     np.testing.assert_allclose(worlds(motion)[0, 3, :3, 3], [0, 1.75, 0])
 
 
-def test_zero_position_channels_below_the_root_keep_the_offset() -> None:
+@pytest.mark.parametrize("zero", ["0", "-0.000001"])
+def test_zero_position_channels_below_the_root_keep_the_offset(zero: str) -> None:
     six = "CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
     text = GOOD.replace("CHANNELS 3 Zrotation Xrotation Yrotation", six)
-    body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + "0 " * 24
+    body = text.split("MOTION")[0] + "MOTION Frames: 1 Frame Time: 0.1\n" + f"{zero} " * 24
     motion, warnings = read(body)
     assert warnings == [("F007.bvh-positions", None, {})]
     np.testing.assert_allclose(worlds(motion)[0, 2, :3, 3], [0.1, -0.9, 0])

@@ -16,6 +16,7 @@ from viewer.rig.geometry.quaternion import align_signs
 __all__ = [
     "Table",
     "inner_moves",
+    "moves_inner",
     "offsets_replaced",
     "placed",
     "rotations_of",
@@ -24,6 +25,8 @@ __all__ = [
     "translations_of",
 ]
 
+# Positions of 0 in files with few decimals, as a fraction of the longest OFFSET.
+_ROUNDING = 1e-4
 _CHUNK = 256  # number of frames per batch, whose values fit into the processor's cache
 
 
@@ -129,7 +132,7 @@ def translations_of(source: Source, table: Table, values: Floats) -> Floats | No
         return None
     base = offsets_replaced(table)
     inner = inner_moves(table)
-    if base[inner].any() and not values[:, [table.moves[at][2] for at in inner]].any():
+    if base[inner].any() and not moves_inner(table, values):
         source.warn("F007.bvh-positions")
         base[inner] = 0.0
     shifts = shifts_of(table, values, base)
@@ -140,6 +143,17 @@ def translations_of(source: Source, table: Table, values: Floats) -> Floats | No
 def inner_moves(table: Table) -> list[int]:
     """Return the indices of the position channels of joints with a parent."""
     return [at for at, (joint, _, _) in enumerate(table.moves) if table.parents[joint] >= 0]
+
+
+def moves_inner(table: Table, values: Floats) -> bool:
+    """Return whether position channels of joints with a parent differ from 0 beyond rounding.
+
+    ``values`` (N, C): some frames.
+    """
+    inner = inner_moves(table)
+    positions = values[:, [table.moves[at][2] for at in inner]]
+    least = _ROUNDING * np.abs(offsets_replaced(table)[inner]).max(initial=0.0)
+    return bool((np.abs(positions) > least).any())
 
 
 def offsets_replaced(table: Table) -> Floats:

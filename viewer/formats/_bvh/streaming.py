@@ -18,6 +18,7 @@ from viewer.errors import FormatError
 from viewer.formats._bvh.channels import (
     Table,
     inner_moves,
+    moves_inner,
     offsets_replaced,
     placed,
     rotations_of,
@@ -91,7 +92,7 @@ class BvhStream:
         clip, count, is_zero = self.motion.clip, 0, True
         for part in _parts(self.path, self.start):
             values = parsed_rows(part, self.table.n_channels)
-            is_zero = is_zero and not _moves_inner(self.table, values)
+            is_zero = is_zero and not moves_inner(self.table, values)
             chosen = values[max(first - count, 0) : max(stop - count, 0)]
             count += len(values)
             if len(chosen):
@@ -196,9 +197,3 @@ def _check_reach(table: Table, values: Floats) -> Floats:
     if is_beyond(shifts).any():
         raise Irregular
     return shifts
-
-
-def _moves_inner(table: Table, values: Floats) -> bool:
-    """Return whether a position channel of a joint with a parent is not zero."""
-    columns = [table.moves[at][2] for at in inner_moves(table)]
-    return bool(values[:, columns].any())
