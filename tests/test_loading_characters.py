@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from formats.capture_files import body, write_frames
+from formats.gltf.files import File
 from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
@@ -17,6 +18,7 @@ from viewer.loading import MotionSettings, begin, capturing, load, read_files
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rig.skinning import joint_matrices
 
 LIMBS = {
     "leftUpperArm": "leftLowerArm",
@@ -169,6 +171,77 @@ def test_finger_joints_missing_in_the_body_are_reported_in_a_note(is_named, hero
     assert [actor.figure.name for actor in scene.actors] == ["hero"]
     notes = [note for note in scene.diagnostics if note.key == "F007.joints-left-out"]
     assert [note.values["names"] for note in notes] == [["left_index1"]]
+
+
+FINGERED = """
+mixamorig:Hips 0 1 0
+ mixamorig:Spine 0 0.4 0
+  mixamorig:LeftArm 0.2 0.1 0
+   mixamorig:LeftForeArm 0.3 0 0
+    mixamorig:LeftHand 0.25 0 0
+     mixamorig:LeftHandIndex1 0.1 0 0.03
+      mixamorig:LeftHandIndex2 0.04 0 0
+       mixamorig:LeftHandIndex3 0.03 0 0
+     mixamorig:LeftHandPinky1 0.1 0 -0.03
+      mixamorig:LeftHandPinky2 0.03 -0.01 0
+  mixamorig:RightArm -0.2 0.1 0
+   mixamorig:RightForeArm -0.3 0 0
+ mixamorig:LeftUpLeg 0.1 0 0
+  mixamorig:LeftLeg 0 -0.5 0
+   mixamorig:LeftFoot 0 -0.4 0
+ mixamorig:RightUpLeg -0.1 0 0
+  mixamorig:RightLeg 0 -0.5 0
+   mixamorig:RightFoot 0 -0.4 0
+"""
+
+
+def character_of(table: str) -> File:
+    """Return a file with the joints of an indented list of names and offsets, and a small mesh."""
+    file, nodes, above = File(), [], []
+    for line in table.strip("\n").split("\n"):
+        depth = len(line) - len(line.lstrip())
+        name, *offset = line.split()
+        nodes.append({"name": name, "translation": [float(value) for value in offset]})
+        above = [*above[:depth], len(nodes) - 1]
+        if depth:
+            nodes[above[-2]].setdefault("children", []).append(len(nodes) - 1)
+    joints, weights = file.accessor([[0] * 4] * 3, "B"), file.accessor([[1, 0, 0, 0]] * 3)
+    mesh = file.mesh(JOINTS_0=joints, WEIGHTS_0=weights)
+    file.root["nodes"] = [*nodes, {"mesh": mesh, "skin": 0}]
+    file.root["skins"] = [{"joints": [*range(len(nodes))]}]
+    file.root["scenes"] = [{"nodes": [0, len(nodes)]}]
+    return file
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_fingers_of_smplh_drive_those_of_a_character(is_named, tmp_path):
+    """The bundled body has no fingers, so they used to stay at rest."""
+    hero = tmp_path / "hero.glb"
+    hero.write_bytes(character_of(FINGERED).glb())
+    poses = np.zeros((1, 156)).reshape(1, 52, 3)
+    poses[0, 22, 2] = -np.pi / 3  # left_index1 bends by 60 degrees, towards the palm
+    poses[0, 29] = [0, np.pi / 2, 0]  # left_pinky2
+    poses[0, 20, 0] = np.pi / 2  # left_wrist turns the palm backwards: y becomes z
+    still = {"trans": np.zeros((1, 3)), "betas": np.zeros(10), "gender": "neutral"}
+    np.savez(tmp_path / "a.npz", poses=poses.reshape(1, 156), mocap_framerate=30.0, **still)
+    settings = MotionSettings(up="y", model=hero if is_named else None, feet=False)
+    paths = [tmp_path / "a.npz"] if is_named else [tmp_path / "a.npz", hero]
+    (actor,) = load(*paths, motion=settings).actors
+    names = [name.split(":")[1] for name in actor.figure.skeleton.names]
+    pose_actor(actor, 0.0)
+    places = joint_matrices(actor.figure, actor.require_pose())[:, :3, 3]
+
+    def bone(start, end):
+        step = places[names.index(f"LeftHand{end}")] - places[names.index(f"LeftHand{start}")]
+        return step / np.linalg.norm(step)
+
+    # R = Rx(90) Rz(-60): x becomes (0.5, -0.866, 0), then (0.5, 0, -0.866). The tolerance is the
+    # slope of the bundled body's forearm in its rest pose, 3 degrees, which the figure lacks.
+    near = np.radians(3.0)
+    assert_allclose(bone("Index1", "Index2"), [0.5, 0, -np.sqrt(0.75)], atol=near)
+    assert_allclose(bone("Index2", "Index3"), bone("Index1", "Index2"), atol=1e-6)
+    # The hand keeps its own curl: the little finger is lowered by 0.01 along 0.03 at rest.
+    assert_allclose(bone("Pinky1", "Pinky2"), np.array([3, 0, -1]) / np.sqrt(10), atol=near)
 
 
 def test_gravity_points_along_the_down_axis_of_the_motion(amass, hero):

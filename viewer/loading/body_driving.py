@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.joint_map import JointMap
+from viewer.rig.smpl_family import FAMILY
 
-__all__ = ["body_drive", "has_joints"]
+__all__ = ["body_drive", "has_joints", "with_joints"]
 
 _ENOUGH = 0.5  # minimum fraction of the joint names that a body model has
 
@@ -27,6 +31,42 @@ def has_joints(figure: Figure, names: Sequence[str]) -> bool:
     """
     own = set(figure.require_skeleton().names)
     return names[0] in own and sum(name in own for name in names) >= _ENOUGH * len(names)
+
+
+def with_joints(body: Figure, names: Sequence[str]) -> Figure:
+    """Return a body without its mesh that has all joints of a motion, to drive other figures.
+
+    Joints that the body lacks, such as the fingers of SMPL+H, are at the positions of their
+    parents. Bones without a length have no direction: the joints that they drive keep the shape
+    of their own hand, and get the rotations relative to a flat one.
+
+    Parameters
+    ----------
+    body : Figure
+        Body model of the SMPL family.
+    names : sequence of str
+        Joints of the motion; those of no member of the family are ignored.
+    """
+    skeleton = body.require_skeleton()
+    own, parents = [*skeleton.names], [*skeleton.parents.tolist()]
+    for member in FAMILY.values():
+        for name, parent in zip(member.names, member.parents, strict=True):
+            if name in names and name not in own and member.names[parent] in own:
+                parents.append(own.index(member.names[parent]))
+                own.append(name)
+    count = len(own) - skeleton.n_joints
+    extended = replace(
+        skeleton,
+        names=tuple(own),
+        parents=np.array(parents, dtype=np.int32),
+        rest_translations=np.concatenate([skeleton.rest_translations, np.zeros((count, 3))]),
+        rest_rotations=np.concatenate(
+            [skeleton.rest_rotations, np.tile([0.0, 0.0, 0.0, 1.0], (count, 1))]
+        ),
+        rest_scales=np.concatenate([skeleton.rest_scales, np.ones((count, 3))]),
+        boxes=None,
+    )
+    return Figure(body.name, skeleton=extended, up=body.up, unit=body.unit)
 
 
 def body_drive(

@@ -12,7 +12,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.formats import Source, read
-from viewer.loading.body_driving import body_drive, has_joints
+from viewer.loading.body_driving import body_drive, has_joints, with_joints
 from viewer.loading.bundled import bundled_body
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
@@ -31,7 +31,9 @@ from viewer.rig.motion.clip import Clip, misfit, suits
 from viewer.rig.motion.evaluation import scene_rate
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_clip import driven_clip
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor
+from viewer.rig.smpl_family import FAMILY
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
@@ -243,27 +245,63 @@ def _give_body_motion(
     lost = motion.shape is not None, motion.expression is not None
     if is_bundled:
         motion = replace(motion, shape=None, expression=None)
-    try:
-        clip, notes = body_clip(motion, model)
-    except RigError as problem:
-        values = {"problem": problem.cause}
-        raise RigError(Diagnostic("F004.model", path, values=values)) from None
-    cast.diagnostics += [replace(note, path=path) for note in notes]
-    actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
+    driven = _may_be_driven(cast, settings, target) if is_bundled else []
+    drives, body = bool(driven), model
+    if drives:
+        body = with_joints(model, _known_joints(motion.joint_names, driven, settings))
+    actor, notes = _moved(path, body, motion, cast)
     up = settings.up or motion.up
     if not up:
         up = _judged_up(path, [actor], cast)
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
     if target is not None:
+        cast.diagnostics += notes
         carried = _carried(path, actor, up, target, cast, settings)
         cast.add(carried, up[-1], placed=False)
         return
-    if is_bundled and _drives_character(path, motion.name, actor, up, cast, settings):
+    if drives and _drives_character(path, motion.name, actor, up, cast, settings):
+        cast.diagnostics += notes
         return
+    if drives:
+        placement = actor.placement
+        actor, notes = _moved(path, model, motion, cast)
+        actor.placement = placement
+    cast.diagnostics += notes
     if is_bundled:
         _note_bundled(cast, path, *lost)
     cast.add(actor, up[-1], placed=False)
+
+
+def _moved(
+    path: Path, model: Figure, motion: BodyMotion, cast: Cast
+) -> tuple[Actor, list[Diagnostic]]:
+    """Return an actor of a body model with a motion; raises RigError if the model does not fit."""
+    try:
+        clip, notes = body_clip(motion, model)
+    except RigError as problem:
+        values = {"problem": problem.cause}
+        raise RigError(Diagnostic("F004.model", path, values=values)) from None
+    actor = Actor(model, clip=clip, called=cast.free_title(motion.name))
+    return actor, [replace(note, path=path) for note in notes]
+
+
+def _may_be_driven(cast: Cast, settings: MotionSettings, target: Figure | None) -> list[Figure]:
+    """Return the figures that a captured body could move: the target, or else open ones."""
+    if target is not None:
+        return [target]
+    if not settings.drives:
+        return []
+    still = [actor.figure for actor in cast.actors if actor.clip is None]
+    return [figure for figure in still if figure.is_attached]
+
+
+def _known_joints(
+    names: Sequence[str], driven: Sequence[Figure], settings: MotionSettings
+) -> list[str]:
+    """Return the joints of a motion that a driven figure has, or that a joint map may name."""
+    known = {name for figure in driven for name in joint_meanings(figure.require_skeleton())}
+    return [name for name in names if name in known or settings.joint_map is not None]
 
 
 def _carried(
@@ -287,9 +325,6 @@ def _drives_character(
     path: Path, name: str, actor: Actor, up: str, cast: Cast, settings: MotionSettings
 ) -> bool:
     """Let a motion of the bundled body drive another figure that has its joints, if any."""
-    has_any = any(other.clip is None and other.figure.is_attached for other in cast.actors)
-    if not (settings.drives and has_any):
-        return False
     from viewer.loading.skeleton_motions import drive_somebody
     from viewer.rig.motion.skeleton_motion import SkeletonMotion
     from viewer.rig.retargeting.drive import Drive
@@ -336,19 +371,31 @@ def _begin_capture(
     """Read a capture until the first person appears; the remaining frames are read later."""
     capture = _with_cameras(capture, model, is_bundled)
     called = cast.free_title(capture.name)
-    builder = Builder(capture, model, called=called, keeps_shape=not is_bundled, path=path)
     cast.diagnostics += capture.warnings
-    while not builder.actors and not builder.is_done:
-        try:
-            cast.diagnostics += builder.read_some()[1]
-        except RigError as problem:
-            raise builder.refusal(problem) from None
-    # EasyMocap's usual calibration has z up, which needs no message.
-    up = settings.up or capture.up or _judged_up(path, builder.actors, cast, usual="z")
-    builder.place(up)
-    builder.swings, builder.joint_map = settings.springs, settings.joint_map
-    builder.plants_feet = settings.feet
-    _carry(builder, cast, target, drives=is_bundled and settings.drives)
+    driven = _may_be_driven(cast, settings, target) if is_bundled else []
+    members = [each for each in FAMILY.values() if each.title == capture.model]
+    body = model
+    if members and driven:
+        body = with_joints(model, _known_joints(members[0].names, driven, settings))
+    up = settings.up or capture.up
+    while True:
+        builder = Builder(capture, body, called=called, keeps_shape=not is_bundled, path=path)
+        notes: list[Diagnostic] = []
+        while not builder.actors and not builder.is_done:
+            try:
+                notes += builder.read_some()[1]
+            except RigError as problem:
+                raise builder.refusal(problem) from None
+        # EasyMocap's usual calibration has z up, which needs no message.
+        up = up or _judged_up(path, builder.actors, cast, usual="z")
+        builder.place(up)
+        builder.swings, builder.joint_map = settings.springs, settings.joint_map
+        builder.plants_feet = settings.feet
+        _carry(builder, cast, target, drives=is_bundled and settings.drives)
+        if builder.target is not None or body is model:
+            break
+        body = model  # no figure matches, so the bundled body itself is shown
+    cast.diagnostics += notes
     if is_bundled and any(actor.figure is model for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     rate = _rate(builder.actors, settings)
