@@ -13,7 +13,9 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export._exporter import Exporter
 from viewer.export._left_out import other_animations_note
+from viewer.export._motion_paths import animation_files
 from viewer.export._options import MotionOptions, VrmMeta
+from viewer.formats import all_or_none
 from viewer.rig.figure import Figure
 from viewer.rig.motion.own_animations import own_animations
 from viewer.rig.motion.sampled_animation import SampledAnimation, upright_animation
@@ -209,7 +211,10 @@ def export(
     if optimizes and key not in ("gltf", "vrm"):
         raise UnsupportedFormatError(f"{Path(path).suffix}: only glTF files can be optimised")
     options |= {"optimizes": True} if optimizes else {}
-    notes: list[Diagnostic] = module.export(actor, Path(path), skinning or Skinning(), **options)
+    with all_or_none(files_written(path)):
+        notes: list[Diagnostic] = module.export(
+            actor, Path(path), skinning or Skinning(), **options
+        )
     return notes + _hidden_note([actor])
 
 
@@ -248,7 +253,8 @@ def export_clips(
     module = import_module(f"{__name__}.{exporter_for(path)}")
     chosen = own_animations(actor) if clips is None else clips
     how = skinning or Skinning()
-    notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
+    with all_or_none(files_written(path)):
+        notes: list[Diagnostic] = module.export_clips(actor, Path(path), how, chosen, optimizes)
     return notes + _hidden_note([actor])
 
 
@@ -285,7 +291,10 @@ def export_figures(
     module = import_module(f"{__name__}.{exporter_for(path)}")
     own = [None] * len(actors) if clips is None else clips
     how = skinning or Skinning()
-    notes: list[Diagnostic] = module.export_figures(actors, Path(path), how, own, scene, optimizes)
+    with all_or_none(files_written(path)):
+        notes: list[Diagnostic] = module.export_figures(
+            actors, Path(path), how, own, scene, optimizes
+        )
     return notes + _hidden_note(actors)
 
 
@@ -348,7 +357,10 @@ def export_animation(
     module = import_module(f"{__name__}.{key}")
     from viewer.export._losses.between import rate_note
 
-    notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
+    # A folder is written to a temporary one, which is renamed at the end.
+    files = [] if key == "easymocap" else animation_files(animation, Path(path), key, options)
+    with all_or_none(files):
+        notes: list[Diagnostic] = module.export_animation(animation, Path(path), options)
     if len(animation.frames.present) == 1:
         return notes  # a pose was requested
     return notes + rate_note(animation) + other_animations_note(animation.figure, animation.motion)

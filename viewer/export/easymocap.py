@@ -121,6 +121,8 @@ def export_animations(
             rows = [person.text(frame) for person in people if person.is_there(frame)]
             text = "[\n" + ",\n".join(rows) + "\n]\n"
             (folder / f"{frame:06}.json").write_text(text, encoding="ascii", newline="\n")
+        # Within the block: parts of the figure may be read now, and the file may be damaged.
+        errors = [line for person in people for line in person.losses(path / _FOLDER, options)]
     values = {
         "n": stop - first,
         "people": len(animations),
@@ -129,7 +131,7 @@ def export_animations(
     }
     return [
         Diagnostic("X001.easymocap", path / _FOLDER, values=values),
-        *(line for person in people for line in person.losses(path / _FOLDER, options)),
+        *errors,
         *notes,
     ]
 

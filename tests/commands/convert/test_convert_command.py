@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -258,6 +259,22 @@ def test_existing_file_is_replaced_only_with_force(tmp_path, capsys):
     assert out.read_text() == "precious"
     assert run(["convert", *rig, "-o", str(out), "--force"]) == 0
     assert len(read_obj(out).v) == 3
+
+
+@pytest.mark.parametrize("name", ["out.glb", "out.bvh", "motion/smpl/000000.json"])
+def test_parts_that_are_read_late_are_checked_before_a_file_is_replaced(tmp_path, name, capsys):
+    path, arrays = write_model(tmp_path)
+    content, stored = Path(path).read_bytes(), arrays["posedirs"].tobytes()
+    at = content.index(stored[:64]) + 32
+    Path(path).write_bytes(content[:at] + b"damaged!" + content[at + 8 :])
+    out = tmp_path / name
+    out.parent.mkdir(parents=True, exist_ok=True)
+    out.write_text("precious")
+    target = tmp_path / "motion" if "/" in name else out
+    assert run(["convert", path, "-o", str(target), "--force"]) == 2
+    assert f"{path}: posedirs" in capsys.readouterr().err
+    assert out.read_text() == "precious"
+    assert sorted(each.name for each in out.parent.iterdir() if each.name[0] == ".") == []
 
 
 @pytest.mark.parametrize("beside", [".skel", ".skin"])

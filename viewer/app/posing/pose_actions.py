@@ -15,7 +15,8 @@ from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.state import Posing
 from viewer.errors import ViewerError
 from viewer.export import export, files_written
-from viewer.formats import Source, write
+from viewer.export.pose import export as export_pose
+from viewer.formats import Source
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.posing.pose_vector import write_vector
@@ -96,10 +97,10 @@ def paste_pose(state: AppState) -> None:
 
 
 def save_pose(state: AppState, path: Path) -> None:
-    """Write the chosen actor's pose; the suffix selects the format."""
-    record = _record(state)
-    if record is not None:
-        save_files(state, lambda: write(record, path), [path])
+    """Write the chosen actor's pose; the suffix selects the format, and losses are shown."""
+    actor, skinning = state.actor, state.options.skinning
+    if actor.pose is not None:
+        save_files(state, lambda: state.say(*export_pose(actor, path, skinning)[1:]), [path])
 
 
 def save_export(state: AppState, path: Path) -> None:

@@ -275,13 +275,14 @@ def _write_together(
     """Write the people present and the figures that do not move into one file."""
     from viewer.export.gltf import export_animations
 
-    check(files_written(output))
+    files = files_written(output)
+    check(files)
     motions = [
         (part.actor, part.animation, part.up)
         for part in parts
         if isinstance(part.animation, SampledAnimation)
     ]
-    with raising():
+    with raising(), all_or_none(files):
         return export_animations(motions, output, options, scene, still)
 
 
