@@ -1,5 +1,6 @@
 """AMASS and related motions: all key names, mismatched arrays, and distinction from poses."""
 
+import json
 import pickle
 
 import numpy as np
@@ -326,6 +327,49 @@ def test_metadata_of_the_writer_is_read(tmp_path):
 def test_unknown_keys_are_reported(tmp_path):
     path = saved(tmp_path / "a.npz", **first_release(contact=np.zeros(4)))
     assert motion_of(path)[1] == [("F007.motion-keys", None, {"keys": ["contact"]})]
+
+
+def rows_as_objects(values):
+    found = np.empty(len(values), dtype=object)
+    found[:] = [*values]
+    return found
+
+
+@pytest.mark.parametrize("form", ["lists", "arrays", "objects", "json"])
+def test_frames_in_lists_are_read_like_arrays(tmp_path, form):
+    poses, trans = waves(5, 72), waves(5, 3)
+    path = tmp_path / ("a.json" if form == "json" else "a.npz" if form == "objects" else "a.pkl")
+    if form == "objects":
+        saved(path, poses=rows_as_objects(poses), trans=trans)
+    elif form == "json":
+        path.write_text(json.dumps({"poses": poses.tolist(), "trans": trans.tolist()}))
+    else:
+        as_list = {"lists": np.ndarray.tolist, "arrays": list}[form]
+        path.write_bytes(pickle.dumps({"poses": as_list(poses), "trans": as_list(trans)}))
+    motion, warnings = motion_of(path)
+    assert warnings == [NO_RATE]
+    assert_array_equal(motion.vectors.reshape(5, 72), poses)
+    assert_array_equal(motion.translations, trans)
+
+
+@pytest.mark.parametrize("missing", [None, []])
+def test_missing_frames_in_lists_are_gaps(tmp_path, missing):
+    poses, trans = [*waves(5, 72)], [*waves(5, 3)]
+    poses[1] = trans[1] = missing
+    path = tmp_path / "a.pkl"
+    path.write_bytes(pickle.dumps({"poses": poses, "trans": trans}))
+    motion, _ = motion_of(path)
+    assert motion.timing.rows.tolist() == [0, -1, 2, 3, 4]
+    assert_array_equal(motion.translations[2:], waves(5, 3)[2:])
+
+
+def test_frames_of_different_lengths_are_not_an_array(tmp_path):
+    path = tmp_path / "a.pkl"
+    poses = [*waves(5, 72)]
+    poses[1] = poses[1][:70]
+    path.write_bytes(pickle.dumps({"poses": poses, "trans": waves(5, 3)}))
+    with pytest.raises(FormatError):
+        read(Source.open(path))
 
 
 @pytest.mark.parametrize(

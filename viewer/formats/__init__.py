@@ -155,7 +155,7 @@ FORMATS = {
     ),
     "video_mocap": Format(
         "video motion capture",
-        (".pt", ".pth", ".pkl", ".npz", ".npy"),
+        (".pt", ".pth", ".pkl", ".npz", ".npy", ".json"),
         keys=(
             *("smpl_params_global", "smpl_params_incam", "pred_rotmat", "camera_world"),
             *("latent_pose", "cam_R", "pred_joint_coords", "pred_keypoints_3d"),
@@ -165,7 +165,7 @@ FORMATS = {
     ),
     "amass": Format(
         "motion of the SMPL family (AMASS)",
-        (".npz", ".pkl"),
+        (".npz", ".pkl", ".json"),
         keys=(
             *("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "smpl_poses"),
             *("root_orient", "pose_body", "markers_latent"),
@@ -176,7 +176,7 @@ FORMATS = {
     "easymocap": Format(
         "EasyMocap recording",
         (".json",),
-        rb"\A\[\s*[\]{]|\A\{(?s:.*?)\"annots\"\s*:",
+        rb"\A\[\s*(?:[\]\[{]|null)|\A\{(?s:.*?)\"annots\"\s*:",
         files=("smpl_full", "smplfull", "smpl", "keypoints3d"),
         writes=False,
     ),
@@ -228,13 +228,13 @@ def detect(source: Source) -> str:
     head = source.head(_HEAD)
     for key in owners:
         if re.search(FORMATS[key].signature, head):
-            return key
+            return _of_json(source, head, key)
     for key, kind in texts.items():
         # Bare numbers are a pose only if the suffix belongs to no other format.
         if re.search(kind.signature, head) and not (by_suffix and key == "pose"):
             if by_suffix:
                 source.warn("F007.suffix", found=kind.suffixes[0], suffix=suffix)
-            return key
+            return _of_json(source, head, key)
     if suffix in _ARCHIVES:
         # Opening the archive again raises an error that states its kind.
         return _detect_archive(source)
@@ -245,6 +245,15 @@ def detect(source: Source) -> str:
     if looks is None:
         raise source.fault("F002.unknown-kind", wanted=wanted)
     raise source.fault("F002.kind", wanted=wanted, looks=looks)
+
+
+def _of_json(source: Source, head: bytes, key: str) -> str:
+    """Return the format of a text; JSON of poses or people may also be a motion."""
+    if key not in ("easymocap", "pose") or head[:1] not in (b"{", b"["):
+        return key
+    from viewer.formats._archive.recognition import json_format
+
+    return json_format(source, key, FORMATS["pose"].keys)
 
 
 SUFFIXES = tuple(dict.fromkeys(suffix for kind in FORMATS.values() for suffix in kind.suffixes))

@@ -26,7 +26,7 @@ from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
 from viewer.phrases import printable
-from viewer.rig.arrays import Bools, Deferred, Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
@@ -81,10 +81,10 @@ def has_frames(archive: Archive) -> bool:
     """
     is_timed = any(archive.has(key) for key in _OF_MOTIONS)
     for key in (*_POSES, "body_pose", "pose_body", *_ROOTS):
-        value = archive.get(key) if archive.has(key) else None
-        if isinstance(value, Deferred):
-            is_per_joint = value.shape[-1:] == (3,) and key not in _ROOTS
-            frames = value.shape[: -2 if is_per_joint else -1]
+        shape = archive.shape(key)
+        if shape:
+            is_per_joint = shape[-1:] == (3,) and key not in _ROOTS
+            frames = shape[: -2 if is_per_joint else -1]
             return math.prod(frames) != 1 or (is_timed and bool(frames))
     return False
 

@@ -114,7 +114,7 @@ def test_headers_from_other_writers_are_read() -> None:
     ("given", "what"),
     [
         (np.array({"L_Hip": 1}, dtype=object), Phrase("unread-objects")),
-        (np.array([None, 1], dtype=object), Phrase("unread-objects")),
+        (np.array([None, "a"], dtype=object), Phrase("unread-objects")),
         (np.zeros(2, "f4,i4"), Phrase("unread-records")),
         (np.zeros(2, [("a", "f4", 3)]), Phrase("unread-records")),
         (np.zeros(2, "V8"), Phrase("unread-dtype", dtype="|V8")),

@@ -104,6 +104,13 @@ MESSAGES = {
     "F007.video-repeated": "frame numbers occur up to {n} times: {n} people assumed, identified by "
     "their order",
     "F007.video-same-frame": "{n:#row} ignored: the person is in an earlier row of the same frame",
+    "F002.video-identity": "{item:text}: expected a number or a name for each person or frame, "
+    "found {found}",
+    "F007.frames-empty": "{n:#frame} without people: {frames:list}",
+    "F007.person-names": "people with names are numbered: {names:list}",
+    "F007.rate-ignored": "{item:text}: expected {low:g} to {high:,.0f} frames per second, found "
+    "{found}: ignored",
+    "F007.video-rows": "no frame numbers: the rows of each {item:text} are its frames, in order",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
     "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "

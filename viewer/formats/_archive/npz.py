@@ -76,7 +76,9 @@ class _Header:
 
 
 def open_npz(
-    directory: ZipDirectory, opened: Callable[[str, bytes], Archive | None] | None = None
+    directory: ZipDirectory,
+    opened: Callable[[str, bytes], Archive | None] | None = None,
+    listed: Callable[[str, bytes], Value] | None = None,
 ) -> Archive:
     """Open an ``.npz`` file; errors as of ``open_archive``.
 
@@ -87,6 +89,8 @@ def open_npz(
     opened : callable, optional
         Opens an array of objects, given its key and its pickle, as a nested archive; None if the
         objects have no names. It is called only for arrays whose contents are requested.
+    listed : callable, optional
+        Returns the objects as a list, given the same; None if there is only one.
     """
     directory.check(_key)
     members, storage = {_key(member): member for member in directory.members}, directory.storage
@@ -97,7 +101,14 @@ def open_npz(
             return None
         return opened(key, _load_objects(storage, members[key]))
 
-    return Archive(directory.source, "npz", tuple(values), values.__getitem__, branch)
+    def objects(key: str) -> Value:
+        if listed is None or values[key] != _OBJECTS:
+            return None
+        return listed(key, _load_objects(storage, members[key]))
+
+    return Archive(
+        directory.source, "npz", tuple(values), values.__getitem__, branch, objects=objects
+    )
 
 
 def open_npy(

@@ -1,14 +1,17 @@
-"""Opening of pickles, ``.npz``, ``.npy`` and torch files, detected by their first bytes."""
+"""Opening of pickles, ``.npz``, ``.npy``, torch and JSON files, detected by their first bytes."""
 
 from __future__ import annotations
 
+import json
 import re
 from functools import partial
 
 from viewer.formats._archive.file_window import Data, FileWindow
-from viewer.formats._archive.values import Archive
+from viewer.formats._archive.values import Archive, Value
 from viewer.formats._joblib.compression import is_compressed
 from viewer.formats._source import Source
+from viewer.formats._text.json_places import MOST_DIGITS, deepest_place, long_number_place
+from viewer.phrases import printable
 
 __all__ = ["is_archive", "open_archive"]
 
@@ -33,7 +36,7 @@ def is_archive(head: bytes) -> bool:
 
 
 def open_archive(source: Source) -> Archive:
-    """Open a pickle, ``.npz``, ``.npy`` or torch file, detected by its first bytes.
+    """Open a pickle, ``.npz``, ``.npy``, torch or JSON file, detected by its first bytes.
 
     Parameters
     ----------
@@ -57,17 +60,37 @@ def open_archive(source: Source) -> Archive:
         with open_directory(source) as directory:
             if is_torch(directory):
                 return open_torch(directory)
-            return open_npz(directory, partial(_open_member, source))
+            return open_npz(directory, partial(_open_member, source), partial(_list_member, source))
     if head.startswith(_NPY):
         return open_npy(source, _open_objects)
     if head.startswith(_LFS):
         raise source.fault("F002.archive-pointer")
     if is_compressed(head):
         return _open_pickle(source, unpacked(source))
+    if head.lstrip()[:1] in (b"{", b"["):
+        return _open_json(source)
     if not is_archive(head):
         looks = source.looks_like() or "an unknown format"
         raise source.fault("F002.archive", found=looks)
     return _open_pickle(source, _pickle_data(source))
+
+
+def _open_json(source: Source) -> Archive:
+    """Open a JSON file; NaN and infinities are numbers, as Python writes them."""
+    from viewer.formats._pickle.reading import named_archive
+
+    text = source.data.decode("utf-8", "replace")
+    try:
+        whole = json.loads(text)
+    except json.JSONDecodeError as problem:
+        offset = len(text[: problem.pos].encode())
+        raise source.fault("F002.json", offset, reason=printable(problem.msg, 100)) from None
+    except RecursionError:
+        raise source.fault("F002.json-nesting", deepest_place(text)) from None
+    except ValueError:  # decoding can raise no other error
+        place = long_number_place(text)
+        raise source.fault("F002.capture-digits", place, most=MOST_DIGITS) from None
+    return named_archive(source, "json", len(source.data), whole)
 
 
 def _pickle_data(source: Source) -> Data:
@@ -105,6 +128,18 @@ def _open_member(source: Source, key: str, data: bytes) -> Archive | None:
     machine = Machine(source, data)
     machine.load_bytes = read_bytes
     return nested_archive(source, "npz", len(data), run(machine), f"{key}.")
+
+
+def _list_member(source: Source, key: str, data: bytes) -> Value:
+    """Return the objects in an array of objects of an ``.npz`` as a list; None for others."""
+    from viewer.formats._pickle.machine import Machine
+    from viewer.formats._pickle.reading import listed
+    from viewer.formats._pickle.steps import run
+    from viewer.formats._torch.legacy import read_bytes
+
+    machine = Machine(source, data)
+    machine.load_bytes = read_bytes
+    return listed(source, len(data), key, run(machine))
 
 
 def _open_objects(source: Source, offset: int) -> Archive | None:

@@ -44,6 +44,30 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
     raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
 
 
+_OF_EASYMOCAP = ("Rh", "Th", "keypoints3d", "annots")
+
+
+def json_format(source: Source, key: str, poses: Collection[str]) -> str:
+    """Return the key of the format of a JSON file: motion, people in frames, or ``key``.
+
+    ``key`` is the format of its first bytes: ``"easymocap"`` for a list of people, or ``"pose"``,
+    which is also the result for files that cannot be read, so that its reader reports the error.
+    ``poses`` are the keys of poses.
+    """
+    try:
+        archive = archive_of(source)
+        first = archive.inside("0") if archive.is_list else archive
+        if first is not None and any(map(first.has, (*_OF_EASYMOCAP, "viewer_pose"))):
+            return key
+        if _has_tool(archive):
+            return "video_mocap"
+        if key == "pose" and set(archive.keys).intersection(poses):
+            return _pose_or_motion(archive, poses)
+    except FormatError:
+        return key
+    return key
+
+
 def _is_video_mocap(archive: Archive) -> bool:
     """Return whether an archive has results of a tool without distinctive keys."""
     from viewer.formats._video_mocap.tools import tool_of

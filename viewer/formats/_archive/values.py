@@ -172,6 +172,11 @@ class Archive:
         Returns the archive of a key whose value is a dict or a list of dicts, None for others.
     label : str
         Path of the names in the file, for messages: ``"people.3."``.
+    objects : callable, optional
+        Returns the objects of an array of objects as a list, which ``get`` does not evaluate; None
+        for other values.
+    is_list : bool
+        Whether the values are the items of a list, called "0", "1" …
     """
 
     def __init__(
@@ -182,11 +187,14 @@ class Archive:
         load: Callable[[str], Value],
         branch: Callable[[str], Archive | None] | None = None,
         label: str = "",
+        objects: Callable[[str], Value] | None = None,
+        is_list: bool = False,
     ) -> None:
         self.source, self.kind, self.keys = source, kind, keys
-        self.label = label
-        self._load, self._branch = load, branch
+        self.label, self.is_list = label, is_list
+        self._load, self._branch, self._objects = load, branch, objects
         self._values: dict[str, Value] = {}
+        self._arrays: dict[str, Deferred | None] = {}
         self._branches: dict[str, Archive | None] = {}
 
     def has(self, key: str) -> bool:
@@ -235,7 +243,8 @@ class Archive:
         Parameters
         ----------
         key : str
-            Name in the file. Numbers in nested lists are treated as an array.
+            Name in the file. Numbers or arrays in nested lists, or in an array of objects, are
+            treated as an array, with NaN in place of None and of empty items.
         shape : sequence, optional
             For each axis a size, None for any, or a letter: axes with the same letter are equal.
         kinds : str
@@ -248,11 +257,26 @@ class Archive:
         """
         value = self.get(key)
         if not isinstance(value, Deferred):
-            value = _from_lists(value)
+            value = self._listed(key, value)
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
             raise self.fault("F002.value", item=key, expected=_wanted(shape, kinds), found=found)
         return widened(value)
+
+    def shape(self, key: str) -> tuple[int, ...]:
+        """Return the shape of an array of numbers; empty if there is no such array."""
+        value = self.get(key) if key in self.keys else None
+        if value is not None and not isinstance(value, Deferred):
+            value = self._listed(key, value)
+        return value.shape if isinstance(value, Deferred) and value.dtype.kind in "biuf" else ()
+
+    def _listed(self, key: str, value: Value) -> Deferred | None:
+        """Return numbers in nested lists, or in an array of objects, as an array."""
+        if key not in self._arrays:
+            if isinstance(value, Opaque) and self._objects is not None:
+                value = self._objects(key)
+            self._arrays[key] = _from_lists(value)
+        return self._arrays[key]
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
         """Return a matrix in sparse form, whether it is stored sparse or dense.
@@ -371,18 +395,35 @@ def _fits(wanted: Axes | None, found: tuple[int, ...]) -> bool:
 
 
 def _from_lists(value: Value) -> Deferred | None:
-    """Return numbers in nested lists as an array; None if the lists are ragged or not numeric."""
-    # Only numbers are passed to numpy: one long string would make all elements that long.
-    if not _is_numbers(value):
-        return None
+    """Return numbers or arrays in nested lists as an array; None if they are ragged or others."""
     try:
-        array = np.array(value)
+        items = _plain(value)
+        usual = [item for item in items if not _is_missing(item)] if isinstance(items, list) else []
+        if usual and len(usual) < len(items):
+            missing = np.full(np.shape(usual[0]), np.nan)
+            items = [missing if _is_missing(item) else item for item in items]
+        array = np.array(items)
     except (ValueError, TypeError, OverflowError):
+        return None
+    if array.dtype.kind not in "biuf":
         return None
     return Deferred(array.shape, array.dtype, lambda: array)
 
 
-def _is_numbers(value: Value) -> bool:
+def _plain(value: Value, is_item: bool = False) -> Any:
+    """Return nested lists of numbers and arrays; raise ValueError for other values.
+
+    Only numbers are passed to numpy: one long string would make all elements that long.
+    """
     if isinstance(value, list | tuple):
-        return all(map(_is_numbers, value))
-    return isinstance(value, int | float)
+        return [_plain(item, not is_item) for item in value]
+    if isinstance(value, Deferred) and value.dtype.kind in "biuf":
+        return value.values()
+    if isinstance(value, int | float) or (value is None and is_item):
+        return value
+    raise ValueError(value)
+
+
+def _is_missing(item: Any) -> bool:
+    """Return whether an item of a list stands for a missing frame."""
+    return item is None or (isinstance(item, list) and not item)

@@ -295,6 +295,7 @@ def _build_array(target: Array, state: object) -> None:
                 return
             if isinstance(payload, list) and dtype.code.startswith("O"):
                 target.what, target.items = dtype.what(), payload
+                target.shape, target.is_fortran = shape, bool(order)
                 return
     raise MisfitError(Phrase("pickle-array-state", found=noun(state)))
 

@@ -17,6 +17,7 @@ should be copied first.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from viewer.formats._archive.values import Archive, Value
@@ -26,7 +27,7 @@ from viewer.formats._pickle.values import Array, noun
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-__all__ = ["has_names", "named_archive", "nested_archive", "warn_of_rest"]
+__all__ = ["has_names", "listed", "named_archive", "nested_archive", "warn_of_rest"]
 
 
 def warn_of_rest(machine: Machine) -> None:
@@ -55,7 +56,9 @@ def named_archive(source: Source, kind: str, size: int, whole: object) -> Archiv
     FormatError
         If it is neither a dict with string keys, nor a list or dict of dicts.
     """
-    return _archive(source, kind, size, _named(source, _objects(whole)), "")
+    found = _objects(whole)
+    is_list = not isinstance(found, dict)
+    return _archive(source, kind, size, _named(source, found), "", is_list)
 
 
 def nested_archive(
@@ -67,7 +70,22 @@ def nested_archive(
     others, see ``named_archive``.
     """
     found = _items(_objects(whole))
-    return None if found is None else _archive(source, kind, size, _strings(source, found), label)
+    if found is None:
+        return None
+    is_list = not isinstance(_objects(whole), dict)
+    return _archive(source, kind, size, _strings(source, found), label, is_list)
+
+
+def listed(source: Source, size: int, key: str, whole: object) -> Value:
+    """Return the objects of an array of objects in nested lists; None for other values."""
+    if not isinstance(whole, Array) or whole.items is None:
+        return None
+    items, (_, *sides) = whole.items, whole.shape or (1,)
+    if sides and (whole.is_fortran or math.prod(whole.shape) != len(items) or not items):
+        return None
+    for side in reversed(sides):
+        items = [items[start : start + side] for start in range(0, len(items), side)]
+    return resolve(source.path, size, key, items)
 
 
 def has_names(whole: object) -> bool:
@@ -83,7 +101,12 @@ def _objects(whole: object) -> object:
 
 
 def _archive(
-    source: Source, kind: str, size: int, values: dict[str, object], label: str
+    source: Source,
+    kind: str,
+    size: int,
+    values: dict[str, object],
+    label: str,
+    is_list: bool,
 ) -> Archive:
     path = source.path
 
@@ -91,16 +114,19 @@ def _archive(
         return resolve(path, size, label + key, values[key])
 
     def branch(key: str) -> Archive | None:
-        found = _items(values[key])
-        if found is None:
-            return None
-        return _archive(source, kind, size, _strings(source, found), f"{label}{key}.")
+        return nested_archive(source, kind, size, values[key], f"{label}{key}.")
 
-    return Archive(source, kind, tuple(values), load, branch, label)
+    def objects(key: str) -> Value:
+        return listed(source, size, label + key, values[key])
+
+    return Archive(source, kind, tuple(values), load, branch, label, objects, is_list)
 
 
 def _items(value: object) -> Mapping[str | bytes | int, object] | None:
-    """Return a dict, or by index the dicts of a list, or its lists of dicts; else None."""
+    """Return a dict, or by index the dicts of a list, or its lists of dicts; else None.
+
+    None and empty items of a list stand for missing frames.
+    """
     if isinstance(value, dict):
         return value
     if isinstance(value, list | tuple) and any(map(_has_dict, value)) and all(map(_is_nest, value)):
@@ -109,14 +135,14 @@ def _items(value: object) -> Mapping[str | bytes | int, object] | None:
 
 
 def _has_dict(item: object) -> bool:
-    return isinstance(item, dict) or (isinstance(item, list | tuple) and len(item) > 0)
+    return isinstance(item, dict) or (isinstance(item, list | tuple) and any(map(_has_dict, item)))
 
 
 def _is_nest(item: object) -> bool:
-    """Return whether an item of a list is a dict, or a list of dicts, which may be empty."""
+    """Return whether an item of a list is a dict, None, or a list of these, which may be empty."""
     if isinstance(item, list | tuple):
-        return all(isinstance(inner, dict) for inner in item)
-    return isinstance(item, dict)
+        return all(inner is None or isinstance(inner, dict) for inner in item)
+    return item is None or isinstance(item, dict)
 
 
 def _named(source: Source, whole: object) -> dict[str, object]:
@@ -124,7 +150,10 @@ def _named(source: Source, whole: object) -> dict[str, object]:
     found = _items(whole)
     if found is None:
         raise source.fault("F002.pickle-named", found=noun(whole))
+    is_lost = any(isinstance(value, dict | list | tuple) for value in found.values())
     for key, value in found.items():
+        if is_lost and value is None:
+            continue  # a frame without people
         if isinstance(key, int) and not isinstance(value, dict | list | tuple):
             raise source.fault("F002.pickle-key", found=key)
     return _strings(source, found)

@@ -19,7 +19,7 @@ import numpy as np
 
 from viewer.formats._archive.values import Archive
 from viewer.formats._source import Source
-from viewer.formats._video_mocap.numbers import Frames, has, places, rows, shape_of
+from viewer.formats._video_mocap.numbers import Frames, has, places, rows
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import RestRoots
@@ -48,7 +48,7 @@ def read(source: Source, archive: Archive) -> Results:
     cameras, frames = {}, np.arange(len(next(iter(people.values()))[_PERSON].frames))
     intrinsics = None
     # None if there was no video.
-    if len(frames) and shape_of(archive, "K_fullimg"):
+    if len(frames) and archive.shape("K_fullimg"):
         intrinsics = rows(archive, "K_fullimg", (len(frames), 3, 3))
         cameras["camera"] = Cameras(
             frames, intrinsics, np.eye(3)[None], np.zeros((1, 3)), _size(intrinsics)

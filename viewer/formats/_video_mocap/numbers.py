@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive, Axes
 from viewer.formats._source import Source
-from viewer.rig.arrays import Bools, Deferred, Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.rotation import matrix_to_rotation_vector, nearest_rotations
 
 __all__ = [
@@ -27,7 +27,6 @@ __all__ = [
     "places",
     "rotations_of",
     "rows",
-    "shape_of",
     "six",
     "sole",
     "vectors_of",
@@ -72,13 +71,6 @@ def person_number(key: str) -> int | None:
     (-1, None)
     """
     return int(key) if _PERSON.fullmatch(key) else None
-
-
-def shape_of(archive: Archive, key: str) -> tuple[int, ...]:
-    """Return the shape of an array of numbers; empty if there is no such array."""
-    value = archive.get(key) if archive.has(key) else None
-    is_array = isinstance(value, Deferred) and value.dtype.kind in "biuf"
-    return value.shape if is_array and isinstance(value, Deferred) else ()
 
 
 def rows(archive: Archive, key: str, shape: Axes) -> Floats:

@@ -6,26 +6,31 @@
     places     trans, transl … ; cam_t … in the space of a camera, where y points down
     shape      betas, shape …
     frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
-    person     person_id, track_id, id …, one number, or one for each frame
+    person     person_id, track_id, id …, one number or name, or one for each row
     rate       fps, frame_rate, frameRate …, frames per second
 
-Several rows with the same frame are several people. Dicts may be nested: people by number, frames
-in a list, or parameters within another dict. AMASS files and single poses have other spellings and
-are read by ``amass.py`` and ``pose.py``.
+Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
+except the poses may also stand in one of the dicts around them, once, or as a list with one value
+for each dict. Several rows with the same frame are several people. In a list of frames, None, an
+empty list and a dict without poses are frames without people. AMASS files and single poses have
+other spellings and are read by ``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
 
 import itertools
+import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.errors import FormatError
-from viewer.formats._archive.checking import within_reach
-from viewer.formats._archive.values import Archive
+from viewer.formats._archive.checking import finite, finite_or_nan, within_reach
+from viewer.formats._archive.values import Archive, Value, describe
+from viewer.formats._frame_gaps import frame_spans
 from viewer.formats._source import Source
 from viewer.formats._video_mocap.numbers import (
     Frames,
@@ -35,13 +40,12 @@ from viewer.formats._video_mocap.numbers import (
     person_number,
     places,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_vectors
-from viewer.phrases import printable
+from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred, Floats
-from viewer.rig.motion.timing import is_rate
+from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
 from viewer.rig.smpl_family import FAMILY, members_by_numbers
 
 __all__ = ["read", "recognises"]
@@ -73,35 +77,68 @@ _SHAPES = (
     *("shapeParameters",),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
-_RATES = ("fps", "frame_rate", "frameRate", "mocap_framerate", "mocap_frame_rate")
+_RATES = (
+    *("fps", "frame_rate", "frameRate", "framerate", "mocap_framerate", "mocap_frame_rate"),
+    *("video_fps", "frames_per_second"),
+)
 _DETECTIONS = "detection_all"
 _PEOPLE = (
     *("person_id", "track_id", "tracklet_id", "person", "pid", "id"),
-    *("person_ids", "track_ids", "pids", "ids"),
+    *("person_ids", "track_ids", "tracklet_ids", "pids", "ids"),
 )
 _NAMES = {len(names): names for names in members_by_numbers().values()}
 _LARGEST = 1 << 30  # maximum number of a frame or person
-_DEEPEST = 3  # maximum depth of dicts inside dicts
+_DEEPEST = 3  # maximum depth of dicts inside dicts; lists between them do not count
+_NAMED_PERSON = re.compile(r"(?:subj|subject|person|people|pid|id|track|tracklet)[_ -]?(\d{1,9})")
+_NAMED_FRAME = re.compile(r"\D*(?:.*\D)?(\d{1,9})(?:\.[A-Za-z]\w*)?")
 _COST = 20  # number of frames that take about as long to read as one dict takes to inspect
 _LOOKED_AT = 5000  # number of dicts of which at least one must be recognised
+# Maximum number of frames of a numbered dict: this many for every item, plus a constant.
+_MOST_HOLES, _FEW = 10, 1000
 _LISTED = 12  # maximum number of ignored keys that are listed
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Value:
+    """A value of a dict, or of one around it; ``item``: only this item of the value."""
+
+    archive: Archive
+    key: str
+    item: int | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Layout:
     """Keys of one dict of parameters, and the forms of its rotations."""
 
     poses: tuple[tuple[str, Form], ...]
-    place: str
-    shape: str
-    frames: str
-    person: str
-    rate: str
+    place: _Value | None
+    shape: _Value | None
+    frames: _Value | None  # a number for each of several rows
+    frame: _Value | None  # one number for all rows
+    person: _Value | None
+    rate: _Value | None
+
+    @property
+    def count(self) -> int:
+        """Number of rows."""
+        return self.poses[0][1].n_frames
 
     @property
     def keys(self) -> list[str]:
-        others = (self.place, self.shape, self.frames, self.person, self.rate)
-        return [key for key, _ in self.poses] + [key for key in others if key]
+        frames = self.frames or self.frame
+        others = (self.place, self.shape, frames, self.person, self.rate)
+        return [key for key, _ in self.poses] + [value.key for value in others if value]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Found:
+    """A dict of parameters; its path from the outermost, and the dicts and lists on this path."""
+
+    path: tuple[str, ...]
+    around: tuple[Archive, ...]
+    archive: Archive
+    layout: _Layout
 
 
 def recognises(archive: Archive) -> bool:
@@ -114,22 +151,29 @@ def recognises(archive: Archive) -> bool:
         except FormatError:  # there are thousands of dicts without poses
             return False
     is_plain = all(key in _AMASS and form.size == 3 for key, form in layout.poses)
-    return not is_plain or layout.place in _CAMERA or bool(layout.frames)
+    is_plain &= layout.place is None or layout.place.key not in _CAMERA
+    has_people = layout.person is not None and layout.count > 1
+    is_numbered = layout.frames is not None or (layout.frame is not None and layout.count == 1)
+    return not is_plain or is_numbered or has_people
 
 
 def read(source: Source, archive: Archive) -> Results:
     """Read all people."""
     found = [*_found(archive)]
-    layout = found[0][2]
-    people = _people(source, found)
-    is_camera = layout.place in _CAMERA
+    layout = found[0].layout
+    people, span = _people(source, found)
+    is_camera = layout.place is not None and layout.place.key in _CAMERA
     space = "camera" if is_camera else "world"
-    if not layout.place:
+    if layout.place is None:
         source.warn("F007.motion-place")
-    recognised = [f"{key} ({form.title} of {form.n_joints} joints)" for key, form in layout.poses]
+    recognised = [
+        f"{key} ({form.title} of {counted(form.n_joints, 'joint')})" for key, form in layout.poses
+    ]
     recognised += layout.keys[len(layout.poses) :]
-    ignored = [key for key in found[0][1].keys if key not in layout.keys][:_LISTED]
-    rest = ", ".join(map(printable, ignored))
+    used = {key for one in found for key in (*one.layout.keys, *one.path)}
+    scopes = [scope for scope in (found[0].archive, *found[0].around) if not scope.is_list]
+    ignored = [key for scope in scopes for key in scope.keys if key not in used]
+    rest = ", ".join(map(printable, ignored[:_LISTED]))
     source.warn("F007.video-parameters", n=len(people), recognised=recognised, ignored=rest)
     n_joints = sum(form.n_joints for _, form in layout.poses)
     model = FAMILY[n_joints].title if n_joints in FAMILY else "SMPL"
@@ -139,23 +183,46 @@ def read(source: Source, archive: Archive) -> Results:
         model,
         {space: people},
         {space: "-y" if is_camera else ""},
-        frame_rate=_rate(found[0][1], layout.rate),
+        frame_rate=_rate(source, found),
         facts=facts,
+        span=span,
     )
 
 
-def _rate(archive: Archive, key: str) -> float | None:
-    """Return the frame rate; None if the value is not a frame rate."""
-    value = archive.get(key) if key else None
-    if isinstance(value, Deferred) and value.dtype.kind in "iuf":
-        value = float(value.values().reshape(-1)[0])
-    if not isinstance(value, int | float) or isinstance(value, bool):
+def _rate(source: Source, found: list[_Found]) -> float | None:
+    """Return the first frame rate; note values that differ from it, or are not frame rates."""
+    values = [one.layout.rate for one in found if one.layout.rate is not None]
+    rates: list[float] = []
+    for archive, key in dict.fromkeys((value.archive, value.key) for value in values):
+        rate = _number(archive.get(key))
+        if rate is None or not is_rate(rate):
+            shown = describe(archive.get(key)) if rate is None else f"{rate:g}"
+            source.warn("F007.rate-ignored", item=key, low=SLOWEST, high=FASTEST, found=shown)
+        elif rate not in rates:
+            rates.append(rate)
+    if len(rates) > 1:
+        source.warn("F007.motion-rates", rates=[f"{rate:g}" for rate in rates])
+    return rates[0] if rates else None
+
+
+def _number(value: Value) -> float | None:
+    """Return a number, also as text or an array of one; None for other values."""
+    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
+        value = value.values().reshape(-1)[0].item()
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return _number(value[0])
+    if isinstance(value, bool) or not isinstance(value, int | float | str | bytes):
         return None
-    return float(value) if is_rate(value) else None
+    try:
+        return float(value)
+    except (ValueError, OverflowError):
+        return None
 
 
-def _layout(archive: Archive) -> _Layout | None:
-    """Return the layout of a dict; None if it has no poses."""
+def _layout(
+    archive: Archive, around: Sequence[Archive] = (), path: Sequence[str] = ()
+) -> _Layout | None:
+    """Return the layout of a dict inside others; None if it has no poses."""
     whole = _first_form(archive, _WHOLE, tuple(_NAMES))
     if whole is not None:
         poses: tuple[tuple[str, Form], ...] = (whole,)
@@ -167,19 +234,47 @@ def _layout(archive: Archive) -> _Layout | None:
             return None
         poses = (root, body)
     count = poses[0][1].n_frames
-    place = _first(archive, (*_WORLD, *_CAMERA), lambda shape: _is_place(shape, count))
-    shape = _first(archive, _SHAPES, lambda shape: _is_shape(shape, count))
-    frames = _first(archive, _FRAMES, lambda shape: shape == (count,))
-    person = ""
-    if count == 1:
-        frames = frames or _first_number(archive, _FRAMES)
-        person = _first_number(archive, _PEOPLE)
-    elif not frames and shape_of(archive, _DETECTIONS)[:1] == (count,):
-        frames = _DETECTIONS
-    if frames and count > 1:
-        person = _first(archive, _PEOPLE, lambda shape: shape == (count,))
-    rate = _first(archive, _RATES, lambda shape: shape in ((), (1,)))
-    return _Layout(poses, place, shape, frames, person, rate)
+    scopes = (archive, *reversed(around))
+
+    def first(keys: Sequence[str], fits: Callable[[Archive, str], bool]) -> _Value | None:
+        return next(
+            (
+                _Value(scope, key)
+                for scope in scopes
+                for key in keys
+                if scope.has(key) and key not in path and fits(scope, key)
+            ),
+            None,
+        )
+
+    def of_item(keys: Sequence[str]) -> _Value | None:
+        """Find a list with one value for each item of a list, or of a dict, on the path."""
+        for level in range(len(around) - 1, 0, -1):
+            items, beside = around[level].keys, around[level - 1]
+            for key in keys:
+                if beside.has(key) and key not in path and _length(beside, key) == len(items):
+                    return _Value(beside, key, items.index(path[level]))
+        return None
+
+    def is_single(scope: Archive, key: str) -> bool:
+        return scope.shape(key) in ((), (1,)) and _identity(scope.get(key)) is not None
+
+    frames = frame = None
+    if count > 1:
+        frames = first(_FRAMES, lambda scope, key: scope.shape(key) == (count,))
+        frames = frames or first(
+            (_DETECTIONS,), lambda scope, key: scope.shape(key)[:1] == (count,)
+        )
+    if frames is None:
+        frame = first(_FRAMES, is_single) or of_item(_FRAMES)
+    person = of_item(_PEOPLE) or first(
+        _PEOPLE, lambda scope, key: count > 1 and _length(scope, key) == count
+    )
+    person = person or first(_PEOPLE, is_single)
+    rate = first(_RATES, lambda scope, key: scope.shape(key) in ((), (1,)))
+    place = first((*_WORLD, *_CAMERA), lambda scope, key: _is_place(scope.shape(key), count))
+    shape = first(_SHAPES, lambda scope, key: _is_shape(scope.shape(key), count))
+    return _Layout(poses, place, shape, frames, frame, person, rate)
 
 
 def _first_form(
@@ -192,22 +287,46 @@ def _first_form(
     return None
 
 
-def _first(archive: Archive, keys: tuple[str, ...], fits: Callable[[tuple[int, ...]], bool]) -> str:
-    return next((key for key in keys if archive.has(key) and fits(shape_of(archive, key))), "")
+def _length(archive: Archive, key: str) -> int:
+    """Return the number of items of a list or array with one axis; -1 for other values."""
+    value = archive.get(key)
+    if isinstance(value, list | tuple):
+        return len(value)
+    is_row = isinstance(value, Deferred) and len(value.shape) == 1
+    return value.shape[0] if isinstance(value, Deferred) and is_row else -1
 
 
-def _first_number(archive: Archive, keys: tuple[str, ...]) -> str:
-    return next((key for key in keys if _number(archive, key) is not None), "")
-
-
-def _number(archive: Archive, key: str) -> int | None:
-    """Return an integer, also as an array of one; None for other values."""
-    value = archive.get(key) if key and archive.has(key) else None
-    if isinstance(value, Deferred) and value.dtype.kind in "iu" and value.shape in ((), (1,)):
-        value = int(value.values().reshape(-1)[0])
-    if not isinstance(value, int) or isinstance(value, bool):
+def _identity(value: Value) -> int | str | None:
+    """Return the number or name of a person or frame; None for other values."""
+    if isinstance(value, Deferred) and value.dtype.kind in "iufSU" and value.shape in ((), (1,)):
+        value = value.values().reshape(-1)[0].item()
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return _identity(value[0])
+    if isinstance(value, bytes):
+        value = value.decode("utf-8", "replace")
+    if isinstance(value, float) and value.is_integer():
+        value = int(value)
+    if isinstance(value, str):
+        number = person_number(value)
+        return value if number is None else number
+    if isinstance(value, bool) or not isinstance(value, int):
         return None
     return value if abs(value) < _LARGEST else None
+
+
+def _identities(value: _Value, count: int) -> list[int | str]:
+    """Return the person of each row, or of all rows."""
+    found = value.archive.get(value.key)
+    if isinstance(found, Deferred) and len(found.shape) == 1:
+        found = [np.asarray(item).item() for item in found.values()]
+    items = list(found) if isinstance(found, list | tuple) else [found]
+    chosen = items if value.item is None else items[value.item : value.item + 1]
+    persons = [_identity(item) for item in chosen]
+    if None in persons:
+        odd = describe(chosen[persons.index(None)])
+        raise value.archive.fault("F002.video-identity", item=value.key, found=odd)
+    known = [person for person in persons if person is not None]
+    return known if len(known) == count else known[:1] * count
 
 
 def _is_place(shape: tuple[int, ...], count: int) -> bool:
@@ -219,169 +338,315 @@ def _is_shape(shape: tuple[int, ...], count: int) -> bool:
 
 
 def _found(
-    archive: Archive, budget: RowBudget | None = None, depth: int = 0
-) -> Iterator[tuple[tuple[str, ...], Archive, _Layout]]:
-    """Yield the path, the dict and the layout of all dicts with poses."""
-    layout = _layout(archive)
+    archive: Archive,
+    budget: RowBudget | None = None,
+    around: tuple[Archive, ...] = (),
+    path: tuple[str, ...] = (),
+) -> Iterator[_Found]:
+    """Yield all dicts with poses."""
+    layout = _layout(archive, around, path)
     budget = budget or RowBudget(archive)
-    budget.spend(_COST if layout is None else layout.poses[0][1].n_frames)
+    budget.spend(_COST if layout is None else layout.count)
     if layout is not None:
-        yield (), archive, layout
+        yield _Found(path, around, archive, layout)
         return
-    for key in archive.keys if depth < _DEEPEST else ():
+    depth = sum(not scope.is_list for scope in around)
+    for key in archive.keys if depth < _DEEPEST or archive.is_list else ():
         inner = archive.inside(key)
         if inner is not None:
-            yield from (
-                ((key, *path), found, kept)
-                for path, found, kept in _found(inner, budget, depth + 1)
-            )
+            yield from _found(inner, budget, (*around, archive), (*path, key))
 
 
-def _people(
-    source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]]
-) -> dict[int, Track]:
-    """Return the tracks of people: dicts of single frames are combined into people.
+_Person = int | str | tuple[int, ...]
+"""A person of a row: an ID or name of the file, or the index of a dict and the person in it."""
 
-    Single frames with different joints or numbers of coefficients are different people.
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """A track of several people: the frame and person of each row."""
+
+    track: Track
+    frames: Frames
+    persons: Sequence[_Person]
+
+
+def _people(source: Source, found: list[_Found]) -> tuple[dict[int, Track], tuple[int, ...]]:
+    """Return the tracks of people, and the first and last frame of a list of frames.
+
+    A dict has all frames of one or several people, or one frame of one or several people.
     """
-    tracks = [_track(archive, layout) for _, archive, layout in found]
-    are_single = all(len(track.frames) == 1 for track in tracks)
+    tracks = [_track(one) for one in found]
     is_alike = len({(track.joint_names, _width(track.shape)) for track in tracks}) == 1
-    if are_single and is_alike and len(tracks) > 1:
-        kept = [(archive, layout) for _, archive, layout in found]
-        return _people_of_frames(source, kept, tracks)
-    return _people_of_arrays(source, found, tracks)
+    if is_alike and _are_frames(found):
+        rows, span = _rows_of_frames(source, found, tracks)
+    else:
+        rows, span = _rows_of_people(source, found, tracks), ()
+    return _assembled(source, rows), span
 
 
-def _people_of_arrays(
-    source: Source, found: list[tuple[tuple[str, ...], Archive, _Layout]], tracks: list[Track]
-) -> dict[int, Track]:
-    """Return the people of dicts, each of which has all frames of one or several people."""
-    people: dict[int, Track] = {}
-    most = 1
-    for index, ((path, archive, layout), track) in enumerate(zip(found, tracks, strict=True)):
-        persons = _persons(archive, layout, track.frames)
-        numbers = np.unique(persons)
-        if len(numbers) > 1:
-            most = max(most, 0 if layout.person else len(numbers))
-            for number in numbers.tolist():
-                own = number if number not in people else _unused(people, index)
-                people[own] = _rows_of(source, track, np.flatnonzero(persons == number))
-            continue
-        known = (person_number(part) for part in path)
-        number = next((each for each in known if each is not None and each >= 0), index)
-        people[number if number not in people else _unused(people, index)] = _rows_of(
-            source, track, np.arange(len(persons))
-        )
-    if most > 1:
+def _rows_of_people(source: Source, found: list[_Found], tracks: list[Track]) -> list[_Rows]:
+    """Return the rows of dicts, each of which has all frames of one or several people."""
+    rows: list[_Rows] = []
+    taken: dict[int, int] = {}
+    for index, (one, track) in enumerate(zip(found, tracks, strict=True)):
+        frames = track.frames
+        again = _occurrences(frames.tolist())
+        persons: list[_Person]
+        if one.layout.person is not None:
+            persons = [*_identities(one.layout.person, len(frames))]
+            if one.layout.frames is None and len(set(persons)) > 1:
+                frames = _occurrences(persons)
+                source.warn("F007.video-rows", item=one.layout.person.key)
+        elif again.any():
+            persons = [(index, person) for person in again.tolist()]
+            source.warn("F007.video-repeated", n=int(again.max()) + 1)
+        else:
+            known = (_person_named(part) for part in one.path)
+            number = next((each for each in known if each is not None), None)
+            is_free = number is not None and taken.setdefault(number, index) == index
+            persons = [number if number is not None and is_free else (index, 0)] * len(frames)
+        rows.append(_Rows(track, frames, persons))
+    return rows
+
+
+def _are_frames(found: list[_Found]) -> bool:
+    """Return whether dicts are frames, and not people.
+
+    A single dict is one if it is an item of a longer list, whose other items are missing. Dicts of
+    several rows are frames if they have one frame number each, if each row is another person, or if
+    they are items of a list that has more items than any of them has rows.
+    """
+    most = max(one.layout.count for one in found)
+    if len(found) == 1 and not any(
+        scope.is_list and len(scope.keys) > 1 for scope in found[0].around
+    ):
+        return False
+    if most == 1:
+        return True
+    if any(one.layout.frames is not None for one in found):
+        return False
+    if all(one.layout.frame is not None for one in found):
+        return True
+    listed = [
+        _identities(one.layout.person, one.layout.count)
+        for one in found
+        if one.layout.person is not None
+    ]
+    if len(listed) == len(found):
+        return all(len(set(persons)) == len(persons) for persons in listed)
+    container = found[0].around[-1]
+    return container.is_list and len(container.keys) > most
+
+
+def _rows_of_frames(
+    source: Source, found: list[_Found], tracks: list[Track]
+) -> tuple[list[_Rows], tuple[int, ...]]:
+    """Return the rows of dicts of single frames, and the first and last frame of their list."""
+    frames, persons, span = _on_timeline(source, found)
+    is_known = all(one.layout.person is not None for one in found)
+    rows: list[_Rows] = []
+    seen: Counter[int] = Counter()
+    for one, track, frame, number in zip(found, tracks, frames, persons, strict=True):
+        count = one.layout.count
+        own: list[_Person] = [*range(seen[frame], seen[frame] + count)]
+        if is_known and one.layout.person is not None:
+            own = [*_identities(one.layout.person, count)]
+        elif number is not None and count == 1:
+            own = [number]
+        seen[frame] += count
+        rows.append(_Rows(track, np.full(count, frame), own))
+    most = max(seen.values())
+    if most > 1 and not is_known:
         source.warn("F007.video-repeated", n=most)
+    return rows, span
+
+
+def _on_timeline(
+    source: Source, found: list[_Found]
+) -> tuple[list[int], list[int | None], tuple[int, ...]]:
+    """Return the frame of each dict, its person if its place tells it, and the range of frames.
+
+    Frames have numbers in the dicts, or are the items of a list or dict. Of two lists or dicts, one
+    inside the other, the outer one has the frames, unless it is the shorter one or its keys are
+    people.
+    """
+    depth = min(len(one.path) for one in found)
+    levels = [
+        level
+        for level in range(depth)
+        if found[0].around[level].is_list
+        or len({one.path[: level + 1] for one in found}) > len({one.path[:level] for one in found})
+    ]
+    numbers = [
+        None if one.layout.frame is None else _identities(one.layout.frame, 1)[0] for one in found
+    ]
+    keyed = [number for number in numbers if isinstance(number, int)]
+    of_people = [level for level in levels if _are_people(found, level)]
+    if len(keyed) == len(found):
+        # Keys of dicts only tell people apart if frames repeat.
+        is_repeated = len(set(keyed)) < len(keyed)
+        level = next((one for one in levels if not found[0].around[one].is_list), None)
+        persons = [
+            _person_named(one.path[level]) if is_repeated and level is not None else None
+            for one in found
+        ]
+        return keyed, persons, ()
+    if len(levels) > 1 and not of_people:
+        sizes = [max(len(one.around[level].keys) for one in found) for level in levels[:2]]
+        of_people = [levels[0] if sizes[0] < sizes[1] else levels[1]]
+    of_frames = next((level for level in levels if level not in of_people), None)
+    others = [level for level in range(depth) if level != of_frames]
+    names = [[_person_named(one.path[level]) for level in others] for one in found]
+    persons = [next((one for one in each if one is not None), None) for each in names]
+    if of_frames is None:
+        return [0] * len(found), persons, ()
+    frames, missing, span = _numbered(found, of_frames)
+    if missing:
+        spans = frame_spans(np.array(missing))
+        source.warn("F007.frames-empty", n=len(missing), frames=spans)
+    return frames, persons, span
+
+
+def _are_people(found: list[_Found], level: int) -> bool:
+    """Return whether the keys of a dict on the path say that they are people."""
+    return all(_NAMED_PERSON.fullmatch(one.path[level].lower()) for one in found)
+
+
+def _numbered(found: list[_Found], level: int) -> tuple[list[int], list[int], tuple[int, ...]]:
+    """Return the frames of items of lists or dicts, those without people, and their range."""
+    keys = [one.path[level] for one in found]
+    scopes = dict.fromkeys(one.around[level] for one in found)
+    known = set(keys)
+    slots = [
+        key
+        for key in dict.fromkeys(key for scope in scopes for key in scope.keys)
+        if key in known
+        or any(scope.has(key) and scope.get(key) in (None, [], (), {}) for scope in scopes)
+        or any(scope.is_list for scope in scopes)
+    ]
+    matches = [_NAMED_FRAME.fullmatch(key) for key in slots]
+    numbers = [int(match[1]) for match in matches if match is not None]
+    is_plausible = len(set(numbers)) == len(slots)
+    if not is_plausible or max(numbers) - min(numbers) > _MOST_HOLES * len(slots) + _FEW:
+        numbers = [*range(len(slots))]
+    place = dict(zip(slots, numbers, strict=True))
+    missing = sorted(place[key] for key in slots if key not in known)
+    return [place[key] for key in keys], missing, (min(numbers), max(numbers))
+
+
+def _person_named(name: str) -> int | None:
+    """Return the person of a key that is a number, or a number after a word; None for others."""
+    match = _NAMED_PERSON.fullmatch(name.lower())
+    number = int(match[1]) if match else person_number(name)
+    return number if number is not None and number >= 0 else None
+
+
+def _occurrences(values: Sequence[object]) -> Frames:
+    """Return how often each value has occurred before: (N,).
+
+    >>> _occurrences([5, 5, 6, 5]).tolist()
+    [0, 1, 0, 2]
+    """
+    seen: Counter[object] = Counter()
+    found = []
+    for value in values:
+        found.append(seen[value])
+        seen[value] += 1
+    return np.array(found, dtype=np.int64)
+
+
+def _assembled(source: Source, rows: list[_Rows]) -> dict[int, Track]:
+    """Return the tracks of people, each with the rows of one or several dicts."""
+    numbers = _numbers_of(source, [person for each in rows for person in each.persons])
+    listed: dict[int, list[tuple[Track, Frames]]] = {}
+    untracked: Counter[int] = Counter()
+    for each in rows:
+        own = np.zeros(len(each.frames), dtype=np.int64)
+        for row, (frame, person) in enumerate(zip(each.frames.tolist(), each.persons, strict=True)):
+            own[row] = numbers.get(person, 0)
+            if isinstance(person, int) and person < 0:  # the number is unique only in its frame
+                untracked[frame] += 1
+                own[row] = -untracked[frame]
+        for number in np.unique(own).tolist():
+            chosen = np.flatnonzero(own == number)
+            part = each.track.selected(chosen)
+            listed.setdefault(number, []).append((part, each.frames[chosen]))
+    if untracked:
+        source.warn("F007.record-untracked")
+    people: dict[int, Track] = {}
+    for number, parts in sorted(listed.items()):
+        frames, first = first_rows(source, np.concatenate([own for _, own in parts]))
+        whole = _joined([track for track, _ in parts]).selected(first)
+        people[number] = replace(whole, frames=frames)
     return people
 
 
-def _persons(archive: Archive, layout: _Layout, frames: Frames) -> Frames:
-    """Return the person of each row; rows with the same frame are counted if they have no IDs."""
-    if len(frames) > 1 and layout.person:
-        return frames_of(archive, layout.person, len(frames))
-    order = np.argsort(frames, kind="stable")
-    firsts = np.searchsorted(frames[order], frames[order], side="left")
-    persons = np.zeros(len(frames), dtype=np.int64)
-    persons[order] = np.arange(len(frames)) - firsts
-    return persons
+def _numbers_of(source: Source, persons: Sequence[_Person]) -> dict[_Person, int]:
+    """Return the number of each person; names, and people without IDs, get unused numbers."""
+    found = dict.fromkeys(persons)
+    numbers: dict[_Person, int] = {one: one for one in found if isinstance(one, int)}
+    for one in found:
+        if not isinstance(one, int):
+            start = one[0] + one[1] if isinstance(one, tuple) else 0
+            used = set(numbers.values())
+            numbers[one] = next(each for each in itertools.count(start) if each not in used)
+    names = [
+        f"{number}: {printable(one, 40)}" for one, number in numbers.items() if isinstance(one, str)
+    ]
+    if names:
+        source.warn("F007.person-names", names=names)
+    return numbers
 
 
-def _rows_of(source: Source, track: Track, chosen: Frames) -> Track:
-    """Return rows of a track in the order of their frames; warn if a frame occurs again."""
-    frames, first = first_rows(source, track.frames[chosen])
-    kept = chosen[first]
-    shape, count = track.shape, len(track.frames)
-    if track.vectors is None or track.translations is None:
-        return track
+def _joined(tracks: list[Track]) -> Track:
+    """Return the rows of one person, which are in several dicts."""
+    if len(tracks) == 1:
+        return tracks[0]
+    counts = [len(track.frames) for track in tracks]
+    shapes = [
+        np.broadcast_to(track.shape, (count, track.shape.shape[1]))
+        for track, count in zip(tracks, counts, strict=True)
+        if track.shape is not None
+    ]
     return Track(
-        frames,
-        track.joint_names,
-        track.vectors[kept],
-        track.translations[kept],
-        shape[kept] if shape is not None and len(shape) == count else shape,
+        np.concatenate([track.frames for track in tracks]),
+        tracks[0].joint_names,
+        np.concatenate([track.vectors for track in tracks if track.vectors is not None]),
+        np.concatenate([track.translations for track in tracks if track.translations is not None]),
+        np.concatenate(shapes) if len(shapes) == len(tracks) else None,
     )
 
 
-def _people_of_frames(
-    source: Source, found: list[tuple[Archive, _Layout]], tracks: list[Track]
-) -> dict[int, Track]:
-    """Return the people of single frames; without numbers, they are counted within each frame."""
-    persons = [_number(archive, layout.person) for archive, layout in found]
-    known = [person for person in persons if person is not None and person >= 0]
-    if len(known) < len(tracks):
-        known = [0] * len(tracks)
-        if all(layout.frames for _, layout in found):
-            seen: Counter[int] = Counter()
-            for row, track in enumerate(tracks):
-                frame = int(track.frames[0])
-                known[row] = seen[frame]
-                seen[frame] += 1
-    listed: dict[int, list[Track]] = {person: [] for person in sorted(set(known))}
-    for track, person in zip(tracks, known, strict=True):
-        listed[person].append(track)
-    people = {person: _joined(own) for person, own in listed.items()}
-    if len(people) > 1 and not all(layout.person for _, layout in found):
-        source.warn("F007.video-repeated", n=len(people))
-    return people
-
-
-def _unused(people: Mapping[int, Track], first: int) -> int:
-    """Return the lowest unused number of a person, starting at ``first``."""
-    return next(number for number in itertools.count(first) if number not in people)
-
-
-def _track(archive: Archive, layout: _Layout) -> Track:
+def _track(one: _Found) -> Track:
+    archive, layout = one.archive, one.layout
     parts = [rotation_vectors(archive, key, form) for key, form in layout.poses]
     vectors = np.concatenate(parts, axis=1)
     count = len(vectors)
     placed = np.zeros((count, 3))
-    if layout.place:
-        shape = shape_of(archive, layout.place)
-        if shape == (3,):
-            single = rows(archive, layout.place, shape)[None]
-            placed = within_reach(archive, layout.place, single)
+    if layout.place is not None:
+        beside, key = layout.place.archive, layout.place.key
+        if beside.shape(key) == (3,):
+            placed = within_reach(beside, key, rows(beside, key, (3,))[None])
         else:
-            placed = places(archive, layout.place, count)
+            placed = places(beside, key, count)
     frames = np.arange(count)
-    number = _number(archive, layout.frames) if count == 1 else None
-    if number is not None:
-        frames = np.array([number])
-    elif layout.frames:
-        frames = frames_of(archive, layout.frames, count)
-    coefficients = _coefficients(archive, layout.shape)
-    return Track(frames, _NAMES[vectors.shape[1]], vectors, placed, coefficients)
+    if layout.frames is not None:
+        frames = frames_of(layout.frames.archive, layout.frames.key, count)
+    elif layout.frame is not None and count == 1:
+        number = _identities(layout.frame, 1)[0]
+        frames = np.array([number if isinstance(number, int) else 0])
+    return Track(frames, _NAMES[vectors.shape[1]], vectors, placed, _coefficients(layout, count))
 
 
-def _coefficients(archive: Archive, key: str) -> Floats | None:
-    if not key:
+def _coefficients(layout: _Layout, count: int) -> Floats | None:
+    if layout.shape is None:
         return None
-    found = rows(archive, key, shape_of(archive, key))
-    return found.reshape(-1, found.shape[-1])
+    archive, key = layout.shape.archive, layout.shape.key
+    shape = archive.shape(key)
+    is_constant = count > 1 and (len(shape) == 1 or shape[0] == 1)
+    check = finite if is_constant else finite_or_nan
+    return check(archive, key, archive.array(key).values()).reshape(-1, shape[-1])
 
 
 def _width(shape: Floats | None) -> int:
     return 0 if shape is None else shape.shape[1]
-
-
-def _joined(tracks: list[Track]) -> Track:
-    """Return the frames of one person, each of which is a separate dict.
-
-    The numbers of frames are used if all are different; otherwise frames are in the given order.
-    """
-    numbers = np.concatenate([track.frames for track in tracks])
-    frames, order = np.unique(numbers, return_index=True)
-    if len(frames) < len(tracks):
-        frames = order = np.arange(len(tracks))
-    vectors = [track.vectors for track in tracks if track.vectors is not None]
-    placed = [track.translations for track in tracks if track.translations is not None]
-    shapes = [track.shape for track in tracks if track.shape is not None]
-    return Track(
-        frames,
-        tracks[0].joint_names,
-        np.concatenate(vectors)[order],
-        np.concatenate(placed)[order],
-        np.concatenate(shapes)[order] if len(shapes) == len(tracks) else None,
-    )

@@ -29,7 +29,6 @@ from viewer.formats._video_mocap.numbers import (
     places,
     rotations_of,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.spaces import inverse
@@ -61,7 +60,7 @@ def read(source: Source, archive: Archive) -> Results:
         for space, part in _SPACES.items():
             body = person.inside(part)
             if body is not None and body.has("trans"):
-                budget.spend(sum(shape_of(body, "trans")[:1]))
+                budget.spend(sum(body.shape("trans")[:1]))
                 found.append((number, space, person, body))
     people: dict[str, dict[int, Track]] = {}
     for number, space, person, body in found:

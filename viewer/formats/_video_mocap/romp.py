@@ -33,7 +33,6 @@ from viewer.formats._video_mocap.numbers import (
     intrinsics_of,
     places,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.rig.arrays import Floats
@@ -65,7 +64,7 @@ def read(source: Source, archive: Archive) -> Results:
     images = {} if whole is None else _images(whole)
     budget = RowBudget(archive)
     for image in images.values():
-        budget.spend(sum(shape_of(image, _POSES)[:1]))
+        budget.spend(sum(image.shape(_POSES)[:1]))
     found: dict[int, list[tuple[int, Floats]]] = defaultdict(list)
     is_tracked, has_infants, most = True, False, 1
     has_joints = all(map(_has_joints, images.values()))
@@ -76,7 +75,7 @@ def read(source: Source, archive: Archive) -> Results:
             persons = frames_of(image, _TRACKS, len(table))
         else:
             is_tracked, most = False, max(most, len(table))
-        has_infants |= shape_of(image, _SHAPES)[1:] == (_N_SHAPES + 1,)
+        has_infants |= image.shape(_SHAPES)[1:] == (_N_SHAPES + 1,)
         for person, row in zip(persons.tolist(), table, strict=True):
             found[person].append((number, row))
     if not is_tracked and most > 1 and len(images) > 1:
@@ -117,8 +116,8 @@ def _camera(images: list[Archive]) -> Cameras | None:
 
 def _projected(image: Archive) -> Floats | None:
     """Return directions and pixels of the joints in front of the camera: (N, 4)."""
-    shape = shape_of(image, _JOINTS)
-    if not _has_joints(image) or shape_of(image, _PIXELS) != (*shape[:2], 2):
+    shape = image.shape(_JOINTS)
+    if not _has_joints(image) or image.shape(_PIXELS) != (*shape[:2], 2):
         return None
     placed = places(image, _PLACES, shape[0])
     points = (rows(image, _JOINTS, shape) + placed[:, None]).reshape(-1, 3)
@@ -130,7 +129,7 @@ def _projected(image: Archive) -> Floats | None:
 
 def _has_joints(image: Archive) -> bool:
     """Return whether an image has the joints of its people relative to ``cam_trans``."""
-    shape, count = shape_of(image, _JOINTS), sum(shape_of(image, _POSES)[:1])
+    shape, count = image.shape(_JOINTS), sum(image.shape(_POSES)[:1])
     return len(shape) == 3 and shape[0] == count and shape[1] >= _N_JOINTS and shape[2] == 3
 
 
@@ -164,7 +163,7 @@ def _table(image: Archive, has_joints: bool) -> Floats:
         shape[:, : given.shape[1]] = given
     placed = places(image, _PLACES, count)
     if has_joints:
-        roots = rows(image, _JOINTS, shape_of(image, _JOINTS))[:, 0]
+        roots = rows(image, _JOINTS, image.shape(_JOINTS))[:, 0]
         placed = within_reach(image, _JOINTS, placed + roots)
     return np.concatenate([poses, placed, shape], axis=1)
 

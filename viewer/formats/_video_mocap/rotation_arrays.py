@@ -17,7 +17,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._archive.values import Archive
-from viewer.formats._video_mocap.numbers import rows, shape_of, six, vectors_of
+from viewer.formats._video_mocap.numbers import rows, six, vectors_of
 from viewer.rig.arrays import Floats
 
 __all__ = ["Form", "form_of", "rotation_vectors"]
@@ -51,7 +51,7 @@ def form_of(archive: Archive, key: str, joints: tuple[int, ...]) -> Form | None:
     joints : tuple of int
         Possible numbers of joints.
     """
-    shape = shape_of(archive, key)
+    shape = archive.shape(key)
     sizes: tuple[int, ...] = ()
     lead: tuple[int, ...] = ()
     if shape[-2:] == (3, 3) and (len(shape) != 2 or joints == (1,)):
@@ -75,7 +75,7 @@ def _flat_form(shape: tuple[int, ...], joints: tuple[int, ...]) -> Form | None:
 
 def rotation_vectors(archive: Archive, key: str, form: Form) -> Floats:
     """Return the rotations as rotation vectors: (N, J, 3)."""
-    found = rows(archive, key, shape_of(archive, key))
+    found = rows(archive, key, archive.shape(key))
     count = form.n_frames, form.n_joints
     if form.size == 9:
         return vectors_of(archive, key, found.reshape(*count, 3, 3))

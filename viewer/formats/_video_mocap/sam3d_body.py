@@ -35,7 +35,6 @@ from viewer.formats._video_mocap.numbers import (
     first_rows,
     intrinsics_of,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.sam3d_files import frames_and_people
@@ -96,7 +95,7 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
     FormatError
         If a shape differs from the tool's.
     """
-    place = shape_of(archive, _PLACE)
+    place = archive.shape(_PLACE)
     lead, count = place[:1] if len(place) == 2 else (), _length(archive)
     found = {
         key: _positions(archive, key, lead)
@@ -104,14 +103,14 @@ def read_person(archive: Archive, with_vertices: bool = True) -> Person:
         if key != _VERTICES or with_vertices
     }
     rotations = None
-    if shape_of(archive, _ROTATIONS):
+    if archive.shape(_ROTATIONS):
         n_joints = found[_JOINTS].shape[1]
         rotations = _framed(rows(archive, _ROTATIONS, (*lead, n_joints, 3, 3)), lead)
     translations = _framed(rows(archive, _PLACE, (*lead, 3)), lead)
     parameters = {
         key: _framed(rows(archive, key, (*lead, None)), lead)
         for key in _PARAMETERS
-        if shape_of(archive, key)
+        if archive.shape(key)
     }
     turned = within_reach(archive, _PLACE, translations) * [1.0, -1.0, -1.0]
     return Person(
@@ -130,7 +129,7 @@ def _framed(values: Floats, lead: tuple[int, ...]) -> Floats:
 
 
 def _positions(archive: Archive, key: str, lead: tuple[int, ...]) -> Floats:
-    if not shape_of(archive, key):
+    if not archive.shape(key):
         return np.zeros((lead[0] if lead else 1, 0, 3))
     found = _framed(rows(archive, key, (*lead, None, 3)), lead)
     return within_reach(archive, key, found) * [1.0, -1.0, -1.0]
@@ -212,7 +211,7 @@ def read_folder(source: Source, names: set[str]) -> Results:
 
 def _length(archive: Archive) -> int:
     """Return the number of frames of a person's arrays."""
-    place = shape_of(archive, _PLACE)
+    place = archive.shape(_PLACE)
     return place[0] if len(place) == 2 else 1
 
 
@@ -223,7 +222,7 @@ def read(source: Source, archive: Archive) -> Results:
 
 def _results(source: Source, found: list[tuple[int, int, Archive]]) -> Results:
     """Return the people as points; vertices are thinned out if there are too many frames."""
-    counts = [shape_of(each, _VERTICES)[-2:-1] for _, _, each in found]
+    counts = [each.shape(_VERTICES)[-2:-1] for _, _, each in found]
     most = max((count[0] for count in counts if count), default=0)
     step = max(1, -(-most * len(found) // _MOST_POINTS))
     placed: dict[int, list[_Row]] = defaultdict(list)
@@ -305,7 +304,7 @@ def intrinsics_seen(archive: Archive, person: Person) -> Floats | None:
 
     u = f x / z + cx and v = f y / z + cy are solved for f, cx and cy by least squares.
     """
-    shape = shape_of(archive, _SEEN)
+    shape = archive.shape(_SEEN)
     if shape != (*person.keypoints.shape[1:2], 2) or not shape[0]:
         return None
     seen = rows(archive, _SEEN, shape)

@@ -28,7 +28,6 @@ from viewer.formats._video_mocap.numbers import (
     intrinsics_of,
     rotations_of,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Cameras, Results, Track
 from viewer.formats._video_mocap.spaces import moved
@@ -46,7 +45,7 @@ def recognises(archive: Archive) -> bool:
     """Return whether an archive has SLAHMR's results: its arrays have an axis of people."""
     if not has(archive, "trans", "root_orient", "pose_body"):
         return False
-    return all(len(shape_of(archive, key)) == 3 for key in ("trans", "root_orient"))
+    return all(len(archive.shape(key)) == 3 for key in ("trans", "root_orient"))
 
 
 def claims_folder(source: Source, names: set[str]) -> bool:

@@ -22,7 +22,6 @@ from viewer.formats._video_mocap.numbers import (
     person_number,
     places,
     rows,
-    shape_of,
 )
 from viewer.formats._video_mocap.results import Results, Track
 from viewer.rig.smpl_family import FAMILY
@@ -54,7 +53,7 @@ def read(source: Source, archive: Archive) -> Results:
     ]
     budget = RowBudget(archive)
     for _, _, person, names in found:  # checked before any array is read
-        budget.spend(sum(shape_of(person, names[0])[:1]))
+        budget.spend(sum(person.shape(names[0])[:1]))
     people: dict[str, dict[int, Track]] = {}
     for number, space, person, names in found:
         people.setdefault(space, {})[number] = _track(person, *names)

@@ -1,0 +1,190 @@
+"""People and frames of SMPL parameters, in every container in which they are found.
+
+Every body is at x = frame, y = person, so its place tells where it belongs.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+from formats.capture_files import waves
+from formats.joblib.joblib_bytes import joblib_file
+from formats.npz_bytes import npz
+
+from viewer.errors import FormatError
+from viewer.formats import Source, detect
+from viewer.formats.video_mocap import open_results
+
+Presence = dict[int, list[int]]
+
+
+def body(frame: int, person: int, /, **more: Any) -> dict[str, Any]:
+    """Return the parameters of a person in one frame."""
+    pose = waves(72, seed=10.0 * person + frame)
+    return {"pose": pose, "trans": np.array([frame, person, 3.0]), **more}
+
+
+def stacked(rows: list[tuple[int, int]], /, **more: Any) -> dict[str, Any]:
+    """Return the parameters of rows, each of a frame and person."""
+    bodies = [body(*row) for row in rows]
+    return {key: np.array([one[key] for one in bodies]) for key in ("pose", "trans")} | more
+
+
+def found_in(source: Source) -> tuple[Presence, int, int, float]:
+    """Return the frames of each person, first frame, number of frames, and rate.
+
+    Frames and people are checked against the places of the bodies, except a constant offset.
+    """
+    assert detect(source) == "video_mocap"
+    capture = open_results(source)
+    people: Presence = {}
+    rate = 0.0
+    for number, motion in next(iter(capture.parts())).bodies.items():
+        rows, rate = motion.timing.rows, motion.timing.frame_rate
+        people[number] = (np.flatnonzero(rows >= 0) + capture.first_frame).tolist()
+        places = motion.translations[rows[rows >= 0]]
+        assert len(set((places[:, 0] - people[number]).tolist())) == 1
+        assert len(set(places[:, 1].tolist())) == 1
+    return people, capture.first_frame, capture.n_frames, rate
+
+
+def plain(value: Any) -> Any:
+    """Return arrays as lists."""
+    if isinstance(value, dict):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list):
+        return [*map(plain, value)]
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+
+
+TWO = [(0, 0), (0, 1), (1, 0), (1, 1), (2, 0), (2, 1)]
+BOTH: Presence = {0: [0, 1, 2], 1: [0, 1, 2]}
+IDS, NUMBERS = np.array([4, 9] * 3), np.array([1000, 1000, 1001, 1001, 1002, 1002])
+LATE: Presence = {4: [1000, 1001, 1002], 9: [1000, 1001, 1002]}
+SMPL = {"smpl": stacked(TWO)}
+ALONE = [(frame, 0) for frame in range(3)]
+
+CASES: dict[str, tuple[Any, Presence]] = {
+    # Keys beside the parameters
+    "ids and frames in the same dict": (stacked(TWO, track_id=IDS, frame_id=NUMBERS), LATE),
+    "ids and frames around": ({**SMPL, "track_id": IDS, "frame_id": NUMBERS}, LATE),
+    "ids and frames two levels above": ({"a": {**SMPL, "fps": 30}, "person_ids": IDS,
+                                         "frames": NUMBERS}, LATE),
+    "frames around, ids inside": ({"smpl": stacked(TWO, track_id=IDS), "frame_id": NUMBERS}, LATE),
+    "frames around without ids": ({**SMPL, "frame_id": NUMBERS},
+                                  {0: LATE[4], 1: LATE[9]}),
+    "ids around without frames": ({**SMPL, "track_id": IDS}, {4: [0, 1, 2], 9: [0, 1, 2]}),
+    "ids as a list of numpy numbers": ({**SMPL, "track_id": [*IDS], "frame_id": [*NUMBERS]}, LATE),
+    "ids as floats": ({**SMPL, "track_id": IDS * 1.0, "frame_id": NUMBERS * 1.0}, LATE),
+    "ids as text": ({**SMPL, "track_id": IDS.astype(str), "frame_id": NUMBERS}, LATE),
+    "people with names": ({**SMPL, "person": ["bob", "amy"] * 3, "frame": NUMBERS},
+                          {0: LATE[4], 1: LATE[9]}),
+    "one id for all rows": ({"track_id": 7, "smpl": stacked(ALONE), "x": 1}, {7: [0, 1, 2]}),
+    "place around": ({"track_id": 3, "p": {"rotmat": np.tile(np.eye(3), (3, 24, 1, 1))},
+                      "cam_t": stacked(ALONE)["trans"]}, {3: [0, 1, 2]}),
+    # Dicts of people
+    "people by number": ({7: stacked(ALONE), 9: stacked([(0, 1)])}, {7: [0, 1, 2], 9: [0]}),
+    "people by numbers as text": ({"7": stacked(ALONE), "9": stacked([(0, 1)])},
+                                  {7: [0, 1, 2], 9: [0]}),
+    "people by words": ({"person_7": stacked(ALONE), "person_9": stacked([(0, 1)])},
+                        {7: [0, 1, 2], 9: [0]}),
+    "people in a list, ids around": ({"people": [stacked(ALONE), stacked([(0, 1), (1, 1)])],
+                                      "track_ids": [4, 9]}, {4: [0, 1, 2], 9: [0, 1]}),
+    "people in parts": ([stacked(ALONE, track_id=3, frames=np.arange(3)),
+                         stacked([(3, 0), (4, 0)], track_id=3, frames=np.arange(3, 5))],
+                        {3: [0, 1, 2, 3, 4]}),
+    # Lists of frames
+    "frames": ([body(frame, 0) for frame in range(3)], {0: [0, 1, 2]}),
+    "a frame is None": ([body(0, 0), None, body(2, 0)], {0: [0, 2]}),
+    "a frame is empty": ([body(0, 0), {}, body(2, 0)], {0: [0, 2]}),
+    "the first and last frame are None": ([None, body(1, 0), None], {0: [1]}),
+    "a frame without poses": ([body(0, 0), {"error": 1}, body(2, 0)], {0: [0, 2]}),
+    "frames in a dict": ({"fps": 25, "frames": [body(0, 0), None, body(2, 0)]}, {0: [0, 2]}),
+    "frames by number": ({0: body(0, 0), 3: body(3, 0)}, {0: [0, 3]}),
+    "frames by file name": ({"a/0005.jpg": body(5, 0), "a/0007.jpg": body(7, 0)}, {0: [5, 7]}),
+    "a frame of a dict is None": ({"f0": body(0, 0), "f1": None, "f2": body(2, 0)}, {0: [0, 2]}),
+    "frame numbers in the dicts": ([body(1000, 0, frame=1000), body(1002, 0, frame=1002)],
+                                   {0: [1000, 1002]}),
+    "frame numbers beside the list": ({"frames": [1000, 1002], "results": [body(1000, 0),
+                                       body(1002, 0)]}, {0: [1000, 1002]}),
+    "lists of people": ([[body(0, 0), body(0, 1)], [], [body(2, 0)]], {0: [0, 2], 1: [0]}),
+    "a list of people is None": ([[body(0, 0)], None, [body(2, 0)]], {0: [0, 2]}),
+    "the first person is None": ([[body(0, 0), body(0, 1)], [None, body(1, 1)], []],
+                                 {0: [0], 1: [0, 1]}),
+    "lists of people with ids": ([[body(0, 0, id=4), body(0, 1, id=9)], [body(1, 1, id=9)], []],
+                                 {4: [0], 9: [0, 1]}),
+    "ids deeper": ([{"people": [{"id": 9, "smpl": body(0, 1)}]},
+                    {"people": [{"id": 4, "smpl": body(1, 0)}, {"id": 9, "smpl": body(1, 1)}]}],
+                   {4: [1], 9: [0, 1]}),
+    "frames of each person": ({7: [body(frame, 0) for frame in range(3)],
+                               9: [body(frame, 1) for frame in range(2)]},
+                              {7: [0, 1, 2], 9: [0, 1]}),
+    "frames of one person": ({7: [body(0, 0), None, body(2, 0)]}, {7: [0, 2]}),
+    "people of each file": ({"0005.jpg": {1: body(5, 0), 2: body(5, 1)}, "0007.jpg":
+                             {2: body(7, 1)}}, {1: [5], 2: [5, 7]}),
+    # Frames with several rows
+    "rows with ids": ([stacked([(0, 0), (0, 1)], track_ids=np.array([4, 9])),
+                       stacked([(1, 1)], track_ids=np.array([9])), {},
+                       stacked([(3, 1), (3, 0)], track_ids=np.array([9, 4]))],
+                      {4: [0, 3], 9: [0, 1, 3]}),
+    "rows with a frame number": ([stacked([(5, 0), (5, 1)], frame=5), stacked([(8, 0)], frame=8)],
+                                 {0: [5, 8], 1: [5]}),
+    "rows of a longer list": ([stacked([(0, 0), (0, 1)]), stacked([(1, 0)]), stacked([(2, 0)])],
+                              {0: [0, 1, 2], 1: [0]}),
+    "detections without a track": ([body(0, 0, id=-1), body(1, 1, id=5), body(2, 1, id=5)],
+                                   {-1: [0], 5: [1, 2]}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("container", ["pickle", "json"])
+def test_people_keep_their_frames(name: str, container: str) -> None:
+    given, wanted = CASES[name]
+    if container == "json":
+        source = Source("a.json", json.dumps(plain(given)).encode())
+    else:
+        source = Source("a.pkl", joblib_file(given))
+    assert found_in(source)[0] == wanted
+
+
+def test_flat_arrays_have_people() -> None:
+    source = Source("a.npz", npz(**stacked(TWO, track_id=IDS)))
+    assert found_in(source)[0] == {4: [0, 1, 2], 9: [0, 1, 2]}
+
+
+def test_frames_at_the_ends_of_a_list_count() -> None:
+    source = Source("a.pkl", joblib_file([None, body(1, 0), {}, body(3, 0), []]))
+    assert found_in(source)[:3] == ({0: [1, 3]}, 0, 5)
+    (note,) = [n.message for n in source.diagnostics.warnings if n.key == "F007.frames-empty"]
+    assert note == "3 frames without people: frame 0, frame 2, frame 4"
+
+
+def test_a_list_of_missing_arrays_is_a_list_of_frames() -> None:
+    given = {"pose": [body(0, 0)["pose"], None, body(2, 0)["pose"]],
+             "cam_t": [body(0, 0)["trans"], [], body(2, 0)["trans"]]}  # fmt: skip
+    assert found_in(Source("a.pkl", joblib_file(given)))[0] == {0: [0, 2]}
+
+
+@pytest.mark.parametrize("key", ["fps", "frame_rate", "frameRate", "framerate", "mocap_framerate",
+                                 "mocap_frame_rate"])  # fmt: skip
+@pytest.mark.parametrize("value", [25, np.float32(25), np.array([25.0]), "25"])
+def test_frame_rates_are_found_around_the_parameters(key: str, value: Any) -> None:
+    given = {"info": {"smpl": stacked(ALONE)}, key: value}
+    assert found_in(Source("a.pkl", joblib_file(given)))[3] == 25.0
+
+
+@pytest.mark.parametrize(("rate", "found"), [(0.0, "0"), ("fast", "'fast'"), (float("nan"), "nan")])
+def test_other_frame_rates_are_reported(rate: Any, found: str) -> None:
+    source = Source("a.pkl", joblib_file({"smpl": stacked(ALONE), "fps": rate}))
+    assert found_in(source)[3] == 30.0
+    (note,) = [n.message for n in source.diagnostics.warnings if n.key == "F007.rate-ignored"]
+    assert note == f"fps: expected 1e-06 to 1,000,000 frames per second, found {found}: ignored"
+
+
+def test_people_without_numbers_or_names_are_refused() -> None:
+    given = {**SMPL, "track_id": [0.5] * 6, "frame_id": NUMBERS}
+    with pytest.raises(FormatError, match=r"track_id: expected a number or a name .* found 0.5"):
+        open_results(Source("a.pkl", joblib_file(given)))
