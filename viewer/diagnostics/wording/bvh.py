@@ -38,6 +38,9 @@ PHRASES = {
     "up-of-longest": "{up} up assumed: the rest skeleton is longest along {up}",
     "up-of-head": "{up} up assumed: the head is above the feet along {up}",
     "up-against-rest": "{up} up assumed, although the rest skeleton is upright along {axis}",
+    "up-of-frames": "{up} up assumed: the skeleton is upright along {up} in the frames, although "
+    "along {axis} in the rest pose",
+    "up-unclear": "no axis",
     "up-against-frames": "{up} up assumed, although the skeleton is upright along {axis} in the "
     "frames",
 }

@@ -31,6 +31,8 @@ _LONGEST = 5.0  # seconds; longer frame times are rates or milliseconds
 _DECIMALS = 9  # decimals of frame times in seconds that this program writes, however long
 _LONG = 2.0  # ratio of z extent to y extent above which z is up
 _UPRIGHT = 0.8  # minimum cosine of the angle between a standing body and an axis
+# Distance from the ground, and length of a path that is none, relative to the body.
+_NEAR, _STILL = 0.15, 1e-3
 _LOOKS = 16  # number of frames to examine
 _UPPER = ("head", "neck", "left_shoulder", "right_shoulder")
 _LOWER = ("left_ankle", "right_ankle", "left_knee", "right_knee")
@@ -114,9 +116,12 @@ def guess_unit(points: Floats) -> tuple[str, Facts, Phrase | None]:
 def guess_up(
     figure: Figure, clip: SampledClip, points: Floats
 ) -> tuple[Literal["y", "z"], Facts, tuple[Phrase, ...]]:
-    """Return the up axis of the rest skeleton: from feet to head, or along its longest side.
+    """Return the up axis: from feet to head in the rest skeleton, or along its longest side.
 
-    Animals are longer than high; y is up if their legs then reach the ground.
+    Animals are longer than high; y is up if their legs then reach the ground. If the skeleton is
+    upright along another axis in the frames, that one is up, because some programs rotate the root
+    of a skeleton with y up into a world with z up. A person who lies on the ground is no evidence:
+    see ``_lies``.
 
     Parameters
     ----------
@@ -151,17 +156,37 @@ def guess_up(
     joints = points[: skeleton.n_joints]
     rest = _axis(joints[upper].mean(axis=0) - joints[lower].mean(axis=0))
     up: Literal["y", "z"] = "z" if rest == "+z" else "y"
-    notes = []
-    if up == "z":
-        notes.append(Phrase("up-of-head", up="z"))
-    elif rest not in ("+y", ""):
-        notes.append(Phrase("up-against-rest", up="y", axis=rest))
     every = examined_frames(clip.timing.n_frames) / clip.timing.frame_rate
     posed = world_frames(figure, frames_of(figure, clip, every))[:, :, :3, 3]
-    stands = _axis((posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)).mean(axis=0))
+    heights = posed[:, upper].mean(axis=1) - posed[:, lower].mean(axis=1)
+    stands = _axis(heights.mean(axis=0))
     if stands in ("+y", "+z") and stands[1] != up:
-        notes.append(Phrase("up-against-frames", up=up, axis=stands))
-    return up, (("up", f"{up}, from the rest skeleton"),), tuple(notes)
+        other: Literal["y", "z"] = "z" if up == "y" else "y"
+        size = float(np.linalg.norm(heights, axis=1).mean())
+        if rest in ("+y", "+z") and _lies(posed, other, up, size):
+            notes = (Phrase("up-against-frames", up=up, axis=stands),)
+            return up, (("up", f"{up}, from the rest skeleton"),), notes
+        note = Phrase("up-of-frames", up=other, axis=rest or Phrase("up-unclear"))
+        return other, (("up", f"{other}, from the frames"),), (note,)
+    told = []
+    if up == "z":
+        told.append(Phrase("up-of-head", up="z"))
+    elif rest not in ("+y", ""):
+        told.append(Phrase("up-against-rest", up="y", axis=rest))
+    return up, (("up", f"{up}, from the rest skeleton"),), tuple(told)
+
+
+def _lies(posed: Floats, along: str, up: str, size: float) -> bool:
+    """Return whether a body along one axis lies on the ground of a world with another up axis.
+
+    A standing body moves with its feet near 0 along its own axis. A lying one is near 0 along the
+    up axis, and anywhere along its own. Without a path there is no evidence, and people stand.
+
+    ``posed`` (F, J, 3): joints in some frames, ``size``: the distance of legs and upper body.
+    """
+    moves = np.ptp(posed[:, 0], axis=0).max() > _STILL * size
+    lowest = np.abs(np.median(posed.min(axis=1), axis=0)) < _NEAR * size
+    return bool(moves and not lowest["xyz".index(along)] and lowest["xyz".index(up)])
 
 
 def _stands_on_four_legs(skeleton: Skeleton, points: Floats) -> bool:

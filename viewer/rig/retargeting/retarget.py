@@ -39,7 +39,7 @@ from viewer.rig.retargeting.rest_poses import (
     rest_of,
     up_rotation,
 )
-from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest
+from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
 from viewer.rig.skeleton import Skeleton, joint_label
 
 __all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
@@ -184,6 +184,9 @@ def retargeted(
     matches = match_joints(source, target, mapping, (motion.figure.name, figure.name))
     job = _job(motion, source, (target, figure.up), matches)
     rested: list[Diagnostic] = []
+    if not job.is_same:
+        motion = with_upright_rest(motion)
+        job = _job(motion, motion.figure.require_skeleton(), (target, figure.up), matches)
     if not (job.is_same and source_rest == "auto"):
         motion, rested = with_source_rest(motion, source_rest)
         job = _job(motion, motion.figure.skeleton or source, (target, figure.up), matches)

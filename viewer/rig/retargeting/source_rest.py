@@ -15,14 +15,15 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats
-from viewer.rig.geometry.rotation import matrix_to_quaternion
+from viewer.rig.geometry.quaternion import between
+from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.retargeting.anatomical_rest import anatomical_rest, upright_frames
 from viewer.rig.retargeting.limb_axes import limb_axes
 from viewer.rig.retargeting.postures import SIDES, Postures, postures_of, rest_posture
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["SourceRest", "rest_fault", "with_source_rest"]
+__all__ = ["SourceRest", "rest_fault", "with_source_rest", "with_upright_rest"]
 
 SourceRest = int | str
 """A frame number, ``"zero"`` for the zero pose, or ``"auto"``."""
@@ -32,6 +33,7 @@ _FOLDED = np.cos(np.radians(60.0))
 _NEAR = np.radians(20.0)  # maximum deviation of a bone from a T- or A-pose
 _A_POSE = np.radians(55.0)  # maximum angle of the arms of an A-pose below the horizontal
 _T_POSE = np.radians(20.0)  # maximum angle of the arms of a T-pose to the horizontal
+_UPRIGHT = np.cos(np.radians(40.0))  # maximum angle between the legs and an axis
 _ROLLED = np.cos(np.radians(60.0))  # maximum roll of the limbs in a T- or A-pose
 
 
@@ -102,6 +104,25 @@ def with_source_rest(
         key = "F007.rest-axes" if found.is_parallel else "F007.rest-lying"
         return _placed(motion, skeleton, found.rotations), [Diagnostic(key, values=called)]
     return _estimated(motion, skeleton, upright)
+
+
+def with_upright_rest(motion: SkeletonMotion) -> SkeletonMotion:
+    """Return a motion whose rest pose stands along the up axis; the motion itself is unchanged.
+
+    Some programs rotate the root of a skeleton with y up into a world with z up, in which its rest
+    pose lies. Skeletons whose legs are not along an axis, or have no known names, are unchanged.
+    """
+    skeleton, up = motion.figure.skeleton, np.eye(3)["xyz".index(motion.figure.up)]
+    still = None if skeleton is None else rest_posture(skeleton, motion.figure.up)
+    if skeleton is None or still is None:
+        return motion
+    legs = sum(still.direction(f"{side}_ankle", f"{side}_hip")[0] for side in SIDES)
+    axis = int(np.abs(legs).argmax())
+    stands = np.sign(legs[axis]) * np.eye(3)[axis]
+    if legs @ stands < _UPRIGHT * np.linalg.norm(legs) or stands @ up == 1.0:
+        return motion
+    turn = quaternion_to_matrix(between(stands, up))
+    return _placed(motion, skeleton, turn @ still.rotations[0])
 
 
 def _estimated(
