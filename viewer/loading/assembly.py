@@ -22,7 +22,7 @@ from viewer.loading.settings import MotionSettings
 from viewer.loading.unused_options import unused_options
 from viewer.rig.arrays import Bytes
 from viewer.rig.figure import Figure
-from viewer.rig.mesh import first_person_parts
+from viewer.rig.mesh import hidden_parts
 from viewer.rig.scene import Actor, Scene
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def begin(
             figure,
             called=cast.free_title(called),
             origin=origin,
-            hidden_parts=first_person_parts(figure.mesh),
+            hidden_parts=hidden_parts(figure.mesh),
         )
         cast.add(actor, figure.up, placed=False, group=group_of.get(figure))
     _give_morphs(contents, cast)

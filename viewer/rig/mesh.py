@@ -20,7 +20,7 @@ __all__ = [
     "area_vectors",
     "bounding_box",
     "box_size",
-    "first_person_parts",
+    "hidden_parts",
     "split_seams",
     "triangle_areas",
     "vertex_normals",
@@ -30,8 +30,8 @@ __all__ = [
     "without_seams",
 ]
 
-PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person"]
-"""Whether a part is drawn from outside, from the character's eyes, or in both views.
+PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person", "hidden"]
+"""Whether a part is drawn from outside, from the character's eyes, in both views, or in none.
 
 ``"auto"`` parts are drawn from outside and, unless they have triangles that move with the head,
 from the eyes.
@@ -388,7 +388,7 @@ def area_vectors(positions: Floats, triangles: Ints) -> Floats:
     return np.cross(b - a, c - a)
 
 
-def first_person_parts(mesh: Mesh | None) -> frozenset[int]:
+def hidden_parts(mesh: Mesh | None) -> frozenset[int]:
     """Return the parts that are not drawn from outside, and therefore start hidden."""
     views = () if mesh is None else mesh.part_views
-    return frozenset(part for part, view in enumerate(views) if view == "first-person")
+    return frozenset(part for part, view in enumerate(views) if view in ("first-person", "hidden"))

@@ -58,6 +58,13 @@ def skinned_child() -> File:
     return file
 
 
+def only_lines() -> File:
+    file = File(nodes=[{"mesh": 0}])
+    file.mesh()
+    file.primitive["mode"] = 1
+    return file
+
+
 PLANTED = {
     "G001": (without_asset, ""),
     "G002": (misaligned, "/accessors/0"),
@@ -65,6 +72,7 @@ PLANTED = {
     "G004": (joint_twice, "/skins/0/joints"),
     "G005": (keys_at_one_time, "/animations/0/samplers"),
     "G006": (unknown_bone, "/extensions/VRMC_vrm/humanoid/humanBones"),
+    "F008": (only_lines, ""),
     "G007": (skinned_child, "/nodes/0"),
 }
 """A function that creates the document, and the JSON pointer to its error."""

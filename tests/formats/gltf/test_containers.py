@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from formats.gltf.files import File, glb, read, refused, source_of, warned
 
+import viewer
 from viewer.errors import FormatError
 from viewer.formats import Source
 from viewer.formats._gltf.json_text import parsed
@@ -39,12 +40,41 @@ def test_unknown_chunks_are_skipped_and_repeated_chunks_reported() -> None:
     text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
     chunks = [(b"JSON", text), (b"NOTE", b"?"), (b"BIN\0", file.binary), (b"BIN\0", b"more")]
     assert len(read(glb(chunks)).meshes[0].primitives[0].positions) == 3
-    assert warned(glb(chunks)) == [("G001.chunk-again", "")]
+    assert warned(glb(chunks)) == [("G001.chunk-again", ""), ("G001.chunk-order", "")]
+
+
+@pytest.mark.parametrize(
+    ("order", "message"),
+    [
+        ((1, 0), "expected the JSON chunk as the first one, found BIN"),
+        ((0, 2, 1), "expected the BIN chunk as the second one, found NOTE"),
+        ((2, 0, 1), "expected the JSON chunk as the first one, found NOTE"),
+        ((0, 1, 2), ""),
+    ],
+)
+def test_chunks_in_another_order_are_reported(order: tuple[int, ...], message: str) -> None:
+    file = triangle()
+    text = json.dumps({**file.root, "buffers": [{"byteLength": 36}]}).encode()
+    chunks = (b"JSON", text + b" " * (-len(text) % 4)), (b"BIN\0", file.binary), (b"NOTE", b"abcd")
+    source = source_of(glb([chunks[place] for place in order]))
+    assert len(read_nodes(source).meshes) == 1
+    assert [found.message for found in source.diagnostics] == ([message] if message else [])
+
+
+def test_numbers_beyond_double_precision_are_reported() -> None:
+    text = b'{"asset": {"version": "2.0"}, "extras": [1e999, -1E+400, 1e308, 1]}'
+    source = source_of(text)
+    read_nodes(source)
+    (found,) = source.diagnostics
+    assert found.message == "2 numbers too large for double precision (first: 1e999)"
 
 
 @pytest.mark.parametrize("padding", [b"\0\0\0", b"   ", b"\n\t\0"])
 def test_json_chunk_may_be_padded_with_white_space_or_zeros(padding: bytes) -> None:
-    assert read(glb([(b"JSON", TEXT + padding)])).tree.names == ("a",)
+    data = glb([(b"JSON", TEXT + padding)])
+    assert read(data).tree.names == ("a",)
+    is_odd = padding.endswith(b"\0")
+    assert warned(data) == ([("G001.padding", "")] if is_odd else [])
 
 
 def test_chunks_after_padding_outside_the_chunk_length_are_found() -> None:
@@ -232,5 +262,38 @@ def test_unknown_extensions_are_refused_if_required_and_reported_if_used() -> No
     file = File(extensionsUsed=["ODD_a", "KHR_mesh_quantization", "ODD_b"])
     assert warned(file) == [("F007.gltf-extensions", "/extensionsUsed")]
     file.root["extensionsRequired"] = ["KHR_mesh_quantization", "ODD_b"]
-    with pytest.raises(FormatError, match=r"found ODD_b$"):
+    with pytest.raises(FormatError, match=r"found ODD_b, without which "):
         read(file)
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["KHR_materials_clearcoat", "KHR_texture_basisu", "EXT_lights_ies", "KHR_audio", "MSFT_lod"],
+)
+def test_required_extensions_of_the_look_are_reported(name: str) -> None:
+    file = triangle()
+    file.root["extensionsUsed"] = file.root["extensionsRequired"] = [name]
+    source = source_of(file)
+    assert len(read_nodes(source).meshes) == 1
+    (found,) = source.diagnostics
+    assert (found.key, found.pointer) == ("F007.gltf-look", "/extensionsRequired")
+    assert found.message.startswith(f"{name} not shown")
+
+
+def test_hidden_nodes_are_not_drawn(tmp_path: Path) -> None:
+    file = triangle()
+    hidden = {"KHR_node_visibility": {"visible": False}}
+    file.root["nodes"] = [
+        {"name": "shown", "mesh": 0, "extensions": {"KHR_node_visibility": {"visible": True}}},
+        {"name": "above", "children": [2], "extensions": hidden},
+        {"name": "below", "mesh": 0, "translation": [5, 0, 0]},
+    ]
+    file.root["extensionsUsed"] = file.root["extensionsRequired"] = ["KHR_node_visibility"]
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    scene = viewer.load(path)
+    (note,) = [found for found in scene.diagnostics if found.key == "F007.gltf-hidden"]
+    assert note.message == "1 node is hidden by KHR_node_visibility: below"
+    (actor,) = scene.actors
+    names = [actor.figure.mesh.parts[part] for part in actor.hidden_parts]
+    assert names == ["below"]

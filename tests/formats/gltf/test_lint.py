@@ -3,7 +3,7 @@
 from pathlib import Path
 
 import pytest
-from formats.gltf.files import animated, skinned
+from formats.gltf.files import File, animated, skinned
 from formats.gltf.planted_gltf import PLANTED
 from formats.gltf.validator_faults import FAULTS
 
@@ -18,7 +18,7 @@ def test_planted_error_is_found(tmp_path: Path, code: str) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
     found = [finding for finding in lint_files([path])[1] if finding.code == code]
-    severity = "note" if code == "G007" else "warning"
+    severity = {"G007": "note", "F008": "error"}.get(code, "warning")
     assert (severity, path, pointer) in {(one.severity, one.file, one.pointer) for one in found}
 
 
@@ -26,6 +26,41 @@ def test_valid_file_has_none_of_these_codes(tmp_path: Path) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(skinned().json())
     assert {finding.code for finding in lint_files([path])[1]}.isdisjoint(PLANTED)
+
+
+@pytest.mark.parametrize(
+    ("n_bound", "messages"),
+    [
+        (0, ["skin of a mesh without joints and weights: not used"]),
+        (1, ["used only by its 1 primitive without joints and weights"]),
+        (2, ["transform of a node with a skinned mesh: not used"]),
+    ],
+)
+def test_transform_of_a_skinned_node_is_used_by_rigid_primitives(
+    tmp_path: Path, n_bound: int, messages: list[str]
+) -> None:
+    file = skinned()
+    bound = file.primitive
+    rigid = {"attributes": {"POSITION": bound["attributes"]["POSITION"]}}
+    file.root["meshes"][0]["primitives"] = [bound] * n_bound + [rigid] * (2 - n_bound)
+    file.root["nodes"][0]["translation"] = [1, 0, 0]
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    found = [one.message for one in lint_files([path])[1] if one.code == "G003"]
+    assert len(found) == len(messages)
+    assert all(text in one for one, text in zip(found, messages, strict=True))
+
+
+def test_contents_without_a_figure_are_named(tmp_path: Path) -> None:
+    lens = {"type": "perspective", "perspective": {"yfov": 1, "znear": 0.1}}
+    file = File(nodes=[{"camera": 0}, {"mesh": 0}], cameras=[lens])
+    file.mesh()
+    file.primitive["mode"] = 3
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    (found,) = [one for one in lint_files([path])[1] if one.severity == "error"]
+    assert found.code == "F008"
+    assert "found only 1 primitive of lines, 1 camera, 2 nodes" in found.message
 
 
 def test_several_errors_are_found(tmp_path: Path) -> None:

@@ -199,7 +199,7 @@ def test_empty_file_is_refused_and_a_skeleton_is_read():
 def test_files_with_only_points_or_lines_are_refused_as_such():
     with pytest.raises(FormatError) as caught:
         figures_of(file_of(tree_of({"name": "cloud", "mesh": 0}), meshes=(NodeMesh("", ()),)))
-    assert caught.value.diagnostic.key == "F002.no-triangles"
+    assert caught.value.diagnostic.key == "F002.no-figure"
     with pytest.raises(FormatError) as caught:
         figures_of(file_of(tree_of({"name": "a"}), meshes=(mesh(triangle(0)),)))
     assert caught.value.diagnostic.key == "F002.no-figure"

@@ -48,9 +48,12 @@ MESSAGES = {
     "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer number",
     "G001.chunk-again": "ignored another {kind:text} chunk",
     "G001.chunk-length": "{kind:text} chunk: expected {expected:#byte}, found {found}",
+    "G001.chunk-order": "expected the {first:text} chunk as the {place} one, found {found:text}",
+    "G001.padding": "JSON chunk padded with zeros instead of spaces",
     "G001.trailing": "ignored {n:#byte} after the last chunk",
     "G001.length": "expected {expected:#byte} as declared by the header, found {found}",
     "G001.constants": "{n:#number} invalid in JSON (first: {found})",
+    "G001.overflow": "{n:#number} too large for double precision (first: {found:text})",
     "G001.repeated": "{n:#repeated key} (first: {found:quoted}): only the last value is used",
     "G001.nulls": "{n:#member} that {n:?is|are} null: ignored",
     "G001.text": "invalid UTF-8 at byte {at} of the JSON: replaced",
@@ -88,7 +91,11 @@ MESSAGES = {
     "G002.normalized": "expected normalised integers, found none marked as normalised: normalised",
     # Document
     "G001.no-asset": "expected an asset with a version, found none: read as glTF 2.0",
-    "F002.gltf-extensions": "expected only supported extensions, found {names:list12}",
+    "F002.gltf-extensions": "expected supported extensions, found {names:list12}, without which "
+    "the file may have another shape or motion",
+    "F007.gltf-look": "{names:list12} not shown: surfaces and motions do not depend on "
+    "{n:?it|them}",
+    "F007.gltf-hidden": "{n:#node|is|are} hidden by KHR_node_visibility: {names:list12}",
     "F007.gltf-extensions": "ignored unsupported {names:list12}",
     "F007.gltf-lights": "{n:#light} not used",
     "F007.gltf-scenes": "{n} scenes: only {found:quoted} is shown",
@@ -137,6 +144,8 @@ MESSAGES = {
     "G003.no-influences": "skin of a mesh without joints and weights: not used",
     "G003.no-skin": "mesh with joints and weights, but no skin: not deformed",
     "G003.unused-transform": "transform of a node with a skinned mesh: not used",
+    "G003.partly-used": "transform of a node with a skinned mesh: used only by its "
+    "{n:#primitive} without joints and weights",
     "G004.no-common-root": "expected joints with a common root, found joints below nodes "
     "{nodes:list12}",
     "G004.not-a-root": "expected a common ancestor of all joints, found node {node}, with "
@@ -173,4 +182,15 @@ MESSAGES = {
     "G005.channel-twice": "ignored second channel for {path:text} of node {node}",
 }
 
-PHRASES: dict[str, str] = {}
+PHRASES = {
+    "gltf-points": "{n:#primitive} of points",
+    "gltf-lines": "{n:#primitive} of lines",
+    "gltf-triangles": "{n:#primitive} of triangles that no node shows",
+    "gltf-cameras": "{n:#camera}",
+    "gltf-nodes": "{n:#node}",
+    "gltf-skins": "{n:#skin}",
+    "gltf-animations": "{n:#animation}",
+    "gltf-materials": "{n:#material}",
+    "gltf-images": "{n:#image}",
+    "gltf-lights": "{n:#light}",
+}

@@ -2,7 +2,8 @@
 
 MESSAGES = {
     "F002.no-figure": "expected meshes, skins or a hierarchy of nodes, found nothing to show",
-    "F002.no-triangles": "expected meshes with triangles, found only points, lines or empty meshes",
+    "F008.contents": "expected triangles, a skin or a hierarchy of nodes, found only "
+    "{contents:list}",
     "F002.many-vertices": "expected at most {most} vertices, found {found} over all nodes",
     "F007.flat-normals": "{n:#primitive} without normals: flat shaded, with {vertices:#additional "
     "vertex} along the edges",

@@ -19,6 +19,7 @@ CODES = {
     "F005": Code("warning", "missing texture or material library", "put it next to the file"),
     "F006": Code("warning", "unknown content", "remove it or correct its name"),
     "F007": Code("note", "note about a file", "none if intentional"),
+    "F008": Code("error", "nothing that the viewer shows", "open a file with a mesh or a skeleton"),
 }
 
 _NUMBER = "{item}: expected a number, found {found:quoted}"

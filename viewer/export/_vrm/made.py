@@ -23,6 +23,7 @@ _VIEWS: dict[PartView, str] = {
     "both": "both",
     "first-person": "firstPersonOnly",
     "third-person": "thirdPersonOnly",
+    "hidden": "auto",
 }
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._nodes.ancestors import path_to_root
+from viewer.formats._nodes.ancestors import descendants, roots_of
 from viewer.formats._nodes.content import NodeMesh, NodeSkin, NodeTree
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["check_conformance"]
 
@@ -33,9 +33,10 @@ def check_conformance(
     """
     _check_bounds(document)
     _check_primitives(document)
+    roots = roots_of(tree.parents)
     for index, skin in enumerate(skins):
         if len(skin.joints):
-            _check_hierarchy(document.table("skins")[index], skin, tree.parents.tolist())
+            _check_hierarchy(document.table("skins")[index], skin, tree.parents, roots)
     _check_nodes(document, tree, meshes)
     animations = document.table("animations")
     for index in range(len(animations)):
@@ -114,35 +115,39 @@ def _has_bounds(accessor: Element) -> bool:
     return accessor.has("min") and accessor.has("max")
 
 
-def _check_hierarchy(skin: Element, read: NodeSkin, parents: list[int]) -> None:
+def _check_hierarchy(skin: Element, read: NodeSkin, parents: Ints, roots: Ints) -> None:
     """Check that the joints have a common root, and that ``skeleton`` is one if it is declared."""
-    ancestors = [path_to_root(parents, joint) for joint in read.joints.tolist()]
-    roots = {chain[-1] for chain in ancestors}
-    if len(roots) > 1:
-        skin.warn("G004.no-common-root", "joints", nodes=sorted(roots))
+    found = np.unique(roots[read.joints]).tolist()
+    if len(found) > 1:
+        skin.warn("G004.no-common-root", "joints", nodes=found)
     declared = skin.values.get("skeleton")
     if type(declared) is int and 0 <= declared < len(parents):
-        outside = sum(declared not in chain for chain in ancestors)
+        outside = int((~descendants(parents, declared)[read.joints]).sum())
         if outside:
             skin.warn("G004.not-a-root", "skeleton", node=declared, n=outside)
 
 
 def _check_nodes(document: Document, tree: NodeTree, meshes: tuple[NodeMesh, ...]) -> None:
     """Check nodes with a mesh: skins without influences, influences without a skin."""
-    is_bound = [any(part.joints is not None for part in mesh.primitives) for mesh in meshes]
+    n_bound = [sum(part.joints is not None for part in mesh.primitives) for mesh in meshes]
     is_drawn = [bool(mesh.primitives) for mesh in meshes]
     identity = (0.0,) * 6 + (1.0,) * 4
     for node in np.flatnonzero(tree.meshes >= 0).tolist():
         mesh, element = int(tree.meshes[node]), document.table("nodes")[node]
         if tree.skins[node] < 0:
-            if is_bound[mesh]:
+            if n_bound[mesh]:
                 element.warn("G003.no-skin")
             continue
-        if is_drawn[mesh] and not is_bound[mesh]:
+        if is_drawn[mesh] and not n_bound[mesh]:
             element.warn("G003.no-influences", "skin")
+            continue
         local = (*tree.translations[node], *tree.rotations[node], *tree.scales[node])
         if node in tree.matrices or not np.allclose(local, identity, atol=1e-6):
-            element.warn("G003.unused-transform")
+            n_rigid = len(meshes[mesh].primitives) - n_bound[mesh]
+            if n_rigid:
+                element.warn("G003.partly-used", n=n_rigid)
+            else:
+                element.warn("G003.unused-transform")
 
 
 def _check_animation(document: Document, animation: Element) -> None:

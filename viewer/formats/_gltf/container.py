@@ -62,7 +62,17 @@ def open_container(source: Source) -> Container:
         chunks.setdefault(kind, content)
     if _JSON not in chunks:
         raise source.fault("F002.glb-json")
-    return Container(parsed(source, bytes(chunks[_JSON]), has_lines=False), chunks.get(_BINARY))
+    kinds = [*chunks]
+    for place, kind in (("first", _JSON), ("second", _BINARY)):
+        found = kinds[0 if place == "first" else min(1, len(kinds) - 1)]
+        if kind in chunks and found != kind:
+            titles = _title(kind), _title(found)
+            source.warn("G001.chunk-order", first=titles[0], place=place, found=titles[1])
+            break
+    text = bytes(chunks[_JSON])
+    if text.endswith(b"\0"):
+        source.warn("G001.padding")
+    return Container(parsed(source, text, has_lines=False), chunks.get(_BINARY))
 
 
 def _chunks(source: Source) -> Iterator[tuple[bytes, memoryview]]:

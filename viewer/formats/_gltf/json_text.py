@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import gc
 import json
+import math
+import re
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,6 +22,7 @@ _PADDING = b" \t\r\n\0"  # some writers pad the JSON chunk with zeros instead of
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _MOST_BYTES = 512 << 20  # maximum size of the text; parsing takes three times as much memory
 _THOROUGH = 1 << 20  # size in bytes up to which a text is always searched for repeated keys
+_HUGE = re.compile(r"\d[eE]\+?\d{3}|\d{309}")  # parts of numbers that may exceed float64
 _UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -45,10 +48,17 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     text = _text(source, data.rstrip(_PADDING).removeprefix(_BYTE_ORDER_MARK))
     constants: list[str] = []
     repeated: list[str] = []
+    overflows: list[str] = []
 
     def constant(word: str) -> float:
         constants.append(word)
         return float(word)
+
+    def number(word: str) -> float:
+        value = float(word)
+        if math.isinf(value):
+            overflows.append(word)
+        return value
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         values = dict(pairs)
@@ -60,7 +70,11 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     # The search for repeated keys takes half as long as parsing.
     looks = len(text) < _THOROUGH or source.diagnostics.keeps_errors
     hook = unique if looks else None
-    decoder = json.JSONDecoder(object_pairs_hook=hook, parse_constant=constant)
+    # Python calls a function for each number only if this is needed, because it is slow.
+    of_numbers = number if _HUGE.search(text) else None
+    decoder = json.JSONDecoder(
+        object_pairs_hook=hook, parse_constant=constant, parse_float=of_numbers
+    )
     try:
         with _collection_suspended():
             root = decoder.decode(text)
@@ -76,6 +90,8 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
         raise source.fault("F002.gltf-type", wanted="an object", found=describe(root))
     if constants:
         source.warn("G001.constants", n=len(constants), found=constants[0])
+    if overflows:
+        source.warn("G001.overflow", n=len(overflows), found=overflows[0])
     if repeated:
         source.warn("G001.repeated", n=len(repeated), found=repeated[0])
     if "null" in text and (n_nulls := _remove_nulls(root)):

@@ -25,14 +25,14 @@ from viewer.formats._gltf.bindings import checked_bindings
 from viewer.formats._gltf.cameras import read_cameras
 from viewer.formats._gltf.conformance import check_conformance
 from viewer.formats._gltf.document import Document, open_document
-from viewer.formats._gltf.extensions import check_extensions
+from viewer.formats._gltf.extensions import check_extensions, hidden_nodes
 from viewer.formats._gltf.meshes import read_meshes
 from viewer.formats._gltf.nodes import read_tree
 from viewer.formats._gltf.scenes import shown_roots, shown_scene
 from viewer.formats._gltf.skins import read_skins
 from viewer.formats._gltf.target_paths import Targets
 from viewer.formats._gltf.targets import node_weights
-from viewer.formats._gltf.unkept import unkept_members
+from viewer.formats._gltf.unkept import contents_of, unkept_members
 from viewer.formats._gltf_materials.materials import DEFAULT_MATERIAL, reading_materials
 from viewer.formats._gltf_materials.stored import stored_textures, stored_toon
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeSkin, NodeTree
@@ -84,11 +84,13 @@ def read_nodes(source: Source) -> NodeFile:
         materials=materials,
         animations=animations,
         cameras=read_cameras(document),
+        part_views=dict.fromkeys(hidden_nodes(document, tree), "hidden"),
         extensions=extensions,
         extras=root.values.get("extras"),
         asset=_object(document, "asset"),
         scene=shown_scene(document),
         unkept=partial(unkept_members, root.values),
+        contents=partial(contents_of, root.values),
         has_pointers=True,
         toon=stored_toon(document) if is_vrm else {},
         textures=stored_textures(document) if is_vrm else None,

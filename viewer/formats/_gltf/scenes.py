@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.formats._gltf.document import Document
 from viewer.formats._gltf.elements import Element
-from viewer.formats._nodes.ancestors import path_to_root
+from viewer.formats._nodes.ancestors import roots_of
 from viewer.formats._nodes.content import NodeTree
 
 __all__ = ["shown_roots", "shown_scene"]
@@ -53,4 +53,4 @@ def _roots(scene: Element, tree: NodeTree) -> tuple[int, ...]:
     if children:
         scene.warn("G003.scene-child", "nodes", n=len(children), found=children[0])
     # Transforms of the ancestors apply, so the tree is shown from its root.
-    return tuple(dict.fromkeys(path_to_root(tree.parents, node)[-1] for node in nodes))
+    return tuple(dict.fromkeys(roots_of(tree.parents)[nodes].tolist()))

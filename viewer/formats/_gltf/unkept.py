@@ -1,18 +1,21 @@
-"""Members of a glTF document that are not read, and so are not written back."""
+"""Members of a glTF document that are not read, and contents of a document without a figure."""
 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
+from viewer.diagnostics import Phrase
 from viewer.formats._gltf.extensions import KEPT_EXTENSIONS
 
-__all__ = ["unkept_members"]
+__all__ = ["contents_of", "unkept_members"]
 
 _EXTRAS, _EXTENSIONS = "extras", "extensions"
 # Lists whose items have application data that is written back.
 _KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
+_DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
 
 
@@ -39,6 +42,25 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
         elif isinstance(listed, list):
             found |= dict.fromkeys(_members(kind, listed, kind in _KEPT))
     return tuple(found)
+
+
+def contents_of(root: dict[str, Any]) -> tuple[Phrase, ...]:
+    """Return what a document holds, with numbers, as parts of a message."""
+    counts: Counter[str] = Counter()
+    for mesh in _objects(root.get("meshes")):
+        for primitive in _objects(mesh.get("primitives")):
+            counts[_DRAWN.get(primitive.get("mode", 4), "triangles")] += 1
+    found = {f"gltf-{kind}": counts[kind] for kind in ("points", "lines", "triangles")}
+    for kind in ("cameras", "nodes", "skins", "animations", "materials", "images"):
+        found[f"gltf-{kind}"] = len(_objects(root.get(kind)))
+    extensions = root.get(_EXTENSIONS)
+    told = extensions.get("KHR_lights_punctual") if isinstance(extensions, dict) else None
+    found["gltf-lights"] = len(_objects(told.get("lights"))) if isinstance(told, dict) else 0
+    return tuple(Phrase(key, n=n) for key, n in found.items() if n)
+
+
+def _objects(listed: Any) -> list[dict[str, Any]]:
+    return [each for each in listed if isinstance(each, dict)] if isinstance(listed, list) else []
 
 
 def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:

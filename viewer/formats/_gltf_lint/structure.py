@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from viewer.formats._gltf_lint.findings import Report, items_of
-from viewer.formats._nodes.ancestors import path_to_root
+from viewer.formats._nodes.ancestors import roots_of
 from viewer.formats._nodes.content import NodeSkin, NodeTree
 from viewer.formats._vrm.json_parts import listed, part
 
@@ -82,7 +82,7 @@ def _check_skinned(
     root: dict[str, Any], tree: NodeTree, skins: tuple[NodeSkin, ...], report: Report
 ) -> None:
     """Check that skinned meshes are roots, in a scene with their joints."""
-    parents = tree.parents.tolist()
+    parents, tops = tree.parents.tolist(), roots_of(tree.parents)
     scenes = [
         {node for node in listed(scene, "nodes") if isinstance(node, int)}
         for _, scene in items_of(root, "scenes")
@@ -92,7 +92,7 @@ def _check_skinned(
             found = f"a child of node {parents[node]}, whose transform has no effect"
             report("G007.skinned-child", "a root", found, ("nodes", node))
         joints = skins[int(tree.skins[node])].joints.tolist()
-        top, roots = path_to_root(parents, node)[-1], {path_to_root(parents, j)[-1] for j in joints}
+        top, roots = int(tops[node]), set(tops[joints].tolist())
         shown = [scene for scene in scenes if top in scene]
         if shown and not any(scene >= roots for scene in shown):
             wanted = "joints in the scene of the mesh"

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.diagnostics import Phrase
 from viewer.formats._nodes.morph_targets import MorphTargets
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.constraints.constraint import Constraint
@@ -316,6 +317,8 @@ class NodeFile:
         Name and application data of the scene that is shown, as parsed from JSON.
     unkept : callable
         Returns the members of the file that are not read, such as ``images.extras``.
+    contents : callable
+        Returns what the file holds, as parts of a message; empty if unknown.
     humanoid : dict of int
         Node of each human bone, by its name in VRM 1.0; empty if the file states none.
     expressions : tuple of NodeExpression
@@ -353,6 +356,7 @@ class NodeFile:
     asset: Mapping[str, Any] = field(default_factory=dict)
     scene: Mapping[str, Any] = field(default_factory=dict)
     unkept: Callable[[], tuple[str, ...]] = tuple
+    contents: Callable[[], tuple[Phrase, ...]] = tuple
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()
     constraints: tuple[Constraint, ...] = ()

@@ -48,7 +48,10 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     """
     groups = group_nodes(file)
     if not groups:
-        raise source.fault("F002.no-triangles" if _is_undrawn(file, source) else "F002.no-figure")
+        contents = file.contents()
+        if contents and not source.diagnostics.errors:
+            raise source.fault("F008.contents", contents=contents)
+        raise source.fault("F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
     found = [_figure(file, members, readers, source) for members in groups]
@@ -62,12 +65,6 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
-
-
-def _is_undrawn(file: NodeFile, source: Source) -> bool:
-    """Return whether the file has meshes, but none with triangles, although all are valid."""
-    has_triangles = any(mesh.primitives for mesh in file.meshes)
-    return bool(file.meshes) and not has_triangles and not source.diagnostics.errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

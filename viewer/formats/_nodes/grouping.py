@@ -8,9 +8,9 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.formats._nodes.ancestors import with_ancestors
+from viewer.formats._nodes.ancestors import roots_of, with_ancestors
 from viewer.formats._nodes.content import NodeFile, NodeMesh, NodeTree
-from viewer.rig.arrays import Bools, Ints
+from viewer.rig.arrays import Bools
 
 __all__ = ["Members", "group_nodes", "is_skinned", "scene_order"]
 
@@ -69,7 +69,7 @@ def group_nodes(file: NodeFile) -> list[Members]:
 
 def scene_order(file: NodeFile) -> list[int]:
     """Return the nodes of the scene that is shown, parents first."""
-    roots = _roots(file.tree)
+    roots = roots_of(file.tree.parents)
     return _preorder(file.tree, dict.fromkeys(int(roots[root]) for root in file.roots))
 
 
@@ -80,7 +80,7 @@ class _Grouping:
         self.file, self.tree = file, file.tree
         self.parents: list[int] = file.tree.parents.tolist()
         self.meshes: list[int] = file.tree.meshes.tolist()
-        self.roots = _roots(file.tree)
+        self.roots = roots_of(file.tree.parents)
         self.is_identity = _identities(file.tree)
         self.moved = set(file.humanoid.values()) | file.named_nodes
         self.moved.update(*(animation.nodes for animation in file.animations))
@@ -261,16 +261,6 @@ class _Grouping:
             skins = (self.file.skins[number] for number in figure.skins)
             of_skins = (skin.name for skin in skins if skin.name and top in skin.joints)
             figure.name = next(of_skins, self.tree.names[top] if top >= 0 else "")
-
-
-def _roots(tree: NodeTree) -> Ints:
-    """Return the root of each node: (N,), by pointer doubling."""
-    above: Ints = np.where(tree.parents < 0, np.arange(tree.n_nodes, dtype=np.int32), tree.parents)
-    while True:
-        next_above = above[above]
-        if np.array_equal(next_above, above):
-            return above
-        above = next_above
 
 
 def _identities(tree: NodeTree) -> Bools:

@@ -83,7 +83,10 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
                 file,
                 humanoid=read_humanoid(source, file, told, version, pointer),
                 expressions=_expressions(source, file, told, version, pointer),
-                part_views=read_part_views(file, told, version, pointer, source),
+                part_views={
+                    **read_part_views(file, told, version, pointer, source),
+                    **file.part_views,
+                },
             )
             return replace(file, facts=(*_facts(told), *_contents(file)))
     return replace(file, facts=_contents(file))
