@@ -282,6 +282,34 @@ def test_pipe_is_refused_without_reading(tmp_path):
     assert refusal(path) == f"{path}: expected a file, found a pipe"
 
 
+@pytest.mark.skipif(not Path("/dev/fd").exists(), reason="needs /dev/fd")
+def test_pipe_that_the_program_was_given_is_read_once(tmp_path):
+    """A shell passes ``<(…)`` as an open descriptor, which delivers its bytes only once."""
+    text = b"balljoint root { balljoint tip { offset 1 0 0 } }"
+    for path in (None, tmp_path / "link"):
+        reading, writing = os.pipe()
+        os.write(writing, text)
+        os.close(writing)
+        place = Path(f"/dev/fd/{reading}")
+        if path is not None:
+            path.symlink_to(place)
+            place = path
+        first, again = (viewer.load(place).actors[0].figure for _ in range(2))
+        assert first.skeleton.names == again.skeleton.names == ("root", "tip")
+        os.close(reading)
+
+
+@pytest.mark.skipif(not Path("/dev/fd").exists(), reason="needs /dev/fd")
+def test_endless_pipe_is_refused_at_the_size_limit():
+    reading, writing = os.pipe()
+    os.write(writing, b"a" * 100)
+    path = f"/dev/fd/{reading}"
+    with pytest.raises(FormatError, match="expected at most 99 bytes, found more"):
+        viewer.load(path, max_size=99)
+    os.close(reading)
+    os.close(writing)
+
+
 def test_device_is_refused_without_reading():
     assert refusal("/dev/zero") == "/dev/zero: expected a file, found a device"
 

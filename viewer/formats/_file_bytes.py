@@ -9,6 +9,7 @@ from pathlib import Path
 
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
+from viewer.interrupts import raising
 
 __all__ = [
     "FOLDER",
@@ -18,6 +19,7 @@ __all__ = [
     "read_bytes",
     "read_head",
     "read_part",
+    "read_pipe",
     "unreadable",
 ]
 
@@ -30,6 +32,9 @@ FOLDER = "a folder"
 # Maximum number of names in a folder that are compared with the name of a missing file.
 _MOST_FILES = 2000
 _ALIKE = 0.8  # minimum similarity; high, because many file names share a suffix and more
+_MOST_LINKS = 8  # links to a descriptor: /dev/stdin has one, and users may add some
+_DESCRIPTORS = ("/dev/fd", "/proc/self/fd")
+_PIECE = 1 << 20  # bytes read from a pipe at once
 _KINDS = {
     stat.S_IFDIR: FOLDER,
     stat.S_IFIFO: "a pipe",
@@ -71,6 +76,58 @@ def kind_of(path: Path, max_size: int) -> str | None:
     if status.st_size > max_size:
         values = {"most": max_size, "size": status.st_size}
         raise FormatError(Diagnostic("F001.too-large", path, values=values))
+    return None
+
+
+def read_pipe(path: Path, max_size: int) -> bytes | None:
+    """Return what a pipe that this process was given delivers; None for any other file.
+
+    Such a pipe is an open descriptor: ``/dev/stdin``, or ``/dev/fd/63`` of ``<(…)`` in a shell. It
+    can be read only once, so its bytes are kept for all readers. Other pipes in the file system are
+    not read: without a writer, opening one waits forever.
+
+    Raises
+    ------
+    FormatError
+        If more than ``max_size`` bytes arrive, or the pipe cannot be read.
+    """
+    number = _descriptor(path)
+    try:
+        status = None if number is None else os.fstat(number)
+    except OSError:
+        status = None
+    if number is None or status is None or not stat.S_ISFIFO(status.st_mode):
+        return None
+    key = status.st_dev, status.st_ino
+    if key not in _piped:
+        parts, size = [], 0
+        try:
+            with raising():
+                while part := os.read(number, _PIECE):
+                    parts.append(part)
+                    size += len(part)
+                    if size > max_size:
+                        values = {"most": max_size, "size": "more"}
+                        raise FormatError(Diagnostic("F001.too-large", path, values=values))
+        except OSError as problem:
+            raise _unreadable(path, problem) from None
+        _piped[key] = b"".join(parts)
+    return _piped[key]
+
+
+_piped: dict[tuple[int, int], bytes] = {}
+
+
+def _descriptor(path: Path) -> int | None:
+    """Return the descriptor of this process that a path stands for, following links."""
+    here = Path(os.path.abspath(path))  # noqa: PTH100 (links are followed one by one)
+    for _ in range(_MOST_LINKS):
+        if str(here.parent) in _DESCRIPTORS and here.name.isdigit():
+            return int(here.name)
+        try:
+            here = here.parent / here.readlink()
+        except (OSError, ValueError):
+            return None
     return None
 
 

@@ -13,7 +13,15 @@ from numpy.typing import ArrayLike
 
 from viewer.diagnostics import Collector, Diagnostic, Part
 from viewer.errors import FormatError
-from viewer.formats._file_bytes import FOLDER, MAX_SIZE, kind_of, no_file, read_bytes, read_head
+from viewer.formats._file_bytes import (
+    FOLDER,
+    MAX_SIZE,
+    kind_of,
+    no_file,
+    read_bytes,
+    read_head,
+    read_pipe,
+)
 from viewer.formats._text.long_text import LongText, count_line_ends, line_parts, without_marks
 from viewer.formats._text.numbers import word_begins
 from viewer.progress import report_bytes
@@ -90,8 +98,11 @@ class Source:
     def open(
         cls, path: str | Path, max_size: int = MAX_SIZE, diagnostics: Collector | None = None
     ) -> Source:
-        """Open a file or folder; errors as in ``read_bytes``."""
-        source = cls(path, max_size=max_size, diagnostics=diagnostics)
+        """Open a file, folder or pipe, see ``read_pipe``; errors as in ``read_bytes``."""
+        piped = read_pipe(Path(path), max_size)
+        source = cls(path, piped, max_size=max_size, diagnostics=diagnostics)
+        if piped is not None:
+            return source
         kind = kind_of(source.path, max_size)
         source.is_folder = kind == FOLDER
         if kind is not None and not source.is_folder:
@@ -138,6 +149,11 @@ class Source:
         """Release the memory of the data, which is read again when an error needs its line."""
         if self._is_stored:
             self._data = None
+
+    @property
+    def is_piped(self) -> bool:
+        """Whether there is no file from which the data could be read again."""
+        return not self._is_stored
 
     def option(self, name: str) -> str:
         """Return an option that selects among the contents of the file; empty for the default."""

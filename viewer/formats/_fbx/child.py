@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -34,9 +36,19 @@ def run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]
     """
     if find_spec("ufbx") is None:
         raise source.fault("F001.fbx-extra")
-    size = source.path.stat().st_size
+    if source.is_piped:
+        # The library reads files, in any order.
+        with tempfile.TemporaryDirectory(prefix="viewer-") as folder:
+            path = Path(folder, "piped.fbx")
+            path.write_bytes(source.data)
+            return _run(source, path, arguments)
+    return _run(source, source.path.resolve(), arguments)
+
+
+def _run(source: Source, path: Path, arguments: Sequence[str]) -> tuple[Arrays, dict[str, Any]]:
+    size = path.stat().st_size
     seconds = _SECONDS + _SECONDS_PER_STEP * (size / _STEP)
-    command = [sys.executable, "-m", _WORKER, str(source.path.resolve()), *arguments]
+    command = [sys.executable, "-m", _WORKER, str(path), *arguments]
     try:
         done = subprocess.run(
             command,
