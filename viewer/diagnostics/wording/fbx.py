@@ -4,6 +4,10 @@ MESSAGES = {
     "F001.fbx-extra": "reading .fbx files needs ufbx, which is not installed: pip install ufbx",
     "F001.fbx-crash": "the FBX library failed on this file: {how:text}",
     "F001.fbx-slow": "reading took more than {seconds:.0f} s and was stopped",
+    "F002.fbx-cut": "expected the end of {n:#open section}, found the end of the file: it is cut "
+    "short",
+    "F002.fbx-connections": "expected a section Connections, found the end of the file: it is cut "
+    "short",
     "F002.fbx": "not a readable FBX file: {reason:text}",
     "F007.fbx-converted": "unsupported {what:list} converted to {to:list}",
     "F007.fbx-unused": "not used: {items:list12}",
@@ -22,6 +26,18 @@ MESSAGES = {
 }
 
 PHRASES = {
+    "fbx-mesh": "mesh {mesh:quoted}: {what} {row}",
+    "fbx-node": "node {node:quoted} ({row}): transform",
+    "fbx-keys": "keys of {node:quoted}: {path}",
+    "fbx-value": "{of:text}",
+    "fbx-position": "position",
+    "fbx-normal": "normal",
+    "fbx-color": "colour",
+    "fbx-bind-matrix": "bind matrix",
+    "fbx-weight": "weight",
+    "fbx-offset": "offset",
+    "fbx-influence": "influence",
+    "fbx-uv": "texture coordinate",
     "fbx-axes": "y up, right-handed",
     "ended-by-signal": "it crashed with signal {number}",
     "ended-with-error": "exit code {code}{error:+: {}}",

@@ -10,6 +10,10 @@ MESSAGES = {
     "W004.mesh-node": "mesh {mesh:quoted}: {n:#vertex} without weights {n:?follows|follow} the "
     "node of the mesh instead of a joint",
     "W004.first-joint": "{n:#vertex} without weights: attached to the first listed joint",
+    "F003.joint-reach": "joint {joint:quoted}: expected a rest transform within ±{limit:.2g}, "
+    "found {found:.3g}",
+    "F003.bind-reach": "joint {joint:quoted}: expected vertices within ±{limit:.2g} in the rest "
+    "pose, found larger ones",
     "F007.animated-others": "animations of {n:#node} that {n:?belongs|belong} to no figure are "
     "omitted: {names:list}",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",

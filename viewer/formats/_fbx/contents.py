@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 import numpy as np
 
 from viewer.diagnostics import Phrase
+from viewer.formats._archive.checking import invalid_numbers, number_problem
 from viewer.formats._fbx.child import run_worker
 from viewer.formats._fbx.materials import materials_of
 from viewer.formats._fbx.meshes import Placed, mesh_on_node, on_nodes, skin_of
@@ -28,9 +31,18 @@ from viewer.rig.units import METRES, UNIT_NAMES
 __all__ = ["node_file", "target_weights"]
 
 
+_BINARY = b"Kaydara FBX Binary"  # first bytes of the binary variant
+_UNSTRUCTURED = re.compile(rb'"[^"]*"|;[^\n]*')  # strings and comments of the text variant
+_CONNECTED = 6000  # version since which objects are connected by a section of their own
+
+
 def node_file(source: Source) -> NodeFile:
     """Read a file in a child process; see ``viewer.formats.fbx.read``."""
     arrays, told = run_worker(source)
+    _check_end(source, told["version"])
+    _check_arrays(source, arrays, partial(_place, told))
+    _check_values(source, told, "")
+    _check_indices(source, arrays, told)
     _say_unused(source, told)
     count = len(told["names"])
     meshes: list[NodeMesh] = []
@@ -69,6 +81,91 @@ def node_file(source: Source) -> NodeFile:
         unit=_unit(told["unit"]),
         asset={"generator": told["creator"], "version": f"{told['version'] / 1000:g}"},
     )
+
+
+def _check_end(source: Source, version: int) -> None:
+    """Refuse a text file that is cut short, which ufbx reads as if the rest did not exist."""
+    if source.peek(len(_BINARY)) == _BINARY:
+        return
+    bare = _UNSTRUCTURED.sub(b"", source.data)
+    depth = bare.count(b"{") - bare.count(b"}")
+    if depth > 0:
+        raise source.fault("F002.fbx-cut", source.end, n=depth)
+    if version >= _CONNECTED and b"Connections:" not in bare:
+        raise source.fault("F002.fbx-connections", source.end)
+
+
+def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Phrase]) -> None:
+    """Refuse a message with a number that is not finite or that single precision cannot hold."""
+    for name, array in arrays.items():
+        if array.dtype != np.float64:
+            continue
+        numbers, bad = invalid_numbers(array)
+        if bad is not None:
+            kind, found = number_problem(numbers, bad)
+            row = int(np.argwhere(bad)[0][0])
+            raise source.fault(f"F003.{kind}", **found | {"item": place(name, row), "at": ""})
+
+
+def _check_values(source: Source, told: Any, path: str) -> None:
+    """Refuse such numbers in the JSON of a message."""
+    if isinstance(told, float):
+        _check_arrays(
+            source, {path: np.array([told])}, lambda name, _: Phrase("fbx-value", of=name)
+        )
+    elif isinstance(told, dict):
+        name = told.get("name")
+        for key, value in told.items():
+            _check_values(source, value, " ".join(filter(None, (path, name, key))))
+    elif isinstance(told, list):
+        for value in told:
+            _check_values(source, value, path)
+
+
+def _check_indices(source: Source, arrays: Arrays, told: dict[str, Any]) -> None:
+    """Refuse skins and blend shapes of vertices that their mesh does not have."""
+    for name, array in arrays.items():
+        if not name.endswith(".vertices") or array.dtype == np.float64:
+            continue
+        last = len(arrays[f"{name.split('.')[0]}.vertices"]) - 1
+        wrong = (array < 0) | (array > last)
+        if wrong.any():
+            place = _place(told, name, int(wrong.argmax()))
+            found = float(array[wrong.argmax()])
+            raise source.fault("F002.vertex-range", item=place, last=last, found=found)
+
+
+_WHAT = {
+    "vertices": "position",
+    "normals": "normal",
+    "colors": "color",
+    "matrices": "bind-matrix",
+    "weights": "weight",
+    "blend": "weight",
+    "offsets": "offset",
+}
+"""Phrase of a number in an array of a mesh, by the array's name."""
+
+
+def _place(told: dict[str, Any], name: str, row: int) -> Phrase:
+    """Return where an array of the contents stands in the file."""
+    if name in ("local", "geometry"):
+        return Phrase("fbx-node", node=told["names"][row], row=row)
+    owner, *_, what = name.split(".")
+    mesh = told["meshes"][int(owner.removeprefix("mesh"))]
+    return Phrase(
+        "fbx-mesh", mesh=mesh["name"], what=Phrase(f"fbx-{_WHAT.get(what, 'uv')}"), row=row
+    )
+
+
+def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
+    """Return which property has invalid keys."""
+    if track["path"] != "weight":
+        name = told["names"][track["node"]]
+    else:
+        rows = [shape for mesh in told["meshes"] for shape in mesh["shapes"]]
+        name = next((r["name"] for r in rows if r["element"] == track["element"]), "")
+    return Phrase("fbx-keys", node=name, path=track["path"])
 
 
 def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints) -> NodeTree:
@@ -139,6 +236,8 @@ def _channels(
 ) -> tuple[NodeChannel, ...]:
     """Sample one animation stack in another child process."""
     arrays, keys = run_worker(source, str(stack))
+    tracks = {each["keys"]: each for each in keys["keys"]}
+    _check_arrays(source, arrays, lambda name, row: _place_of_keys(told, tracks[name]))
     if keys["cut"]:
         source.warn("F007.fbx-continued", n=keys["cut"])
     channels: list[NodeChannel] = []

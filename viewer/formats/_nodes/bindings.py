@@ -15,7 +15,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._nodes.content import NodeSkin
-from viewer.formats._nodes.joints import Joints, rest_worlds
+from viewer.formats._nodes.joints import Joints
 from viewer.rig.arrays import Bools, Floats, Ints
 
 __all__ = ["Bindings", "bind_rigid", "bind_skins", "inverse_binds"]
@@ -57,13 +57,15 @@ class Bindings:
     rigid: dict[int, tuple[int, Floats]] = field(default_factory=dict)
 
 
-def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
+def bind_skins(joints: Joints, worlds: Floats, skins: dict[int, NodeSkin]) -> Bindings:
     """Bind the skins of a figure; the first one determines the binding space.
 
     Parameters
     ----------
     joints : Joints
         Auxiliary joints are appended if skins disagree.
+    worlds : (J, 4, 4)
+        From ``rest_worlds``.
     skins : dict of NodeSkin
         By index in the file, in order of precedence.
 
@@ -72,7 +74,7 @@ def bind_skins(joints: Joints, skins: dict[int, NodeSkin]) -> Bindings:
     Bindings
         Bindings of the skins.
     """
-    bindings = Bindings(joints, rest_worlds(joints))
+    bindings = Bindings(joints, worlds)
     for index, skin in skins.items():
         slots = np.array([joints.carrier[node] for node in skin.joints.tolist()], dtype=np.int32)
         baked, reach = _baked(bindings, skin.inverse_bind, slots), _reach(skin.inverse_bind)

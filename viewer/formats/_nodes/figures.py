@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from viewer.data_classes import dataclass
 from viewer.formats._nodes.bindings import bind_rigid, bind_skins, inverse_binds
 from viewer.formats._nodes.content import NodeFile
 from viewer.formats._nodes.facts import facts_of
 from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, scene_order
-from viewer.formats._nodes.joints import Joints, make_joints, skeleton_of
+from viewer.formats._nodes.joints import Joints, make_joints, rest_worlds, skeleton_of
 from viewer.formats._nodes.motions import Reader, animations_of, read_once
 from viewer.formats._nodes.pointers import remember_pointers
 from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
 from viewer.formats._nodes.views import Carrier, views_of
+from viewer.formats._text.numbers import LARGEST
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.file_record import FileRecord
@@ -81,16 +85,19 @@ class _Made:
 def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Source) -> _Made:
     """Return one figure."""
     joints = make_joints(file.tree, members.nodes)
-    bindings = bind_skins(joints, {index: file.skins[index] for index in members.skins})
+    worlds = _worlds(joints, source)
+    bindings = bind_skins(joints, worlds, {index: file.skins[index] for index in members.skins})
     bind_rigid(bindings, [node for node in members.meshes if not _is_skinned(file, node)])
     pieces = pieces_of(file, members.meshes, bindings)
+    matrices = inverse_binds(bindings)
+    _check_positions(joints, worlds, matrices, pieces, source)
     columns = shape_columns(file, members.meshes, readers)
     record = record_of(file, joints, members.meshes, columns, pieces)
     figure = Figure(
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
         skeleton=skeleton_of(joints, file.humanoid, file.constraints, file.springs),
-        skin=skin_of(pieces, inverse_binds(bindings)) if pieces else None,
+        skin=skin_of(pieces, matrices) if pieces else None,
         up=file.up,
         unit=file.unit,
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
@@ -100,6 +107,37 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Sou
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)
     return _Made(figure, record, joints, pieces, joints.own.keys() | columns.keys())
+
+
+def _worlds(joints: Joints, source: Source) -> Floats:
+    """Return the rest transforms of the joints of nodes; refuse those that are out of reach."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        worlds = rest_worlds(joints)
+    far = ~(np.abs(worlds) <= LARGEST).all(axis=(1, 2))
+    if far.any():
+        joint = int(far.argmax())
+        found = worlds[joint].flat[int((~(np.abs(worlds[joint]) <= LARGEST)).argmax())]
+        raise source.fault(
+            "F003.joint-reach", joint=joints.names[joint], limit=LARGEST, found=found
+        )
+    return worlds
+
+
+def _check_positions(
+    joints: Joints, worlds: Floats, inverse_bind: Floats, pieces: list[Piece], source: Source
+) -> None:
+    """Refuse vertices that the rest pose moves out of reach."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        palette = np.abs(worlds @ inverse_bind[: len(worlds)]).max(axis=(1, 2), initial=0.0)
+    palette = np.concatenate([palette, np.zeros(len(inverse_bind) - len(worlds))])
+    for piece in pieces:
+        with np.errstate(over="ignore", invalid="ignore"):
+            reach = np.abs(piece.baked).max() * np.abs(piece.primitive.positions).max(initial=1.0)
+            far = ~(reach * palette[piece.influences.joints] <= LARGEST)
+        if far.any():
+            joint = int(piece.influences.joints[far.argmax()])
+            name = joints.names[joint]
+            raise source.fault("F003.bind-reach", joint=name, limit=LARGEST)
 
 
 def _is_skinned(file: NodeFile, node: int) -> bool:
