@@ -38,6 +38,9 @@ __all__ = ["add_arguments", "describe", "run"]
 MOST_FREE_DOFS = 24
 
 
+_FAR = 1e3  # distance from the origin, in sizes, beyond which a box is shown with more digits
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
     parser.usage = "%(prog)s FILES ... [options]"
@@ -270,7 +273,11 @@ def _box_text(actor: dict[str, Any]) -> str:
         return "none: nothing is visible" if actor["present"] else "none: absent at this time"
     low, high = actor["box"]
     unit = f" {actor['unit']}" if actor["unit"] else ""
-    return f"{_point(low)} to {_point(high)}, size {actor['size']:.6g}{unit}"
+    # Far from the origin, six digits may not tell one end of the box from the other.
+    farthest = max(map(abs, [*low, *high]))
+    digits = ".6g" if farthest < _FAR * actor["size"] else ".10g"
+    points = _point(low, digits), _point(high, digits)
+    return f"{points[0]} to {points[1]}, size {actor['size']:.6g}{unit}"
 
 
 def _vertices(count: int) -> str:
@@ -357,5 +364,5 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _point(values: list[float]) -> str:
-    return f"({', '.join(number_text(value, '.6g') for value in values)})"
+def _point(values: list[float], digits: str = ".6g") -> str:
+    return f"({', '.join(number_text(value, digits) for value in values)})"

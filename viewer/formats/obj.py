@@ -5,8 +5,9 @@ r"""Reader of Wavefront ``.obj`` meshes, which have no rig.
     obj    = line*                                   a "\" at its end continues a line
     line   = "v" x y z (w | r g b | r g b a)? | "vt" u v? w? | "vn" x y z
            | "f" corner corner corner+ | "usemtl" name | "mtllib" file | "g" name* | "o" name
-           | "#" comment | other
-    corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far
+           | "#" comment | other                     a comment may also follow the numbers of a line
+    corner = v | v/vt | v//vn | v/vt/vn              from 1, or from -1 for the last one so far;
+                                                     slashes at the end are ignored
 
 Vertices keep their indices, including those without a face. Polygons are triangulated. A vertex
 with several normals gets their mean, because a ``Mesh`` has one normal per vertex. Colours of

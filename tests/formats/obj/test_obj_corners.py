@@ -41,11 +41,18 @@ def test_forms_may_be_mixed():
     assert mesh.normals.tolist() == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
 
 
+def test_slashes_without_a_number_after_them_are_ignored():
+    mesh = read("f 1/2/ 2/1/ 3/2/\nf 1/ 2// 3/2/1\nf 1//1\t2//2 3//\r\n")
+    assert mesh.triangles.tolist() == [[0, 1, 2]] * 3
+    given = read("f 1/2 2/1 3/2\nf 1 2 3/2/1\nf 1//1 2//2 3\n")
+    assert mesh.uvs[mesh.uv_triangles].tolist() == given.uvs[given.uv_triangles].tolist()
+    assert mesh.normals.tolist() == given.normals.tolist()
+
+
 @pytest.mark.parametrize(
     "face",
     [
-        *("f 1/1/1/1 2 3", "f 1/ 2/2 3/3", "f /1 2/2 3/3", "f 1/ 2 3/3/3", "f 1// 2//2 3//3"),
-        *("f 1//1 2//2 3//", "f 1/1/ 2/2/2 3/3/3", "f 1///1 2/2 3//3", "f //1 2//2 3//3"),
+        *("f 1/1/1/1 2 3", "f /1 2/2 3/3", "f 1///1 2/2 3//3", "f //1 2//2 3//3"),
         *("f 1/1 /2 3/3", "f 1 / 2 3", "f 1/\x011 2/2 3/3", "f 1/1.5 2/2 3/3", "f 1/0 2/2 3/3"),
     ],
 )

@@ -17,7 +17,17 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import parse_numbers, word_begins
 from viewer.rig.arrays import Bools, Floats
 
-__all__ = ["KEYWORDS", "Lines", "NumberRows", "Places", "Rows", "number_rows", "pieces", "rows_of"]
+__all__ = [
+    "KEYWORDS",
+    "Lines",
+    "NumberRows",
+    "Places",
+    "Rows",
+    "number_rows",
+    "pieces",
+    "rows_of",
+    "without_comments",
+]
 
 Places = NDArray[np.int64]
 Letters = NDArray[np.uint8]
@@ -28,6 +38,9 @@ KEYWORDS = ("v", "vt", "vn", "f")
 _PIECE = 1 << 18  # bytes per piece
 _CONTINUED = re.compile(rb"\\(?:\r*\n|\r)")
 _CONTINUES = re.compile(rb"\\(?:\r*\n|\r+)\Z")
+_COMMENT = re.compile(rb"#[^\r\n]*")
+_OPEN_END = re.compile(rb"(?<=\d)/+(?=\s)")  # as in 1/2/ or 1//, which some programs write
+_OPEN_ENDS = b"/ ", b"/\n", b"/\r", b"/\t"
 _PAD = b"\n\n\n"  # padding, so that three characters can be read at the start of every line
 
 
@@ -96,7 +109,7 @@ def pieces(source: Source) -> Iterator[Lines]:
     start = 0
     for data in _joined(source.line_parts(_PIECE)):
         if b"\\" in data:
-            data = _CONTINUED.sub(lambda found: b" " * len(found.group()), data)
+            data = _CONTINUED.sub(_blanks, data)
         yield _split(data + _PAD, start)
         start += len(data)
 
@@ -151,26 +164,47 @@ def rows_of(lines: Lines, keyword: str) -> Rows:
     if keyword == "f":
         starts = starts + (lines.letters[starts] == ord("o"))
     ends = lines.ends[chosen]
-    if len(chosen) and chosen[-1] - chosen[0] == len(chosen) - 1:
-        return _adjacent_rows(lines, starts, ends, int(lines.starts[chosen[0]]))
+    # Neighbours lose the line ends between them, where comments end.
+    is_plain = b"#" not in lines.data
+    if is_plain and len(chosen) and chosen[-1] - chosen[0] == len(chosen) - 1:
+        return _adjacent_rows(lines, starts, ends, int(lines.starts[chosen[0]]), keyword)
     steps = np.zeros(len(lines.letters) + 1, dtype=np.int8)
     steps[starts] += 1
     steps[ends] -= 1
     letters = lines.letters[np.cumsum(steps[:-1], dtype=np.int8).view(np.bool_)]
     places = np.concatenate([[0], np.cumsum(ends - starts)])
-    return Rows(letters.tobytes(), letters, places, starts + lines.base)
+    return _plain_rows(letters, places, starts + lines.base, keyword)
 
 
-def _adjacent_rows(lines: Lines, starts: Places, ends: Places, first: int) -> Rows:
+def _adjacent_rows(lines: Lines, starts: Places, ends: Places, first: int, keyword: str) -> Rows:
     """Return the text of lines that follow each other, with blanks in place of keywords."""
     letters = lines.letters[first : ends[-1]].copy()
     starts = starts - first
     # A keyword has at most two characters; any before the first one is the end of another line.
     for back in (1, 2):
         letters[np.maximum(starts - back, 0)] = ord(" ")
-    return Rows(
-        letters.tobytes(), letters, np.append(starts, len(letters)), starts + first + lines.base
-    )
+    places = np.append(starts, len(letters))
+    return _plain_rows(letters, places, starts + first + lines.base, keyword)
+
+
+def _plain_rows(letters: Letters, starts: Places, origins: Places, keyword: str) -> Rows:
+    """Return rows with blanks in place of comments and of slashes without a number after them."""
+    body = letters.tobytes()
+    plain = without_comments(body)
+    if keyword == "f" and any(end in plain for end in _OPEN_ENDS):
+        plain = _OPEN_END.sub(_blanks, plain)
+    if plain is not body:
+        letters = np.frombuffer(plain, dtype=np.uint8)
+    return Rows(plain, letters, starts, origins)
+
+
+def without_comments(text: bytes) -> bytes:
+    """Return numbers with blanks in place of comments, which may follow them in a line."""
+    return _COMMENT.sub(_blanks, text) if b"#" in text else text
+
+
+def _blanks(found: re.Match[bytes]) -> bytes:
+    return b" " * len(found.group())
 
 
 NumberRows = tuple[Floats, Places, Floats, Rows]

@@ -11,7 +11,15 @@ from numpy.typing import NDArray
 from viewer.data_classes import dataclass
 from viewer.formats._obj.faces import FEWEST, CornerFault, FaceRows, read_faces
 from viewer.formats._obj.faulty_lines import checked_corners, faulty_faces, faulty_rows
-from viewer.formats._obj.lines import KEYWORDS, Lines, NumberRows, Places, number_rows, pieces
+from viewer.formats._obj.lines import (
+    KEYWORDS,
+    Lines,
+    NumberRows,
+    Places,
+    number_rows,
+    pieces,
+    without_comments,
+)
 from viewer.formats._source import Source
 from viewer.formats._text.growing_table import GrowingTable
 from viewer.rig.arrays import Floats
@@ -162,7 +170,9 @@ def _read_piece(source: Source, lines: Lines, gathered: _Gathered) -> None:
 
 def _without_edges(lines: Lines, gathered: _Gathered) -> Lines:
     """Return lines without faces of one or two corners, once Blender's form of loose edges."""
-    counts = np.array([len(lines.text(line).split()) - 1 for line in lines.of["f"].tolist()])
+    counts = np.array(
+        [len(without_comments(lines.text(line)).split()) - 1 for line in lines.of["f"].tolist()]
+    )
     is_edge = (counts > 0) & (counts < FEWEST)
     if not is_edge.any():
         return lines
