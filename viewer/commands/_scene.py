@@ -67,7 +67,11 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "--rig", metavar="NAME", help="rig of Anny: default, mixamo, game_engine, cmu_mb"
     )
     group.add_argument("--lod", metavar="N", help="level of detail of MHR, 0 (fine) to 6 (coarse)")
-    group.add_argument("--body", action="store_true", help="also open the bundled human body")
+    group.add_argument(
+        "--body",
+        action="store_true",
+        help="the bundled human body: next to FILES, or moved by a motion among them",
+    )
     group.add_argument(
         "--model-path", metavar="FOLDER", help="folder of body models; the viewer remembers it"
     )

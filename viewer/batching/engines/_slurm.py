@@ -62,7 +62,7 @@ def slurm_cluster(
             from viewer.batching.engines._slurm_job import Job
     except ImportError:
         raise ViewerError(
-            "--cluster slurm needs dask-jobqueue: pip install skinning-viewer[batch]"
+            "--cluster slurm needs dask-jobqueue: pip install dask-jobqueue"
         ) from None
     options = dict(name.options)
     processes = name.workers_per_job

@@ -58,7 +58,7 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         import distributed  # noqa: F401
     except ImportError:
         raise ViewerError(
-            "--cluster needs Dask: pip install skinning-viewer[batch], or use --workers without it"
+            "--cluster needs Dask: pip install dask distributed, or use --workers without --cluster"
         ) from None
     from viewer.batching.engines._clusters import connected
 
