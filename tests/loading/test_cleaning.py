@@ -155,8 +155,9 @@ def test_sliding_feet_are_held_in_place():
     places = np.zeros((60, 3))
     places[:, 2] = 0.1 * np.arange(60) / 59
     actor.clip = replace(actor.clip, figure_translations=places)
-    (note,) = clean_up(Scene([actor]), CleanUp(locks_feet=True))
+    note, lowered = clean_up(Scene([actor]), CleanUp(locks_feet=True))
     assert note.key == "X006.locked" and note.values["n"] == 2
+    assert lowered.key == "X006.locked-lowered"
     assert (note.values["before"], note.values["after"]) == ("200 mm", "0 mm")
 
 

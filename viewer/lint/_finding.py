@@ -252,12 +252,17 @@ class Subject:
             return length_text(figure, length)
         return f"{rounded(length)} units" + self._relative(length)
 
-    def speed(self, speed: float) -> str:
-        """Return a speed as text: in metres per second if the unit is known."""
+    def speed(self, speed: float, is_limit: bool = False) -> str:
+        """Return a speed as text: in metres per second if the unit is known.
+
+        Otherwise, a speed that is not a limit is also given as a multiple of the size.
+        """
         unit = self.actor.figure.unit
         if unit in METRES:
             return f"{rounded(speed * METRES[unit])} m/s"
-        return f"{rounded(speed)} units per second" + self._relative(speed)
+        size = 0.0 if is_limit else self.size()
+        relative = f" ({rounded(speed / size)} times its size)" if size > 0.0 else ""
+        return f"{rounded(speed)} units per second{relative}"
 
     def size(self) -> float:
         """Return the diagonal of the bounding box of the mesh, or else of the joints at rest.

@@ -150,7 +150,7 @@ def _jumps(subject: Subject, track: Track, skeleton: Skeleton) -> list[Finding]:
             all=track.n_frames,
             joint=joint_labels(skeleton)[fast.joints[0]],
             speed=subject.speed(fast.rate / track.scale),
-            limit=subject.speed(limit / track.scale),
+            limit=subject.speed(limit / track.scale, is_limit=True),
             frame=int(track.numbers[fast.worst]),
             time=float(track.times[fast.worst]),
             part="clip",

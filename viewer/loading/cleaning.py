@@ -111,8 +111,8 @@ def _cleaned(
         clip, said = _smoothed(actor, clip, wanted.smoothing)
         notes.append(said)
     if wanted.locks_feet:
-        clip, said = _locked(scene, actor, clip)
-        notes.append(said)
+        clip, locked = _locked(scene, actor, clip)
+        notes += locked
     if wanted.grounds:
         clip, said = _grounded(scene, actor, clip)
         notes.append(said)
@@ -131,24 +131,29 @@ def _smoothed(actor: Actor, clip: Captured, chosen: Smoothing) -> tuple[Captured
     return found, _note("X006.smoothed", actor, values, clip, found)
 
 
-def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:
+def _locked(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, list[Diagnostic]]:
     """Return a motion whose feet do not slide during ground contact."""
     figure = actor.figure
     if isinstance(clip, PointClip) or not legs_of(figure.require_skeleton()):
-        return clip, Diagnostic("X006.no-legs", values={"figure": actor.name})
+        return clip, [Diagnostic("X006.no-legs", values={"figure": actor.name})]
     axis, hangs = own_up(scene, actor)
     found, lock = lock_feet(figure, clip, "xyz".index(axis), -1.0 if hangs else 1.0)
     if not lock.n_contacts:
         key = "X006.only-glides" if lock.n_glides else "X006.no-contacts"
-        return clip, Diagnostic(key, values={"figure": actor.name, "n": lock.n_glides})
-    values = {
-        "glides": lock.n_glides,
+        return clip, [Diagnostic(key, values={"figure": actor.name, "n": lock.n_glides})]
+    values: dict[str, object] = {
         "n": lock.n_contacts,
         "before": length_text(figure, lock.before),
         "after": length_text(figure, lock.after if lock.after > _ROUNDING else 0.0),
-        "lowered": length_text(figure, lock.lowered) if lock.lowered > _ROUNDING else "",
     }
-    return found, _note("X006.locked", actor, values, clip, found)
+    notes = [_note("X006.locked", actor, values, clip, found)]
+    if lock.lowered > _ROUNDING:
+        values = {"figure": actor.name, "length": length_text(figure, lock.lowered)}
+        notes.append(Diagnostic("X006.locked-lowered", values=values))
+    if lock.n_glides:
+        values = {"figure": actor.name, "n": lock.n_glides}
+        notes.append(Diagnostic("X006.locked-glides", values=values))
+    return found, notes
 
 
 def _grounded(scene: Scene, actor: Actor, clip: Captured) -> tuple[Captured, Diagnostic]:

@@ -84,10 +84,9 @@ MESSAGES = {
     "F003.motion-reach": "{item:text}: expected numbers within ±{limit:.2g}, found {found:g} in "
     "frame {frame}",
     "F007.motion-differ": "{first:text} and {others:list12} differ: {first:text} is used",
-    "F007.motion-again": "{item:text} and an earlier part with the same joints differ: {item:text} "
-    "omitted",
+    "F007.motion-again": "{item:text} omitted: an earlier array has other values for these joints",
     "F007.motion-angles": "{item:text}: angles used as stored, without the mean hand pose",
-    "F007.motion-place": "no trans: the body stays in place",
+    "F007.motion-place": "no trans array: the body stays in place",
     "F007.motion-rates": "conflicting frame rates ({rates:list}): the first one is used",
     "F007.motion-no-rate": "no frame rate: the common {rate:g} fps assumed (--fps sets it)",
     "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",

@@ -21,8 +21,8 @@ MESSAGES = {
     "rate; {rate:g} fps assumed (--fps overrides it)",
     "C017.bvh-milliseconds": "Frame Time: expected seconds, found {found:word}, which looks like "
     "milliseconds; {rate:g} fps assumed (--fps overrides it)",
-    "F007.bvh-positions": "position channels are 0 except at the root: interpreted as relative to "
-    "OFFSET",
+    "F007.bvh-positions": "position channels below the root are 0: added to OFFSET instead of "
+    "replacing it",
 }
 
 PHRASES = {

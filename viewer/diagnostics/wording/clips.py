@@ -33,12 +33,12 @@ CODES = {
 MESSAGES = {
     "C002.keys": "{n:#key|has|have} the same time as the previous key (first: channel {channel} at "
     "{time:zg} s)",
-    "C003.joint": "{n:#frame/{all}}: {joint:text} moves at {speed} (limit {limit}) at frame "
-    "{frame}, {time:z.3f} s",
-    "C003.point": "{n:#frame/{all}}: {name:text} moves at {speed:.3g} units per second (limit "
-    "{limit:.3g}) at frame {frame}",
-    "C004.joint": "{n:#frame/{all}}: {joint:text} rotates at {rate:.0f} degrees per second (limit "
-    "{limit:.0f}) at frame {frame}, {time:z.3f} s",
+    "C003.joint": "{n:#frame/{all}}: {joint:text} moves at {speed} at frame {frame}, "
+    "{time:z.3f} s (limit {limit})",
+    "C003.point": "{n:#frame/{all}}: {name:text} moves at {speed:.3g} units per second at frame "
+    "{frame} (limit {limit:.3g})",
+    "C004.joint": "{n:#frame/{all}}: {joint:text} rotates at {rate:.0f} degrees per second at "
+    "frame {frame}, {time:z.3f} s (limit {limit:.0f})",
     "C005.gaps": "{n:#frame/{all}|is|are} missing in {n_gaps:#gap}: {gaps:list}",
     "C006.curves": "{n:#curve|exceeds its|exceed their} limits: {dof}",
     "C007.foot": "{n:#frame/{all}}: {joint:text} slides by {distance} in total, at up to {speed} "
@@ -56,8 +56,8 @@ MESSAGES = {
     "checked",
     "C013.no-height": "feet never rest long enough at one height: ground height unclear, feet not "
     "checked",
-    "C014.jitter": "{n:#frame/{all}}: {joint:text} jitters by {noise} from frame to frame (limit "
-    "{limit}), most around frame {frame}",
+    "C014.jitter": "{n:#frame/{all}}: {joint:text} jitters by {noise} from frame to frame, most "
+    "around frame {frame} (limit {limit})",
     "C015.exchanged": "swaps positions with {other}, {distance} away, in {n:#frame}: "
     "{frames_text:list}",
     "C015.continued": "appears in frame {first}, {distance} from where {other} disappears in frame "

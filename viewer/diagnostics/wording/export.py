@@ -38,7 +38,7 @@ MESSAGES = {
     "X001.one-mesh": "1 file, {first:text}{missing:+" + _MISSING,
     "X001.meshes": "{n} files, {first:text} to {last:text}{missing:+" + _MISSING,
     "X001.no-meshes": "no person is present in these frames: nothing was written",
-    "X001.arrays": "{names:all}",
+    "X001.arrays": "arrays {names:all}",
     "X001.motion-arrays": "{n:#frame} at {rate:g} fps{missing:+; {} of them missing, NaN}: "
     "{names:all}",
     "X001.point-arrays": "{n:#frame} at {rate:g} fps{missing:+; {} of them missing, NaN}, {up} up: "
@@ -61,11 +61,11 @@ MESSAGES = {
     f"{_LIMITS}",
     "X002.topology": "{n:#triangle} on {vertices:#vertex} were read back instead of the "
     "{all:#triangle} of the figure",
-    "X002.first-influences": f"{_INFLUENCES}: programs that read only JOINTS_0 have errors of up "
-    "to {length}{extent:+ ({})}",
+    "X002.first-influences": f"{_INFLUENCES}: with only the first four, the mesh moves by up to "
+    "{length}{extent:+ ({})}",
     "X002.quantized": "quantised with rounding errors of up to {parts:all}",
-    "X002.animations": "largest difference of {vertices} over {n:#animation}: {length}{place:+ "
-    "({})}, compared at {times:#time}{causes:+: {}}",
+    "X002.animations": "{vertices} differ by up to {length}{place:+ ({})}, compared at "
+    "{times:#time} in {n:#animation}{causes:+: {}}",
     # Omitted data
     "X005.hidden-parts": "{n:#hidden part|is|are} also written",
     "X003.parts": "not stored in {format}: {parts:all}",
@@ -155,9 +155,8 @@ MESSAGES = {
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
-    "X005.as-smplx": "{figure:text} is not SMPL-X, which has a different rest position of the "
-    "pelvis and different shape coefficients: for exact translations and shapes use --model with "
-    "an SMPL-X model",
+    "X005.as-smplx": "{figure:text} is not SMPL-X: translations and shape are exact only with an "
+    "SMPL-X model (--model)",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
@@ -170,11 +169,9 @@ MESSAGES = {
     "X005.no-influence": '{n:#vertex} without influence: bound to the node "fixed", which never '
     "moves",
     "X005.own-shape": "shape and translation are those of {figure:text}, which is not an SMPL "
-    "model: other models are offset by the distance between the rest positions of the pelvis",
-    "X005.own-root": "translations are relative to the skeleton's root at rest, ({x:z.4g}, "
-    "{y:z.4g}, {z:z.4g}) m: a model with a different root position at rest is offset by the "
-    "difference (use "
-    "--model for exact translations)",
+    "model: other models appear with another shape, and offset (--model selects the model)",
+    "X005.own-root": "translations are relative to the root at rest, ({x:z.4g}, {y:z.4g}, "
+    "{z:z.4g}) m: a model whose root is elsewhere is offset (--model makes translations exact)",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
     "X005.springs-baked": "{figure:text}: simulated rotations of {n:#spring joint} are written",

@@ -5,8 +5,9 @@ MESSAGES = {
     "F002.unknown-kind": "expected a {wanted} file, found an unknown format",
     "F002.unknown-folder": "expected a file, or a folder of PIG tables, EasyMocap frames or "
     "results of video motion capture, found an unrecognised folder",
-    "F002.unknown-archive": "expected a model or pose ({wanted}), found keys {found:list12}",
-    "F002.empty-archive": "expected a model or pose ({wanted}), found no keys",
+    "F002.unknown-archive": "expected a model, motion or pose, found unknown keys: {found:list12} "
+    "(viewer help formats lists what can be opened)",
+    "F002.empty-archive": "expected a model, motion or pose, found no keys",
     "F002.no-writer": 'no writer for "{suffix:text}"; supported: {known:list12}',
     "F007.suffix": "{found} file with the suffix {suffix:text}",
 }

@@ -19,8 +19,8 @@ MESSAGES = {
     "F007.unused-images": "--images {value:text} has no effect: no file is a capture",
     "F007.unused-model": "--model {value:text} has no effect: no file has a motion that could "
     "drive it",
-    "F007.model-of-parameters": "--model has no effect: the capture contains parameters of "
-    "{member}, which can drive a figure only if that model is in the model folder (viewer models)",
+    "F007.model-of-parameters": "--model has no effect: parameters of {member} can drive a figure "
+    "only if {member} is in the model folder (viewer models)",
     "F007.model-of-points": "--model has no effect: the capture has only keypoints",
     "F007.unused-joint-map": "--joint-map has no effect: no motion of another skeleton drives a "
     "figure",
@@ -31,7 +31,7 @@ MESSAGES = {
     "F004.animation": "no animation is called {name:quoted}; {hint}",
     "F004.no-animations": "no animation is called {name:quoted}: the files have none",
     "F004.capture": "{problem}; specify the model with --model",
-    "F004.capture-of-member": "{problem}; specify a {member} model with --model",
+    "F004.capture-of-member": "{problem}; specify the {member} model with --model",
     "F004.clip-alone": "a clip without a skeleton: open it together with its .skel",
     "F004.clip-taken": "every matching skeleton already has a clip",
     "F004.model": "{problem} (--model selects the model)",
@@ -49,13 +49,13 @@ MESSAGES = {
     "F007.own-model": "drawn with {model:text} from the model folder (--model selects another)",
     "F007.own-carrier": "motion computed with {model:text} from the model folder",
     "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
-    "F007.bundled-body": "drawn with the bundled body (--model selects another)",
-    "F007.bundled-body-without-shapes": "drawn with the bundled body, without the shape "
-    "coefficients of the files, which do not apply to it (--model selects another)",
-    "F007.bundled-body-without-expressions": "drawn with the bundled body, without the expression "
-    "coefficients of the files, which do not apply to it (--model selects another)",
-    "F007.bundled-body-without-either": "drawn with the bundled body, without the shape and "
-    "expression coefficients of the files, which do not apply to it (--model selects another)",
+    "F007.bundled-body": "drawn with the bundled body (--model selects another body)",
+    "F007.bundled-body-without-shapes": "drawn with the bundled body, to which the shape "
+    "coefficients of the files do not apply (--model selects another body)",
+    "F007.bundled-body-without-expressions": "drawn with the bundled body, to which the expression "
+    "coefficients of the files do not apply (--model selects another body)",
+    "F007.bundled-body-without-either": "drawn with the bundled body, to which the shape and "
+    "expression coefficients of the files do not apply (--model selects another body)",
     "F007.model-beside": "--model {model:text}: no motion is applied to it with --beside",
     "F007.no-shapes": "no shape coefficients in the files: the model's mean shape is used for all",
     "F007.only-morphs": "{figure:text}: without its .skel, only blend shapes deform it",
@@ -64,8 +64,7 @@ MESSAGES = {
     "F004.vrm-bones": "{figure:text} cannot be written as VRM: {n:#required human bone} not found: "
     "{names:list12}",
     "F004.vrm-meta": "{figure:text} cannot be written as VRM without author and licence: add "
-    "--vrm-author NAME and --vrm-licence {licence}, the VRM Public Licence with the strictest "
-    "permissions",
+    "--vrm-author NAME and --vrm-licence URL, such as {licence} (the strictest permissions)",
     "F007.unit-matched": "{figure:text} is in {unit}: scaled by {factor:g} to match the scene, "
     "which is in {wanted}",
     "F007.unit-taken": "{note}; --unit overrides it",

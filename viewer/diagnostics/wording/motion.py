@@ -14,7 +14,7 @@ MESSAGES = {
     "again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n:#matching joint}; not recognised in {motion:text}: "
-    "{unused:list8}; in {figure:text}: {idle:list8}; match them with --joint-map",
+    "{unused:list}; in {figure:text}: {idle:list}; match them with --joint-map",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
@@ -28,31 +28,34 @@ MESSAGES = {
     "F007.hand-components-left-out": "hand components beyond the {most} of {figure:text} omitted",
     "F007.joints-matched": "{motion:text} drives {n} of {all} joints of {figure:text}",
     "F007.joints-matched-as-follows": "{motion:text} drives {n} of {all} joints of {figure:text}: "
-    "{pairs:list60}",
-    "F007.joints-at-rest": "joints kept at rest: {names:list60}",
-    "F007.joints-without-partner": "unmatched joints of {motion:text}: {names:list60}",
+    "{pairs:list}",
+    "F007.joints-at-rest": "joints kept at rest: {names:list12}",
+    "F007.joints-without-partner": "joints of {motion:text} that drive nothing: {names:list12}",
     "F007.rest-asked": "rest pose of {motion:text}: frame {frame}, as requested",
-    "F007.rest-frame": "rest pose of {motion:text}: frame {frame}, which is {pose}; its zero pose "
-    "is not a standing pose; --source-rest overrides it",
-    "F007.rest-anatomy": "rest pose of {motion:text}: estimated from its trunk, soles, knees and "
-    "elbows; its zero pose is not a standing pose, and no frame is a T- or A-pose; --source-rest "
-    "overrides it",
-    "F007.rest-axes": "rest pose of {motion:text}: a T-pose in which the axes of its joints are "
-    "parallel to the body's; its zero pose is not a standing pose; --source-rest overrides it",
-    "F007.rest-straight": "roll of limbs of {motion:text} assumed, since they hardly bend: "
+    "F007.rest-frame": "rest pose of {motion:text}: frame {frame}, {pose}, because its zero pose "
+    "is not a standing pose (--source-rest overrides it)",
+    "F007.rest-anatomy": "rest pose of {motion:text}: estimated from trunk, soles, knees and "
+    "elbows, because neither its zero pose nor any frame is a T- or A-pose (--source-rest "
+    "overrides it)",
+    "F007.rest-axes": "rest pose of {motion:text}: a T-pose, in which its joint axes are parallel "
+    "to the body's, because its zero pose is not a standing pose (--source-rest overrides it)",
+    "F007.rest-straight": "limbs of {motion:text} that hardly bend, so their roll is assumed: "
     "{names:list}",
-    "F007.rest-lying": "rest pose of {motion:text}: estimated from its trunk, knees and elbows; "
-    "its zero pose is not a standing pose, and the motion is not upright, so the slope of "
-    "its feet is assumed; --source-rest overrides it",
-    "F007.feet-planted": "feet of {figure:text} planted during {n:#contact} of {motion:text}: they "
-    "slide by {after} instead of {before} (source: {source}), and soles are at most {gap} instead "
-    "of {gap_before} from the ground{lowered:+; the body is lowered by up to {}}{ground:+; the "
-    "ground moves at {}}; --feet off disables this",
+    "F007.rest-lying": "rest pose of {motion:text}: estimated from trunk, knees and elbows, with "
+    "an assumed slope of the feet, because the person never stands (--source-rest overrides it)",
+    "F007.feet-planted": "feet of {figure:text} planted during {n:#contact}: they slide by {after} "
+    "instead of {before} ({source} in {motion:text}); --feet off disables this",
+    "F007.feet-gap": "soles of {figure:text} are at most {gap} from the ground during contacts, "
+    "instead of {gap_before}",
+    "F007.feet-lowered": "{figure:text} is lowered by up to {length}, so that its feet reach "
+    "the ground",
+    "F007.feet-ground": "ground moves at {speed}, as on a treadmill: planted feet of {figure:text} "
+    "move with it",
     "F007.feet-kept": "feet of {figure:text} not planted: they already slide as little as "
     "those of {motion:text}",
     "F007.feet-no-contacts": "feet of {figure:text} not planted: no ground contacts found in "
     "{motion:text}",
-    "F007.path-scaled": "root path scaled by {scale:.4g}, {by}",
+    "F007.path-scaled": "path of the root scaled by {scale:.3g}, {by}",
     "F007.joint-positions-left-out": "translations of {n:#joint} relative to {n:?its parent|their "
     "parents} omitted (largest: {most:.3g} at {joint:text})",
     "F007.joints-taken-over": "transferred {n} of {all} joints of {figure:text}",
@@ -72,18 +75,21 @@ MESSAGES = {
     "{longest} ({seconds:.2g} s)",
     "X006.gaps-left": "{figure:text}: {n:#gap} longer than {limit:#frame} {n:?remains|remain}: "
     "{gaps:list}",
-    "X006.locked": "{figure:text}: feet held in place in {n:#contact}; they slide by {after} "
-    f"instead of {{before}}{{lowered:+; the body is lowered by up to {{}}}}"
-    f"{{glides:+; contacts not held because the feet glide too far: {{}}}}: {_MOVED}",
-    "X006.no-contacts": "{figure:text}: no foot is held, since none stands on the ground",
-    "X006.only-glides": "{figure:text}: feet not held, since they glide too far in "
+    "X006.locked": "{figure:text}: feet held in place in {n:#contact}, so they slide by {after} "
+    f"instead of {{before}}: {_MOVED}",
+    "X006.locked-lowered": "{figure:text}: lowered by up to {length}, so that its feet reach "
+    "the ground",
+    "X006.locked-glides": "{figure:text}: feet not held in {n:#more contact}, in which they glide "
+    "too far",
+    "X006.no-contacts": "{figure:text}: no foot is held, because none rests on the ground",
+    "X006.only-glides": "{figure:text}: feet not held, because they glide too far in "
     "{n:#contact} with the ground",
-    "X006.no-legs": "{figure:text}: feet not held, since no legs were found by joint name",
+    "X006.no-legs": "{figure:text}: feet not held, because no joint has the name of a leg",
     "X006.grounded": "{figure:text}: {way} by {height}, so that its feet rest at height 0",
-    "X006.grounded-lowest": "{figure:text}: {way} by {height}: its feet never clearly rest, so "
-    "their lowest positions are at height 0",
-    "X006.no-feet": "{figure:text}: not moved to the ground, since it has no feet with a mesh and "
-    "no joints of known names",
+    "X006.grounded-lowest": "{figure:text}: {way} by {height}, so that the lowest position of its "
+    "feet is at height 0 (they never clearly rest)",
+    "X006.no-feet": "{figure:text}: not moved to the ground, because it has neither feet with a "
+    "mesh nor joints of known names",
     "X006.trimmed": "{figure:text}: frames {first} to {last} kept, {n} of {all}",
     "X006.resampled": "{figure:text}: resampled from {old:g} to {new:g} fps, {before:#frame} to "
     f"{{after}}: at the times of the original frames, {_MOVED}",

@@ -4,8 +4,8 @@ MESSAGES = {
     "F001.picture": "unreadable image: {reason:text}",
     "F002.picture": "unsupported or damaged image",
     "F001.video": "unreadable video: {reason:text}",
-    "F001.video-camera": "a video needs a camera of the capture, which has none: expected people "
-    "in camera space (--space camera) or calibrated cameras",
+    "F001.video-camera": "the capture has no camera to which the video could belong: expected "
+    "calibrated cameras, or people in camera space (--space camera)",
     "F001.several-captures": "expected one capture with {option:text}, found {n}: {paths:list}; "
     "open them one at a time",
     "F001.video-cameras": "expected a video with the name of one of the cameras ({names:list})",

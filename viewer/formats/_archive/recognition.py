@@ -11,14 +11,11 @@ from viewer.formats._format import Format
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
-_NAMED_KEYS = 3  # number of keys per format in a message about unknown archives
-
 
 def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
     """Return the key of an archive's format, determined by its keys and the shapes of its arrays.
 
-    ``formats`` are all formats by key. Raises FormatError if none matches; the message lists keys
-    of each format.
+    ``formats`` are all formats by key. Raises FormatError with the archive's keys if none matches.
     """
     archive = archive_of(source)
     keys = archive.keys
@@ -33,15 +30,9 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
             return "video_mocap"
     if _is_video_mocap(archive):
         return "video_mocap"
-    wanted = "; ".join(
-        f"{form.title}: {', '.join(form.keys[:_NAMED_KEYS])}"
-        for form in formats.values()
-        if form.keys
-    )
     if not keys:
-        raise source.fault("F002.empty-archive", wanted=wanted)
-    found = [printable(key, 40) for key in keys]
-    raise source.fault("F002.unknown-archive", wanted=wanted, found=found)
+        raise source.fault("F002.empty-archive")
+    raise source.fault("F002.unknown-archive", found=[printable(key, 40) for key in keys])
 
 
 _OF_EASYMOCAP = ("Rh", "Th", "keypoints3d", "annots")

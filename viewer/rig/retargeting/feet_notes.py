@@ -14,7 +14,7 @@ _ROUNDING = 1e-6  # length below which 0 is shown, as a fraction of the body's h
 
 
 def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -> list[Diagnostic]:
-    """Return a message about the changes made by planting the feet.
+    """Return messages about the changes made by planting the feet.
 
     Parameters
     ----------
@@ -41,9 +41,15 @@ def feet_notes(changes: PlantedFeet | None, found: Retargeted, figure: Figure) -
         "source": text(changes.source),
         "before": text(changes.before),
         "after": text(changes.after),
-        "gap_before": text(changes.gap_before),
-        "gap": text(changes.gap_after),
-        "ground": f"{text(changes.ground_speed)}/s" if changes.ground_speed else "",
-        "lowered": text(changes.lowered) if changes.lowered > _ROUNDING * changes.size else "",
     }
-    return [Diagnostic("F007.feet-planted", values=values)]
+    notes = [Diagnostic("F007.feet-planted", values=values)]
+    own = {"figure": figure.name}
+    gaps = own | {"gap_before": text(changes.gap_before), "gap": text(changes.gap_after)}
+    notes.append(Diagnostic("F007.feet-gap", values=gaps))
+    if changes.lowered > _ROUNDING * changes.size:
+        length = text(changes.lowered)
+        notes.append(Diagnostic("F007.feet-lowered", values=own | {"length": length}))
+    if changes.ground_speed:
+        speed = f"{text(changes.ground_speed)}/s"
+        notes.append(Diagnostic("F007.feet-ground", values=own | {"speed": speed}))
+    return notes
