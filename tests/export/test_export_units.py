@@ -170,9 +170,8 @@ def test_amass_of_a_skeleton_is_in_metres_relative_to_its_root(tmp_path, up):
             assert_allclose(rotation(poses[0]), expected, rtol=0, atol=1e-12)
     assert notes[1:] == [
         "lengths were converted from centimetres to metres",
-        "translations are relative to the skeleton's root at rest, (0.01, 0.95, 0.02) m: a model "
-        "with a different root position at rest is offset by the difference (use --model for exact "
-        "translations)",
+        "translations are relative to the root at rest, (0.01, 0.95, 0.02) m: a model whose root "
+        "is elsewhere is offset (--model makes translations exact)",
     ]
 
 

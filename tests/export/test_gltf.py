@@ -88,8 +88,8 @@ def test_fox_positions_match_skinning(tmp_path):
     assert notes[1:] == [
         "lengths are unchanged: the unit of fox is unknown, and programs interpret glTF lengths as "
         "metres",
-        f"up to {counts.max()} influences per vertex, all of them written, strongest first: "
-        f"programs that read only JOINTS_0 have errors of up to {percent:.3g} % of the size",
+        f"up to {counts.max()} influences per vertex, all of them written, strongest first; "
+        f"programs that read only the first four are wrong by up to {percent:.3g} % of the size",
         "not stored in glTF: joint limits",
     ]
 

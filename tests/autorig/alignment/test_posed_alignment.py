@@ -130,14 +130,13 @@ def test_stretched_target_gets_a_scale_along_each_axis(own):
     assert_allclose(found.alignment.similarity.linear, wanted, atol=0.005)
     assert [re.sub(r"[\d.]+", "N", str(line)) for line in found.lines] == [
         f"proportions: template stretched by N, N, N along {whose} x, y and z, pose kept",
-        "result: a fitting error of N % of the size, N % before",
+        "result: a gap of N % of the size (N % before)",
     ]
     unfitted, _ = aligned(figure, target, fits=False, samples=250)
     (line,) = unfitted.lines
     found = re.fullmatch(
-        rf"warning: the template fits much better when stretched by (.+) along {whose} x, y and z, "
-        rf"with a fitting error of 0\.\d+ % instead of \d\.\d+ %: if the target was "
-        r"stretched, (.+)",
+        rf"warning: the template fits much better if stretched by (.+) along {whose} x, y and z "
+        r"\(0\.\d+ % of the size apart instead of \d\.\d+ %\): (.+) if the target was stretched",
         line.labelled,
     )
     assert_allclose([float(each) for each in found[1].split(", ")], [1.3, 1.0, 0.8], atol=0.005)
@@ -171,19 +170,19 @@ def fit_of(figure, pose, angle):
 @pytest.mark.parametrize(
     ("target", "reached", "lines"),
     [
-        (1.5, 1.38, ("warning: pose: not fitted, because that would result in a fitting error of G "
-                     "% of the size, G % before, with tip rotated by 79 degrees; use a template "
+        (1.5, 1.38, ("warning: pose: not fitted, because tip would rotate by 79 degrees and a gap "
+                     "of G % of the size (G % before) would remain; use a template "
                      "of the same kind as the target",)),
         (0.9, 0.7, ("pose: template joints rotated to fit, by up to 40 degrees (tip); limb lengths "
                     "changed by up to +0 % (base)",
-                    "warning: poor fit: a fitting error of G % of the size, G % before; use a "
+                    "warning: poor fit: a gap of G % of the size (G % before); use a "
                     "template of "
                     "the same kind as the target")),
         (1.5, 1.5, ("pose: template joints rotated to fit, by up to 86 degrees (tip); limb lengths "
                     "changed by up to +0 % (base)",
-                    "result: a fitting error of G % of the size, G % before")),
-        (1.5, 0.1, ("pose: not fitted, because that would result in a fitting error of G % of the "
-                    "size, G % before",)),
+                    "result: a gap of G % of the size (G % before)")),
+        (1.5, 0.1, ("pose: not fitted, because a gap of G % of the size (G % before) would "
+                    "remain",)),
     ],
 )  # fmt: skip
 def test_poor_fit_is_flagged_or_rejected(monkeypatch, target, reached, lines):

@@ -213,8 +213,8 @@ def test_report_is_complete_and_warns_of_a_poor_fit():
     assert [line.labelled for line in lines] == [
         "alignment: found by matching closest points; scale 2, rotation 90.00 degrees, "
         "translation (1, 0, -2)",
-        "alignment error: 5.000 % of the target's size (RMS of the best 90 %; template to target "
-        "10.000 %)",
-        "warning: unreliable alignment, error above 3 %: specify --up, --facing or landmarks, or "
-        "pose the template like the target",
+        "alignment error: 5.00 % of the target's size (RMS of the best 90 %), 10.00 % from "
+        "template to target",
+        "warning: unreliable alignment, with an error above 3 %: specify --up, --facing or "
+        "--landmarks, or pose the template like the target (--template-pose)",
     ]

@@ -47,7 +47,7 @@ def test_match_report_uses_the_singular_for_one_part():
     found = matches([True, True], [0])
     (line,) = match_lines(found, ~found.matched, "direct")[1:]
     assert str(line) == (
-        "1 part of the target with winding opposite to the template: matched with reversed normals"
+        "1 part of the target is wound opposite to the template: matched with reversed normals"
     )
 
 

@@ -61,8 +61,8 @@ MESSAGES = {
     f"{_LIMITS}",
     "X002.topology": "{n:#triangle} on {vertices:#vertex} were read back instead of the "
     "{all:#triangle} of the figure",
-    "X002.first-influences": f"{_INFLUENCES}: with only the first four, the mesh moves by up to "
-    "{length}{extent:+ ({})}",
+    "X002.first-influences": f"{_INFLUENCES}; programs that read only the first four are wrong by "
+    "up to {length}{extent:+ ({})}",
     "X002.quantized": "quantised with rounding errors of up to {parts:all}",
     "X002.animations": "{vertices} differ by up to {length}{place:+ ({})}, compared at "
     "{times:#time} in {n:#animation}{causes:+: {}}",
