@@ -13,8 +13,10 @@
               "expression": [[10]], "handl": [[n]], "handr": [[n]],
               "keypoints3d": [[x, y, z, c], …], "handl3d", "handr3d", "face3d"}
 
-If all file names are numbers, they are frame numbers, with gaps; other names are sorted. Bodies are
-V = R(Rh) X(poses, shapes) + Th, rotated about the model's origin. The files have no frame rate.
+File names that differ only in a number have the frame numbers, with gaps; files named otherwise are
+ignored. Names without numbers are sorted. An ``id`` may be a number, also as text, or a name.
+Bodies are V = R(Rh) X(poses, shapes) + Th, rotated about the model's origin. The files have no
+frame rate.
 """
 
 from __future__ import annotations

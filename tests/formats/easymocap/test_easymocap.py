@@ -103,14 +103,75 @@ def test_gaps_in_frame_numbers_are_kept(tmp_path):
     assert timing.locate(np.array([-1.0, 0.0, 0.02, 9.0]))[0].tolist() == [-1, 0, -1, -1]
 
 
-def test_numeric_names_are_sorted_by_number_and_other_names_by_text(tmp_path):
-    write_frames(tmp_path / "a", {"9": [body(9)], "10": [body(10)]})
-    _, parts, _ = opened(tmp_path / "a")
-    assert (rows_of(parts, 9), rows_of(parts, 10)) == ([0], [1])
-    write_frames(tmp_path / "b", {"f9": [body(9)], "f10": [body(10)]})
-    capture, parts, _ = opened(tmp_path / "b")
-    assert (rows_of(parts, 9), rows_of(parts, 10)) == ([1], [0])
-    assert capture.first_frame == 0
+@pytest.mark.parametrize("name", ["{}", "f{}", "cam01_{:04}", "take2_{}_smpl"])
+def test_numbers_in_names_are_frame_numbers(tmp_path, name):
+    frames = {name.format(frame): [body(frame)] for frame in (10, 9, 12)}
+    capture, parts, warnings = opened(write_frames(tmp_path / "a", frames))
+    assert (capture.first_frame, capture.n_frames, warnings) == (9, 4, [])
+    assert [rows_of(parts, person) for person in (9, 10, 12)] == [[0], [1], [3]]
+
+
+def test_names_without_numbers_are_sorted_by_text(tmp_path):
+    write_frames(tmp_path / "a", {"b": [body(1)], "a": [body(0)]})
+    capture, parts, _ = opened(tmp_path / "a")
+    assert (rows_of(parts, 0), rows_of(parts, 1), capture.first_frame) == ([0], [1], 0)
+
+
+@pytest.mark.parametrize("name", ["summary", "notes_2024", "2024_notes", "zz"])
+def test_foreign_files_are_ignored(tmp_path, name):
+    frames = {**{frame: [body(0)] for frame in range(3)}, name: {"a": 1}}
+    capture, parts, warnings = opened(write_frames(tmp_path / "smpl", frames).parent)
+    assert (capture.n_frames, rows_of(parts, 0)) == (3, [0, 1, 2])
+    assert warnings == [("F007.capture-foreign", None, {"names": [f"{name}.json"]})]
+    assert noticed(parts) == []
+
+
+def test_foreign_file_beside_a_single_frame_is_ignored(tmp_path):
+    write_frames(tmp_path / "smpl", {0: [body(0)], "summary": {"a": 1}})
+    assert opened(tmp_path)[0].n_frames == 1
+
+
+def test_ids_may_be_numbers_as_text(tmp_path):
+    write_frames(
+        tmp_path / "smpl", {0: [body(0, id="7"), body(0, id="-1")], 1: [body(0, id=" 07")]}
+    )
+    _, parts, _ = opened(tmp_path)
+    assert (rows_of(parts, 7), rows_of(parts, -1)) == ([0, 1], [0])
+
+
+def test_people_with_names_are_numbered(tmp_path):
+    frames = {
+        0: [body(0, id="amy")],
+        1: [body(0, id="bob"), body(0, id="amy")],
+        2: [body(0, id=None, personID="bob")],
+    }
+    _, parts, _ = opened(write_frames(tmp_path / "smpl", frames).parent)
+    assert (rows_of(parts, 0), rows_of(parts, 1)) == ([0, 1], [1, 2])
+    assert ("F007.person-names", None, {"names": ["0: amy", "1: bob"]}) in noticed(parts)
+
+
+def test_number_of_a_person_with_a_name_is_not_used_again(tmp_path):
+    write_frames(
+        tmp_path / "smpl", {0: [body(0, id="amy"), body(0), body(1)], 1: [body(0, id="bob")]}
+    )
+    _, parts, _ = opened(tmp_path)
+    assert [rows_of(parts, person) for person in (0, 1, 2)] == [[0], [0], [1]]
+    assert "F007.record" in [key for key, _, _ in noticed(parts)]
+
+
+def test_ids_that_are_null_are_missing(tmp_path):
+    record = {**body(0), "id": None}
+    _, parts, _ = opened(write_frames(tmp_path / "smpl", {0: [record]}).parent)
+    assert (rows_of(parts, 0), [key for key, _, _ in noticed(parts)]) == (
+        [0],
+        ["F007.record-no-id"],
+    )
+
+
+def test_a_single_person_may_lack_the_list(tmp_path):
+    write_frames(tmp_path / "smpl", {0: body(4), 1: body(4)})
+    _, parts, _ = opened(tmp_path)
+    assert rows_of(parts, 4) == [0, 1]
 
 
 def test_huge_gaps_are_collapsed(tmp_path):

@@ -20,6 +20,7 @@ MESSAGES = {
     "F007.capture-beside": "read {name:text}/, ignored {others:text}/ in the same folder",
     "F007.capture-files": "ignored files next to the frame folders: {names:list}",
     "F007.capture-camera": "read {folder:text}/{name:text}, ignored other cameras: {others:list}",
+    "F007.capture-foreign": "ignored files that are not named like the frames: {names:list}",
     "F007.capture-numbers": "{n:#frame} numbered from {first} to {last}: treated as consecutive",
     "C005.capture-twice": "omitted frames that occur in more than one file: {names:list}",
     # Person records: errors in single frames are notes as long as one person can be read
@@ -125,7 +126,8 @@ PHRASES = {
     "beyond-limit": "expected numbers within ±{limit:.2g}, found {found:g}",
     "found-no-key": "no value",
     "record-person": "expected a person with named values, found {found}",
-    "record-id": "expected an integer, found {found}",
+    "record-id": "expected an integer or a name, found {found}",
+    "record-id-named": "expected a name as in earlier records, found {found}",
     "record-id-limit": "expected an id below {limit}, found {found}",
     "record-lacks": "expected {expected:or}, found keys {keys:list8}",
     "record-no-keys": "expected {expected:or}, found no keys",

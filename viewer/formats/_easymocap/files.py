@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+from collections import Counter
 from collections.abc import Iterable
 from dataclasses import field
 from pathlib import Path
@@ -23,6 +25,7 @@ _SUFFIX = ".json"
 # Maximum number of frames of a timeline: this many for every file, plus a constant.
 _MOST_HOLES = 10
 _FEW = 1000
+_NUMBERED = re.compile(r"(.*?)([0-9]+)(\D*)")
 
 
 @dataclass(slots=True)
@@ -149,11 +152,15 @@ def _first_camera(source: Source, folder: FrameFolder, inside: list[str]) -> lis
 
 def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[str]]) -> FrameFiles:
     """Assign a frame to every file: by number, with gaps, if possible; otherwise consecutively."""
-    stems = {name: name[: -len(_SUFFIX)] for names in found for name in names}
     files = FrameFiles(folders)
     place: dict[str, int] = {}
-    if all(stem.isascii() and stem.isdecimal() for stem in stems.values()):
-        numbers = {name: int(stem) for name, stem in stems.items()}
+    numbered = [_numbered(names) for names in found]
+    if all(numbers or not names for numbers, names in zip(numbered, found, strict=True)):
+        numbers = {name: number for part in numbered for name, number in part.items()}
+        foreign = [name for names in found for name in names if name not in numbers]
+        if foreign:
+            source.warn("F007.capture-foreign", names=list(dict.fromkeys(foreign)))
+        found = [[name for name in names if name in numbers] for names in found]
         order = sorted(set(numbers.values()))
         first, last = order[0], order[-1]
         if last - first < _MOST_HOLES * len(order) + _FEW:
@@ -164,12 +171,35 @@ def _on_timeline(source: Source, folders: list[FrameFolder], found: list[list[st
             rank = {number: index for index, number in enumerate(order)}
             place = {name: rank[number] for name, number in numbers.items()}
     else:
-        place = {name: index for index, name in enumerate(sorted(stems, key=stems.__getitem__))}
+        names = sorted({name for names in found for name in names}, key=_stem)
+        place = {name: index for index, name in enumerate(names)}
     for folder, names in zip(folders, found, strict=True):
         _put(source, folder, ((place[name], name) for name in names))
     files.frames = sorted(set(place.values()))
     files.n_frames = files.frames[-1] + 1
     return files
+
+
+def _stem(name: str) -> str:
+    return name[: -len(_SUFFIX)]
+
+
+def _numbered(names: list[str]) -> dict[str, int]:
+    """Return the numbers in the names of frame files, which are alike except for their number.
+
+    Other files are foreign if they are fewer; otherwise the names are not numbered.
+
+    >>> _numbered(["f01.json", "f02.json", "notes_2024.json"])
+    {'f01.json': 1, 'f02.json': 2}
+    """
+    parts = {name: match for name in names if (match := _NUMBERED.fullmatch(_stem(name)))}
+    counts = Counter((match[1], match[3]) for match in parts.values())
+    if not counts:
+        return {}
+    usual = ("", "") if ("", "") in counts else counts.most_common(1)[0][0]
+    if 2 * counts[usual] < len(names):
+        return {}
+    return {name: int(match[2]) for name, match in parts.items() if (match[1], match[3]) == usual}
 
 
 def _put(source: Source, folder: FrameFolder, frames: Iterable[tuple[int, str]]) -> None:

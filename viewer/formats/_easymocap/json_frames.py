@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 from array import array
 from collections import Counter
 from pathlib import Path
@@ -42,6 +43,10 @@ __all__ = [
 Record = dict[str, Any]
 _TRANSLATION = "Th"
 _WRAPPER = "annots"  # key of the people in files with more content
+_OF_PERSON = {"poses", "keypoints3d"}
+
+
+_WHOLE = re.compile(r"[+-]?[0-9]{1,20}")
 
 
 class RecordError(MisfitError):
@@ -109,6 +114,8 @@ def load_people(path: str, max_size: int) -> list[Any]:
         raise _fault("F002.capture-digits", path, line, most=MOST_DIGITS) from None
     if isinstance(content, dict) and _WRAPPER in content:
         content = content[_WRAPPER]
+    elif isinstance(content, dict) and not _OF_PERSON.isdisjoint(content):
+        content = [content]  # a single person without a list
     if not isinstance(content, list):
         line = _line(text, nearest_place(text, (_WRAPPER,))) or 1
         raise _fault("F002.capture-list", path, line, found=describe(content))
@@ -137,7 +144,7 @@ def record_line(path: str, max_size: int, place: int, key: str) -> int | None:
         return None
     where: Keys = (place, key) if key else (place,)
     if text.lstrip().startswith("{"):
-        where = (_WRAPPER, *where)
+        where = (_WRAPPER, *where) if f'"{_WRAPPER}"' in text else where[1:]
     return _line(text, nearest_place(text, where))
 
 
@@ -172,8 +179,10 @@ def _read(path: str, max_size: int) -> bytes:
         os.close(handle)
 
 
-def person_of(record: Any, place: int) -> int:
+def person_of(record: Any, place: int) -> int | str:
     """Return the person of a record: ``id``, ``personID``, or its index in the list.
+
+    A number as text is a number; other text is the name of a person.
 
     Raises
     ------
@@ -184,7 +193,13 @@ def person_of(record: Any, place: int) -> int:
         return person
     if not isinstance(record, dict):
         raise RecordError("", Phrase("record-person", found=describe(record)))
-    person = record.get("id", record.get("personID", place))
+    given = (value for key in ("id", "personID") if (value := record.get(key)) is not None)
+    person = next(given, place)
+    if isinstance(person, str):
+        number = person.strip()
+        if not _WHOLE.fullmatch(number):
+            return person
+        person = int(number)
     if isinstance(person, float) and person.is_integer():
         person = int(person)
     if isinstance(person, bool) or not isinstance(person, int):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from dataclasses import field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +32,7 @@ from viewer.formats._easymocap.points import KEY, Parts, PointRows, point_layout
 from viewer.formats._easymocap.shapes import COEFFICIENTS
 from viewer.formats._easymocap.survey import usual_widths
 from viewer.formats._misfit import remark_on
+from viewer.phrases import printable
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.capture import CapturePart
@@ -88,6 +90,8 @@ class Reading:
     body_layout: BodyLayout | None = None
     point_layout: tuple[PointLayout, Parts] | None = None
     first_fault: Diagnostic | None = None
+    _numbers: set[int] = field(default_factory=set)
+    _names: dict[str, int] = field(default_factory=dict)
     _prefixes: list[str] = field(default_factory=list)
     _n_faults: int = 0
     _known: dict[int, dict[str, Floats]] = field(default_factory=dict)
@@ -103,15 +107,15 @@ class Reading:
         self._prefixes = [f"{folder.path}{os.sep}" for folder in self.files.folders]
         self._usual = usual_widths(self.files, self.options.max_size)
         sizes = iter(_SIZES)
-        part, size, count = _Part(), 0, 0
+        part, size, n_read = _Part(), 0, 0
         for frame, stop in zip(frames, [*frames[1:], n_frames], strict=True):
             self._read_frame(frame, part)
-            count += 1
+            n_read += 1
             report(stop, n_frames, "frames")
-            is_enough = count == size if size else bool(part.bodies or part.points)
+            is_enough = n_read == size if size else bool(part.bodies or part.points)
             if is_enough or stop == n_frames:
                 yield self._finished(part, stop)
-                part, count, size = _Part(), 0, next(sizes, _SIZES[-1])
+                part, n_read, size = _Part(), 0, next(sizes, _SIZES[-1])
 
     def _read_frame(self, frame: int, part: _Part) -> None:
         for folder, prefix in zip(self.files.folders, self._prefixes, strict=True):
@@ -132,7 +136,7 @@ class Reading:
         seen: set[int] = set()
         for place, record in enumerate(people):
             try:
-                person = person_of(record, place)
+                person = self._number_of(person_of(record, place))
             except RecordError as problem:
                 self._fault_of(path, place, problem, problem.key)
                 continue
@@ -144,17 +148,36 @@ class Reading:
                 values = {"item": f"person {person}"}
                 self._fault(Diagnostic("F002.record-twice", Path(path), line, values=values))
                 continue
-            if "id" not in record or "personID" in record:
+            if record.get("id") is None or "personID" in record:
                 self._note_ids(path, record)
             seen.add(person)
             self._take_person(person, record, folder, frame, (path, place), part)
 
     def _note_ids(self, path: str, record: dict[str, Any]) -> None:
         """Add a note on the identity that is used if a record has none, or two different ones."""
-        if "id" not in record and "personID" not in record:
+        first, second = record.get("id"), record.get("personID")
+        if first is None and second is None:
             self.note("F007.record-no-id", path)
-        elif "id" in record and record["id"] != record["personID"]:
+        elif None not in (first, second) and str(first) != str(second):
             self.note("F007.record-ids", path)
+
+    def _number_of(self, person: int | str) -> int:
+        """Return the number of a person; those with names get unused numbers.
+
+        Raises
+        ------
+        RecordError
+            If a number has already been given to a person with a name.
+        """
+        if isinstance(person, int):
+            if person in self._names.values():
+                raise RecordError("id", Phrase("record-id-named", found=person))
+            self._numbers.add(person)
+            return person
+        if person not in self._names:
+            used = {*self._numbers, *self._names.values()}
+            self._names[person] = next(number for number in count() if number not in used)
+        return self._names[person]
 
     def _take_person(
         self,
@@ -265,6 +288,9 @@ class Reading:
         if unseen:
             people = [*map(person_label, unseen)]
             found.append(Diagnostic("F007.record-unseen", values={**values, "people": people}))
+        if self._names:
+            names = [f"{number}: {printable(name, 40)}" for name, number in self._names.items()]
+            found.append(Diagnostic("F007.person-names", values={"names": names}))
         more = self._n_faults - _MOST_WARNINGS
         if more > 0:
             found.append(Diagnostic("F007.records", values={**values, "n": more}))
