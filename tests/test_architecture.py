@@ -44,7 +44,7 @@ PARTS = {
     "lint": {"loading", "formats", "rig"},
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
-    "models": {"formats", "interrupts"},
+    "models": {"formats", "interrupts", "media"},
     "interrupts": set(),
     "resources": set(),
     "streams": set(),
@@ -89,7 +89,9 @@ ALLOWED_IN_APP = {
     "retargeting": {"core", "files", "retargeting"},
     "rigging": {"core", "files", "posing", "view", "rigging"},
     "recording": {"core", "files", "actors", "weights", "linting", "recording"},
-    "closing": {"core", "files", "curves", "playback", "retargeting", "rigging", "closing"},
+    "closing": {
+        *("core", "files", "curves", "playback", "posing", "retargeting", "rigging", "closing"),
+    },
 }
 # Third-party modules that only one part may import.
 HOMES = {

@@ -194,6 +194,8 @@ def test_window_responds_to_mouse_and_keyboard(window, places, figure):
     assert app.process.poll() is None
 
     app.tell("windowfocus", "--sync", app.id)
+    app.key("r")  # no unsaved pose
+    app.wait_until_quiet(still=1.0)
     app.key("ctrl+q")
     app.finish()
     names = json.loads((app.folder / "state" / "viewer" / "recent.json").read_text())
@@ -267,15 +269,26 @@ def test_text_is_typed_copied_and_pasted_as_in_other_programs(window, places):
     app.key("ctrl+q")
 
 
-def test_window_asks_before_edits_are_lost_and_closes_at_the_second_request(window):
+def test_window_asks_before_edits_are_lost_however_often_it_is_closed(window):
     app = window()
+    opened = app.wait_until_quiet()
     app.key("ctrl+p")
     app.tell("type", "New clip")
     app.key("Return")
-    edited = app.wait_until_quiet()
-    _ask_to_close(app.display, int(app.id))
-    app.wait_until_changed(edited)
-    _ask_to_close(app.display, int(app.id))
+    timeline = (0, 720, 200, 60)
+    app.wait_until_changed(opened, timeline)
+    edited = app.wait_until_quiet(still=1.0)
+    for _ in range(3):
+        _ask_to_close(app.display, int(app.id))
+    app.wait_until_changed(edited, timeline)  # it is dimmed behind the question
+    asked = app.wait_until_quiet(still=1.0)
+    app.key("Escape")
+    app.wait_until_changed(asked, timeline)
+    kept = app.wait_until_quiet(still=1.0)
+    app.key("ctrl+z")
+    app.wait_until_changed(kept, timeline)
+    app.wait_until_quiet(still=1.0)
+    app.key("ctrl+q")
     app.finish()
 
 

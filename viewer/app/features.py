@@ -252,7 +252,7 @@ _NO_EDIT = "retargeting.drive_changes.no_edit"
 ACTIONS = (
     Action("Open the bundled figure", _WANT, ("open bundled",)),
     Action("Open the bundled body", _WANT, ("open body",)),
-    Action("Save pose…", "menus.ask_for_pose", why="core.reasons.no_pose"),
+    Action("Save pose…", "posing.pose_actions.ask_for_pose", why="core.reasons.no_pose"),
     Action("Export…", "menus.ask_for_export", why=_ROOM),
     Action(
         "Export motion…",

@@ -17,7 +17,7 @@ from viewer.app.context.context_menu import answer_right_click, draw_context_men
 from viewer.app.core.edited_animations import Animations, keep_edited
 from viewer.app.core.fitting import keep_fitting
 from viewer.app.core.job_steps import advance_job
-from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.file_choice import PICTURES, FileDialog, folder_of
 from viewer.app.files.file_dialog import draw_file_dialog
@@ -62,6 +62,7 @@ from viewer.rendering.gpu.target import Target
 from viewer.rendering.renderer import Renderer
 from viewer.rendering.sampling import n_passes
 from viewer.rig.arrays import Bytes
+from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["Frame"]
@@ -337,14 +338,20 @@ class Frame:
 
     def _add(self, contents: Contents) -> None:
         """Apply poses and textures to the chosen actor."""
-        state = self.state
+        state, saved = self.state, self.state.of(SavedWork)
+        state.history.observe(state.scene, state.options, busy=False)
         try:
             actor, notes = add_to_actor(contents, state.actor)
         except ViewerError as problem:
             state.error = str(problem)
             return
-        keep_edited(state.of(Animations), state.actor, actor)
-        state.scene.actors[state.chosen_actor] = actor
+        if actor is not state.actor:
+            keep_edited(state.of(Animations), state.actor, actor)
+            state.history.exchange_actor(state.actor, actor)
+            saved.exchange_actor(state.actor, actor)
+            state.scene.actors[state.chosen_actor] = actor
+        if contents.poses and actor.pose is not None:
+            saved.add(SavedPose(actor, pose_key(actor.pose)))
         state.scene.files += contents.files
         added = [*contents.poses, *contents.pictures]
         state.say(*contents.diagnostics, *notes)

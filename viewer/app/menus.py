@@ -31,23 +31,23 @@ from viewer.app.linting.actions import check_rig
 from viewer.app.manual.manual_window import draw_manual_menu
 from viewer.app.palette.palette_window import toggle_palette
 from viewer.app.posing.pose_actions import (
+    ask_for_pose,
     copy_numbers,
     copy_pose,
     mirror,
     paste_pose,
     reset_pose,
     save_export,
-    save_pose,
 )
 from viewer.app.preferences.preferences_window import open_preferences
 from viewer.app.recording.record_dialog import open_record_dialog
 from viewer.app.shown_panels import is_open, reset_layout
 from viewer.app.view.view_menu import draw_view_menu
 from viewer.export import files_written
-from viewer.formats import FORMATS, file_stem, opened_text
+from viewer.formats import file_stem, opened_text
 from viewer.phrases import printable
 
-__all__ = ["ask_for_export", "ask_for_pose", "draw_menus"]
+__all__ = ["ask_for_export", "draw_menus"]
 
 
 def draw_menus(state: AppState) -> list[Path]:
@@ -119,20 +119,6 @@ def _draw_file_menu(state: AppState) -> list[Path]:
     if menu_item(state, "Quit", "Ctrl+Q"):
         state.wants.add("quit")
     return chosen
-
-
-def ask_for_pose(state: AppState) -> None:
-    """Ask where to save the chosen actor's pose."""
-    name = f"{file_stem(state.actor.name)}_pose.json"
-    suffixes = FORMATS["pose"].suffixes
-    state.of(Files).dialog = FileDialog(
-        folder_of(state.paths),
-        lambda state, paths: save_pose(state, paths[0]),
-        "save",
-        "Save pose: .json, .npz or .txt",
-        suffixes,
-        name,
-    )
 
 
 def ask_for_export(state: AppState) -> None:

@@ -15,6 +15,7 @@ from PIL import Image
 from rig.animated import animated_leg
 
 import viewer
+from viewer.app.closing.questions import request_quit
 from viewer.app.closing.state import Closing
 from viewer.app.closing.unsaved import unsaved_edits
 from viewer.app.core.undo_actions import redo, undo
@@ -80,7 +81,6 @@ def exporting(hand, tmp_path):
 
 
 def test_quitting_without_work_needs_no_question(hand):
-    hand.drag("arm.x", 0.9)  # a pose is not an edit of a file
     hand.key("q", "ctrl")
     assert is_over(hand)
 
@@ -119,12 +119,31 @@ def test_quitting_is_withdrawn_and_the_export_goes_on(exporting, tmp_path, key):
     assert not is_over(hand) and (tmp_path / "a.obj").read_text() == "new"
 
 
-def test_second_request_quits_at_once(exporting):
-    hand, _ = exporting
-    hand.key("q", "ctrl")
-    assert not is_over(hand)
-    hand.key("q", "ctrl")
-    assert is_over(hand)
+def test_further_requests_ask_the_same_question(exporting, tmp_path):
+    hand, may_end = exporting
+    for _ in range(3):
+        request_quit(hand.state)  # as a double click on the close button
+        hand.key("q", "ctrl")
+        assert not is_over(hand) and asks(hand, WAIT)
+    hand.click(WAIT)
+    assert not asks(hand, WAIT)
+    request_quit(hand.state)
+    assert asks(hand, WAIT)  # the user may not want to wait any longer
+    hand.click(WAIT)
+    may_end.set()
+    hand.finish_job()
+    assert is_over(hand) and (tmp_path / "a.obj").read_text() == "new"
+
+
+def test_further_requests_do_not_discard_edits(curves):
+    delete_key(curves)
+    for _ in range(3):
+        request_quit(curves.state)
+        curves.key("q", "ctrl")
+        assert not is_over(curves) and asks(curves, DISCARD)
+    curves.click(SAVE)
+    request_quit(curves.state)  # while the dialog covers the question
+    assert not is_over(curves) and asks(curves, DISCARD)
 
 
 def test_window_stays_open_if_the_export_is_cancelled_or_fails(exporting, tmp_path):

@@ -78,6 +78,8 @@ def test_valid_files_replace_the_scene_and_its_history(hand, tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     _open(hand, *write_rig(other, "second"))
+    hand.click("Discard")  # the pose made by hand
+    hand.step(3)
     assert hand.state.scene.actors[0].figure.name == "second"
     assert hand.dof("arm.x") == 0.2 and hand.undo_steps == 0
     assert [path.name for path in hand.state.paths] == ["second.skel", "second.skin"]

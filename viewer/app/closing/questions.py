@@ -48,12 +48,9 @@ class Question:
 
 
 def request_quit(state: AppState) -> None:
-    """Quit as soon as nothing is lost without a question; a second request quits at once."""
+    """Quit as soon as nothing is lost without a question; further requests ask it again."""
     closing, files = state.of(Closing), state.of(Files)
-    if closing.is_requested:
-        closing.is_over = True
-        return
-    closing.is_requested = True
+    closing.is_requested, closing.waits = True, False
     # An open dialog or message would cover the question.
     files.dialog, state.error = None, ""
     advance_closing(state)
@@ -110,6 +107,8 @@ def _edits(state: AppState) -> list[Unsaved]:
     # Imports panels, which are otherwise loaded on first use.
     from viewer.app.closing.unsaved import unsaved_edits
 
+    # The edits of this frame count too.
+    state.history.observe(state.scene, state.options, busy=False)
     return [] if state.of(Closing).discards else unsaved_edits(state)
 
 

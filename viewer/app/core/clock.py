@@ -12,6 +12,7 @@ from viewer.rig.motion.evaluation import scene_rate, time_span
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.motion.timing import DEFAULT_RATE, frame_at
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["FASTEST", "MODES", "Clock"]
@@ -312,6 +313,17 @@ class Clock:
         self.n_posed += 1
         pose_actors(actors, self.time, self.interpolate_gaps)
         return True
+
+    def posed(self, actor: Actor, pose: Pose) -> Pose:
+        """Return a copy of a pose, with the values that an actor's clip sets for the poses shown.
+
+        The springs of the actor do not move.
+        """
+        copied = actor.copy()
+        copied.pose, copied.springs = pose.copy(), None
+        time = self.time if self.posed_for is None else self.posed_for.time
+        pose_actors([copied], time, self.interpolate_gaps)
+        return copied.pose
 
     def go_back(self, time: float, chosen: Actor | None = None) -> None:
         """Go to a time with restored actors and clips, and pose the actors for it.

@@ -8,17 +8,26 @@ from dataclasses import field
 from viewer.data_classes import dataclass
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import PoseKey
 from viewer.rig.scene import Actor
 
-__all__ = ["SavedWork"]
+__all__ = ["SavedPose", "SavedWork"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SavedPose:
+    """A pose of an actor that a file contains."""
+
+    actor: Actor
+    key: PoseKey
 
 
 @dataclass(slots=True)
 class SavedWork:
-    """Clips, joint maps and rigs that were read from a file or saved.
+    """Clips, joint maps, rigs and poses that were read from a file or saved.
 
     Edits replace such an object by a new one, and undo restores the old one, so an object that is
-    not recorded contains unsaved edits.
+    not recorded contains unsaved edits. Poses are edited in place, so they are recorded by value.
     """
 
     _objects: list[object] = field(default_factory=list)
@@ -34,6 +43,15 @@ class SavedWork:
                 self.add(actor.clip)
             if actor.drive is not None:
                 self.add(actor.drive.joint_map)
+
+    def poses_of(self, actor: Actor) -> list[PoseKey]:
+        """Return the poses of an actor that files contain."""
+        poses = (one for one in self._objects if isinstance(one, SavedPose))
+        return [pose.key for pose in poses if pose.actor is actor]
+
+    def exchange_actor(self, old: Actor, new: Actor) -> None:
+        """Keep the poses of an actor that is replaced in the scene."""
+        self.add(*(SavedPose(new, key) for key in self.poses_of(old)))
 
     def __contains__(self, one: object) -> bool:
         return any(one is other for other in self._objects)

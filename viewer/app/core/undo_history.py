@@ -69,9 +69,12 @@ class History:
     ----------
     feature : Undoable or None
         State of the feature whose value is undone with the scene.
+    first_poses : dict
+        Poses of actors before their first edit by hand; actors that were not posed are omitted.
     """
 
     feature: Undoable | None = None
+    first_poses: dict[Actor, PoseKey] = field(default_factory=dict)
     _seen: Snapshot | None = None  # state of the last frame
     _before: Snapshot | None = None  # state before an edit in progress
     _clocked: dict[Actor, tuple[Motion, float, PoseKey | None]] = field(default_factory=dict)
@@ -82,6 +85,7 @@ class History:
         """Clear the history; the current scene becomes the first state."""
         self.feature = None  # it belonged to another scene
         self._clocked.clear()
+        self.first_poses.clear()
         self._seen = self._before = None
         self._seen = self._take(scene, options)
         self._undo.clear()
@@ -102,7 +106,23 @@ class History:
         self._undo.append(_Step(before, self._seen))
         del self._undo[:-_MOST]
         self._redo.clear()
+        self._note_poses(before, self._seen)
         return True
+
+    def _note_poses(self, before: Snapshot, after: Snapshot) -> None:
+        """Record the first poses of actors whose pose alone was edited, not their motion."""
+        new = {id(actor): row for row, actor in enumerate(after.actors)}
+        for row, actor in enumerate(before.actors):
+            other, pose = new.get(id(actor)), before.poses[row]
+            if other is None or pose is None or pose == after.poses[other]:
+                continue
+            if before.looks[row].clip is after.looks[other].clip:
+                self.first_poses.setdefault(actor, pose)
+
+    def exchange_actor(self, old: Actor, new: Actor) -> None:
+        """Keep the first pose of an actor that is replaced in the scene."""
+        if old in self.first_poses:
+            self.first_poses.setdefault(new, self.first_poses[old])
 
     def accept(self, scene: Scene, options: DisplayOptions) -> None:
         """Adopt a change of the display without recording a step."""

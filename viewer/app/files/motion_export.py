@@ -9,7 +9,7 @@ from pathlib import Path
 from viewer.app.core.edited_animations import Animations, edited_aside, with_edited_keys
 from viewer.app.core.jobs import CountedJob, Report
 from viewer.app.core.reasons import no_job_room
-from viewer.app.core.saved_work import SavedWork
+from viewer.app.core.saved_work import SavedPose, SavedWork
 from viewer.app.core.state import AppState
 from viewer.app.files.export_formats import FOLDER
 from viewer.data_classes import dataclass
@@ -40,6 +40,7 @@ from viewer.rig.motion.spring_motion import release_springs
 from viewer.rig.motion.timing import frame_at
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import upright_actor
+from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.smpl_family import member_of
 
@@ -131,7 +132,7 @@ def _paths(path: Path, actors: Sequence[Actor]) -> list[Path]:
 class _Part:
     """One actor to export: its state at the start of the export, target file and frames.
 
-    ``saved``: the edited clips that the file will contain.
+    ``saved``: the edited clips and the pose that the file will contain.
     """
 
     actor: Actor
@@ -176,7 +177,14 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         return
     scene = Scene([], world_up=state.scene.up, views=state.scene.views)
     still = [each.copy() for each in state.scene.actors if everyone and each.clip is None]
-    known, clips = state.of(SavedWork), [clip for part in parts for clip in part.saved]
+    in_one_file = is_one_file(path) and (len(parts) + len(still) > 1 or bool(scene.views))
+    known, written = state.of(SavedWork), [one for part in parts for one in part.saved]
+    if in_one_file:
+        written += [
+            SavedPose(each, pose_key(each.pose))
+            for each in state.scene.actors
+            if everyone and each.clip is None and each.pose is not None
+        ]
     options = MotionOptions(skinning=replace(state.options.skinning))
     n_paths = len({part.path for part in parts})
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
@@ -190,14 +198,14 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
             if key == "easymocap":
                 return [*map(str, [*_write_capture(scene, parts, path, options), *left_out])]
             with all_or_none(files):
-                if is_one_file(path) and (len(parts) + len(still) > 1 or scene.views):
+                if in_one_file:
                     notes = _write_together(scene, parts, still, path, options)
                 else:
                     notes = _write(scene, parts, key, options)
                 report(1, 1, "")  # as in save_in_background
                 return [*map(str, [*notes, *left_out])]
 
-    state.job = CountedJob(title, write, lambda: known.add(*clips), "export")
+    state.job = CountedJob(title, write, lambda: known.add(*written), "export")
 
 
 def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], list[Diagnostic]]:
@@ -235,9 +243,13 @@ def _parts(state: AppState, path: Path, everyone: bool) -> tuple[list[_Part], li
 
 
 def _written_keys(state: AppState, actor: Actor, file: Path) -> tuple[object, ...]:
-    """Return the edited clips of an actor that a file contains."""
+    """Return the edited clips of an actor that a file contains, and the pose under its clip."""
     has_all = file.suffix.lower() in _ALL_ANIMATIONS and keeps_keys(state.scene, actor)
-    return (actor.clip, *(edited_aside(state.of(Animations), actor).values() if has_all else ()))
+    clips = (actor.clip, *(edited_aside(state.of(Animations), actor).values() if has_all else ()))
+    if actor.pose is None:
+        return clips
+    # A pose made by hand at this time is not part of the motion.
+    return (*clips, SavedPose(actor, pose_key(state.clock.posed(actor, actor.pose))))
 
 
 def _write(

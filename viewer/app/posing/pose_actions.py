@@ -9,25 +9,32 @@ from pathlib import Path
 import numpy as np
 from imgui_bundle import imgui
 
+from viewer.app.core.saved_work import SavedPose
 from viewer.app.core.state import AppState
+from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.saving import save_files, save_in_background
+from viewer.app.files.state import Files
 from viewer.app.posing.clip_pause import pause_for_edit
 from viewer.app.posing.state import Posing
 from viewer.errors import ViewerError
 from viewer.export import export, files_written
 from viewer.export.pose import export as export_pose
-from viewer.formats import Source
+from viewer.formats import FORMATS, Source, file_stem
+from viewer.rig.figure import Figure
 from viewer.rig.motion.upright import upright_actor
+from viewer.rig.pose import Pose, pose_key
 from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, figure_pose
 
 __all__ = [
+    "ask_for_pose",
     "copy_numbers",
     "copy_pose",
     "mirror",
     "paste_pose",
+    "pose_of_file",
     "random_shape",
     "reset_actor",
     "reset_joint",
@@ -96,11 +103,29 @@ def paste_pose(state: AppState) -> None:
     pause_for_edit(state)
 
 
+def ask_for_pose(state: AppState) -> None:
+    """Ask where to save the chosen actor's pose."""
+    name = f"{file_stem(state.actor.name)}_pose.json"
+    suffixes = FORMATS["pose"].suffixes
+    state.of(Files).dialog = FileDialog(
+        folder_of(state.paths),
+        lambda state, paths: save_pose(state, paths[0]),
+        "save",
+        "Save pose: .json, .npz or .txt",
+        suffixes,
+        name,
+    )
+
+
 def save_pose(state: AppState, path: Path) -> None:
     """Write the chosen actor's pose; the suffix selects the format, and losses are shown."""
     actor, skinning = state.actor, state.options.skinning
+
+    def act() -> None:
+        state.say(*export_pose(actor, path, skinning)[1:])
+
     if actor.pose is not None:
-        save_files(state, lambda: state.say(*export_pose(actor, path, skinning)[1:]), [path])
+        save_files(state, act, [path], _saved(actor))
 
 
 def save_export(state: AppState, path: Path) -> None:
@@ -113,7 +138,13 @@ def save_export(state: AppState, path: Path) -> None:
     # Edits made during the export must not change the written pose.
     actor = upright_actor(state.scene, state.actor).copy()
     skinning = replace(state.options.skinning)
-    save_in_background(state, lambda: export(actor, path, skinning), files)
+    act, saved = lambda: export(actor, path, skinning), _saved(state.actor)
+    save_in_background(state, act, files, saved=saved)
+
+
+def _saved(actor: Actor) -> SavedPose | None:
+    """Return the present pose of an actor, to record that a file contains it."""
+    return None if actor.pose is None else SavedPose(actor, pose_key(actor.pose))
 
 
 def mirror(state: AppState) -> None:
@@ -144,16 +175,21 @@ def reset_actor(state: AppState) -> None:
 
 def _reset(actor: Actor) -> bool:
     """Reset an actor to the pose of its file, and return whether it has one."""
-    figure, old = actor.figure, actor.pose
-    if figure.skeleton is None or old is None:
+    if actor.figure.skeleton is None or actor.pose is None:
         return False
-    actor.pose = figure_pose(figure)
+    actor.pose = pose_of_file(actor.figure, actor.pose)
+    return True
+
+
+def pose_of_file(figure: Figure, old: Pose) -> Pose:
+    """Return the pose of a figure's file with the shape of another pose."""
+    pose = figure_pose(figure)
     groups = () if figure.blend_shapes is None else figure.blend_shapes.groups
     # Shape coefficients belong to the person, morph targets to the pose.
     is_kept = np.array([group != "morph" for group in groups[: len(old.shape_weights)]], bool)
     rows = np.flatnonzero(is_kept)
-    actor.pose.shape_weights[rows] = old.shape_weights[rows]
-    return True
+    pose.shape_weights[rows] = old.shape_weights[rows]
+    return pose
 
 
 def reset_joint(state: AppState, joint: int) -> None:
