@@ -15,7 +15,7 @@ import moderngl  # noqa: E402  after glfw, whose library imgui-bundle chooses
 from imgui_bundle import imgui, implot  # noqa: E402
 
 from viewer.app.display_loss import stop_watching  # noqa: E402
-from viewer.app.files.recent import state_folder  # noqa: E402
+from viewer.app.files.recent import load_layout, save_layout  # noqa: E402
 from viewer.app.preferences.applying import chosen_scale  # noqa: E402
 from viewer.app.preferences.state import Appearance  # noqa: E402
 from viewer.app.preferences.storage import load_preferences  # noqa: E402
@@ -52,6 +52,8 @@ class Shell:
         Whether the window's contents were damaged or resized.
     problems : list of str
         Messages about problems that do not prevent the window from opening.
+    has_layout : bool
+        Whether a stored layout of the panels was restored.
 
     Raises
     ------
@@ -60,7 +62,9 @@ class Shell:
     """
 
     def __init__(self, title: str, scale: float | None = None) -> None:
-        self.preferences, self.appearance = load_preferences(), Appearance()
+        self.problems: list[str] = []
+        self.preferences = load_preferences(self.problems.append)
+        self.appearance = Appearance()
         self.handle = create_window(title, scale=scale or self.preferences.scale)
         try:
             glfw.make_context_current(self.handle)
@@ -72,8 +76,8 @@ class Shell:
             raise
         self.dropped: list[Path] = []
         self.is_dirty = True
-        self.problems: list[str] = []
         self._title = title
+        self._saves_layout = True
         self._typed_keys = TypedKeys()
         self._set_callbacks()
         self.imgui: Any = imgui.create_context()
@@ -105,13 +109,11 @@ class Shell:
     def _set_up_imgui(self, scale: float | None) -> None:
         io = imgui.get_io()
         io.config_flags |= imgui.ConfigFlags_.docking_enable
-        folder = state_folder()
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
-            io.set_ini_filename(str(folder / "layout.ini"))
-        except OSError as problem:
-            io.set_ini_filename(None)
-            self.problems.append(f"the layout cannot be saved: {problem.strerror}")
+        # ImGui would write the file in place, and load whatever is in it.
+        io.set_ini_filename(None)
+        layout = load_layout(self.problems.append)
+        self.has_layout = bool(layout)
+        imgui.load_ini_settings_from_memory(layout)
         appearance, preferences = self.appearance, self.preferences
         appearance.given_scale, appearance.screen_scale = scale, self.screen_scale()
         if preferences.theme == "system":
@@ -141,6 +143,15 @@ class Shell:
         imgui.backends.opengl3_new_frame()
         imgui.backends.glfw_new_frame()
         imgui.new_frame()
+
+    def save_layout(self) -> str:
+        """Store the layout of the panels; return the reason if that fails for the first time."""
+        imgui.get_io().want_save_ini_settings = False
+        if not self._saves_layout:
+            return ""
+        why = save_layout(imgui.save_ini_settings_to_memory())
+        self._saves_layout = not why
+        return f"the layout cannot be saved: {why}" if why else ""
 
     def set_title(self, title: str) -> None:
         """Set the title of the window if it has changed."""

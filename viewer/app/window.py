@@ -68,6 +68,7 @@ def show(
     plays: bool = False,
     motion: MotionSettings | None = None,
     shell: Shell | None = None,
+    messages: Sequence[str] = (),
 ) -> None:
     """Open a window and return when it is closed.
 
@@ -93,6 +94,8 @@ def show(
         Settings with which the scene's motions were read.
     shell : Shell, optional
         Window that is already open; a new one if omitted. It is closed at the end.
+    messages : sequence of str
+        Messages to show in the window.
 
     Raises
     ------
@@ -103,7 +106,8 @@ def show(
     """
     if shell is None:
         find_display()
-    preferences = load_preferences() if shell is None else shell.preferences
+    problems = [*messages]
+    preferences = load_preferences(problems.append) if shell is None else shell.preferences
     options = options or DisplayOptions(samples=preferences.samples, quality=preferences.quality)
     points = scene_points(scene, options.show)
     camera = camera or facing_camera(guess_front(scene), scene.up)
@@ -117,14 +121,15 @@ def show(
     if options.shading == "scalar":
         start_heat_map(state)
     opened = state.of(Files)
-    opened.recent = load_recent()
-    state.of(ShownPanels).closed = load_closed_panels()
+    opened.recent = load_recent(problems.append)
+    state.of(ShownPanels).closed = load_closed_panels(problems.append)
     start_with(state, preferences)
-    state.of(Layout).is_arranged = load_arranged()
-    state.say(*filter(None, [remember(opened.recent, files)]))
+    is_arranged = load_arranged(problems.append)
+    state.say(*problems, *filter(None, [remember(opened.recent, files)]))
     state.clock.playing = plays and state.clock.has_motion
     shell = shell or Shell(_title(state), scale)
     state.put(shell.appearance)
+    state.of(Layout).is_arranged = is_arranged and shell.has_layout
     window = _Window(state, shell)
     try:
         window.frame.stream(builders)
@@ -227,11 +232,14 @@ class _Window:
         shell.begin_frame()
         self.frame.draw(shell.context.screen, size, shell.pixels_per_point())
         glfw.swap_buffers(self.handle)
+        if imgui.get_io().want_save_ini_settings:
+            self.state.say(*filter(None, [shell.save_layout()]))
 
     def release(self) -> None:
         """Save the layout, close the window, and release everything."""
         save_closed_panels(self.state.of(ShownPanels).closed)
         save_arranged(self.state.of(Layout).is_arranged)
+        self.shell.save_layout()
         self.frame.release()
         self.shell.release()
 

@@ -30,6 +30,7 @@ from viewer.commands._view import (
     warn_of_missing,
 )
 from viewer.formats import free_path, opened_text
+from viewer.media.kept_files import to_stderr
 from viewer.phrases import printable
 from viewer.progress import Cancelled
 from viewer.rendering.camera import Camera
@@ -79,11 +80,13 @@ def run(arguments: argparse.Namespace) -> int:
     """Open the window, or write the image that it would show."""
     from viewer.app.display import NoDisplay, find_display
 
-    _fill_in(arguments)
+    problems = _fill_in(arguments)
     options = display_of(arguments)
     try:
         find_display()
     except NoDisplay as problem:
+        for text in problems:
+            to_stderr(text)
         start = _start(arguments, options)
         for builder in start.builders:
             finish(builder, start.scene)
@@ -115,6 +118,7 @@ def run(arguments: argparse.Namespace) -> int:
         plays=arguments.play,
         motion=motion_settings(arguments),
         shell=shell,
+        messages=problems,
     )
     return 0
 
@@ -149,15 +153,17 @@ def _title(arguments: argparse.Namespace) -> str:
     return " + ".join(names) or "the bundled figure"
 
 
-def _fill_in(arguments: argparse.Namespace) -> None:
-    """Set omitted options from the user's preferences."""
+def _fill_in(arguments: argparse.Namespace) -> list[str]:
+    """Set omitted options from the user's preferences; return messages about damaged ones."""
     from viewer.app.preferences.storage import load_preferences
 
-    preferences = load_preferences()
+    problems: list[str] = []
+    preferences = load_preferences(problems.append)
     if arguments.samples is None:
         arguments.samples = preferences.samples
     arguments.quality = arguments.quality or preferences.quality
     arguments.up = arguments.up or preferences.up or None
+    return problems
 
 
 def _draw_instead(

@@ -56,13 +56,18 @@ def _settings_file() -> Path:
 
 def load_model_folder() -> Path | None:
     """Return the remembered folder; None if there is none or the setting cannot be read."""
-    import json
+    from viewer.media.kept_files import load_kept
 
-    try:
-        folder = json.loads(_settings_file().read_text("utf-8"))["folder"]
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return None
-    return Path(folder) if isinstance(folder, str) else None
+    return load_kept(_settings_file(), _folder_in, None)
+
+
+def _folder_in(data: bytes) -> Path | None:
+    from viewer.media.kept_files import as_json
+
+    found = as_json(data)
+    if not isinstance(found, dict) or not isinstance(found.get("folder"), str):
+        raise ValueError("expected a folder")
+    return Path(found["folder"])
 
 
 def save_model_folder(folder: str | Path) -> Path:

@@ -1,28 +1,37 @@
-"""Recent files, closed panels and their arrangement, stored between runs."""
+"""Recent files, closed panels, and layout of the panels, stored between runs."""
 
 from __future__ import annotations
 
-import contextlib
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import platformdirs
 
-from viewer.errors import OutputError
-from viewer.formats import save_bytes
+from viewer.media.kept_files import (
+    as_json,
+    checked,
+    load_kept,
+    save_kept,
+    to_stderr,
+    with_checksum,
+)
 
 __all__ = [
     "load_arranged",
     "load_closed_panels",
+    "load_layout",
     "load_recent",
     "remember",
     "save_arranged",
     "save_closed_panels",
+    "save_layout",
     "state_folder",
 ]
 
 _MOST = 12
+_Say = Callable[[str], object]
 
 
 def state_folder() -> Path:
@@ -30,14 +39,14 @@ def state_folder() -> Path:
     return Path(platformdirs.user_state_dir("viewer", appauthor=False))
 
 
-def load_recent() -> list[tuple[str, ...]]:
+def load_recent(say: _Say = to_stderr) -> list[tuple[str, ...]]:
     """Return groups of files that were opened together, latest first; empty if unreadable."""
-    try:
-        groups = json.loads((state_folder() / "recent.json").read_text("utf-8"))
-        lists = [group for group in groups if isinstance(group, list) and group]
-        return [tuple(map(str, group)) for group in lists][:_MOST]
-    except (OSError, ValueError, TypeError, RecursionError):
-        return []
+    none: list[tuple[str, ...]] = []
+    return load_kept(state_folder() / "recent.json", _groups, none, say)[:_MOST]
+
+
+def _groups(data: bytes) -> list[tuple[str, ...]]:
+    return [tuple(_texts(group)) for group in _list(as_json(data))]
 
 
 def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
@@ -54,41 +63,67 @@ def remember(recent: list[tuple[str, ...]], paths: Sequence[Path]) -> str:
         return ""
     try:
         group = tuple(str(path.resolve()) for path in paths)
-        recent[:] = [group, *(old for old in recent if old != group)][:_MOST]
-        state_folder().mkdir(parents=True, exist_ok=True)
-        text = json.dumps([list(old) for old in recent], indent=1)
-        save_bytes(state_folder() / "recent.json", text.encode("utf-8", "replace"))
-    except (OSError, RuntimeError, OutputError) as problem:  # resolve() raises both
+    except (OSError, RuntimeError) as problem:  # resolve() raises both
         return f"recent files could not be saved: {problem}"
-    return ""
+    recent[:] = [group, *(old for old in recent if old != group)][:_MOST]
+    text = json.dumps([list(old) for old in recent], indent=1)
+    why = save_kept(state_folder() / "recent.json", text.encode("utf-8", "replace"))
+    return f"recent files could not be saved: {why}" if why else ""
 
 
-def load_closed_panels() -> set[str]:
+def load_closed_panels(say: _Say = to_stderr) -> set[str]:
     """Return the panels that were closed in the last run; empty if unreadable."""
-    try:
-        names = json.loads((state_folder() / "closed.json").read_text("utf-8"))
-        return {name for name in names if isinstance(name, str)}
-    except (OSError, ValueError, TypeError, RecursionError):
-        return set()
+    return load_kept(state_folder() / "closed.json", _names, set(), say)
+
+
+def _names(data: bytes) -> set[str]:
+    return {*_texts(as_json(data))}
 
 
 def save_closed_panels(names: set[str]) -> None:
     """Store which panels are closed; an unwritable folder is ignored."""
-    with contextlib.suppress(OSError, OutputError):
-        state_folder().mkdir(parents=True, exist_ok=True)
-        save_bytes(state_folder() / "closed.json", json.dumps(sorted(names)).encode())
+    save_kept(state_folder() / "closed.json", json.dumps(sorted(names)).encode())
 
 
-def load_arranged() -> bool:
+def load_arranged(say: _Say = to_stderr) -> bool:
     """Return whether the stored layout is the user's own; a stored default is rebuilt."""
-    try:
-        return json.loads((state_folder() / "arranged.json").read_text("utf-8")) is True
-    except (OSError, ValueError, RecursionError):
-        return False
+    return load_kept(state_folder() / "arranged.json", _flag, False, say)
+
+
+def _flag(data: bytes) -> bool:
+    found = as_json(data)
+    if not isinstance(found, bool):
+        raise ValueError("expected true or false")
+    return found
 
 
 def save_arranged(is_arranged: bool) -> None:
     """Store whether the user has arranged the panels; an unwritable folder is ignored."""
-    with contextlib.suppress(OSError, OutputError):
-        state_folder().mkdir(parents=True, exist_ok=True)
-        save_bytes(state_folder() / "arranged.json", json.dumps(is_arranged).encode())
+    save_kept(state_folder() / "arranged.json", json.dumps(is_arranged).encode())
+
+
+def load_layout(say: _Say = to_stderr) -> str:
+    """Return the layout of the panels as ImGui wrote it; empty if there is none.
+
+    ImGui trusts its file: docks that do not fit together end the process. So only text that was
+    stored completely and is unchanged is returned.
+    """
+    return load_kept(state_folder() / "layout.ini", checked, "", say)
+
+
+def save_layout(text: str) -> str:
+    """Store the layout; return the reason why it could not be written, empty if it was."""
+    return save_kept(state_folder() / "layout.ini", with_checksum(text))
+
+
+def _list(found: Any) -> list[Any]:
+    if not isinstance(found, list):
+        raise ValueError("expected a list")
+    return found
+
+
+def _texts(found: Any) -> list[str]:
+    texts = _list(found)
+    if not all(isinstance(text, str) and text and "\0" not in text for text in texts):
+        raise ValueError("expected a list of names")
+    return texts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Container
+from collections.abc import Callable, Container
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeVar
@@ -11,8 +11,7 @@ from typing import Any, TypeVar
 import platformdirs
 
 from viewer.app.preferences.state import FONT_SIZES, SAMPLES, SCALES, THEMES, UPS, Preferences
-from viewer.errors import OutputError
-from viewer.formats import save_bytes
+from viewer.media.kept_files import as_json, load_kept, save_kept, to_stderr
 from viewer.phrases import printable
 from viewer.rendering.options import QUALITIES
 
@@ -27,15 +26,29 @@ def preferences_file() -> Path:
     return Path(platformdirs.user_config_dir("viewer", appauthor=False)) / "preferences.json"
 
 
-def load_preferences() -> Preferences:
+def load_preferences(say: Callable[[str], object] = to_stderr) -> Preferences:
     """Return the stored preferences; the defaults if there are none or they are unreadable."""
-    try:
-        found = json.loads(preferences_file().read_text("utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return Preferences()
-    usual = Preferences()
+    none: dict[str, Any] = {}
+    found = load_kept(preferences_file(), _entries, none, say)
+    preferences = _valid(found)
+    known = asdict(preferences)
+    wrong = [name for name in found if name in known and found[name] != known[name]]
+    if wrong:
+        shown = ", ".join(printable(name, 60) for name in wrong)
+        say(f"{printable(preferences_file(), 300)}: invalid values are replaced: {shown}")
+    return preferences
+
+
+def _entries(data: bytes) -> dict[str, Any]:
+    found = as_json(data)
     if not isinstance(found, dict):
-        return usual
+        raise ValueError("expected an object")
+    return found
+
+
+def _valid(found: dict[str, Any]) -> Preferences:
+    """Return the valid entries among stored ones, and the defaults of all others."""
+    usual = Preferences()
     return Preferences(
         theme=_one_of(found.get("theme"), THEMES, usual.theme),
         scale=_one_of(found.get("scale"), (0.0, *SCALES), usual.scale),
@@ -67,12 +80,5 @@ def _texts(value: object) -> dict[str, str]:
 
 def save_preferences(preferences: Preferences) -> str:
     """Store the preferences; return an error message, empty if they were stored."""
-    path = preferences_file()
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        save_bytes(path, json.dumps(asdict(preferences), indent=1).encode())
-    except OSError as problem:
-        return f"the preferences could not be saved: {printable(path, 300)}: {problem.strerror}"
-    except OutputError as problem:
-        return f"the preferences could not be saved: {problem}"
-    return ""
+    why = save_kept(preferences_file(), json.dumps(asdict(preferences), indent=1).encode())
+    return f"the preferences could not be saved: {why}" if why else ""
