@@ -138,6 +138,15 @@ class _Source:
         self.x11.XFlush(self.display)
 
 
+def drag_and_vanish(display, window, paths, place=(400, 300)):
+    """Drag files onto a window, and close the source's own window before it is answered."""
+    source = _Source(display, window, paths)
+    copy = source.atom("XdndActionCopy")
+    source.send("XdndEnter", _VERSION << 24, source.atom("text/uri-list"), 0, 0)
+    source.send("XdndPosition", 0, place[0] << 16 | place[1], 0, copy)
+    source.x11.XCloseDisplay(source.display)
+
+
 def drag_files(display, window, paths, place=(400, 300)):
     """Drag files onto a window and drop them there.
 

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from app.driver import Driver
 from app.tiny import write_rig
-from dragged_files import drag_files
+from dragged_files import drag_and_vanish, drag_files
 from driven_window import PATIENCE, ROOT, Window, _ask_to_close, _wait_for
 from formats.pig_text import write as write_pig
 from imgui_bundle import imgui
@@ -234,6 +234,12 @@ def test_files_and_folders_dragged_onto_the_window_open(window, tmp_path):
     app = window()
     parts = tmp_path / "other figure"
     parts.mkdir()
+    app.process.send_signal(signal.SIGSTOP)  # it answers when the source is gone
+    drag_and_vanish(app.display, app.id, [parts])
+    time.sleep(0.3)  # the server removes its window
+    app.process.send_signal(signal.SIGCONT)
+    # The next source would get the same window number.
+    app.wait_until_quiet(still=1.0)
     drag_files(app.display, app.id, write_rig(parts))
     _wait_for(lambda: "tiny" in app.tell("getwindowname", app.id), "the figure that was dropped")
     folder = write_pig(tmp_path / "a pig")

@@ -1,8 +1,14 @@
-"""Clean exit of the program when the connection to the X server is lost.
+"""Errors of the X server: other programs' vanished windows, and the loss of the connection.
 
-By default Xlib then exits the process, with its own message and exit code 1. A program can install
-its own handler, but the handler must not return: OpenGL drivers would use replies that the X server
-never sent, and crash. So the handler does all of the clean-up.
+Xlib exits the process in both cases, with its own message and exit code 1. It has one handler for
+each, which a program can replace.
+
+A request about a window that no longer exists is an error. GLFW answers programs that drag files
+onto the window, and that paste from it; if such a program ends before it is answered, the answer
+is lost, and nothing else is wrong. So those errors are ignored, and all others are left to Xlib.
+
+The handler of a lost connection must not return: OpenGL drivers would use replies that the X server
+never sent, and crash. So it does all of the clean-up.
 """
 
 from __future__ import annotations
@@ -18,11 +24,32 @@ from viewer.media.unfinished import remove_unfinished
 __all__ = ["stop_watching", "watch_display"]
 
 _LIBRARY = "libX11.so.6"  # the library that GLFW loads, which shares the handlers
-_Handler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+
+
+class _ErrorEvent(ctypes.Structure):
+    """XErrorEvent of Xlib.h."""
+
+    _fields_ = (
+        ("type", ctypes.c_int),
+        ("display", ctypes.c_void_p),
+        ("resource", ctypes.c_ulong),
+        ("serial", ctypes.c_ulong),
+        ("error", ctypes.c_ubyte),
+        ("request", ctypes.c_ubyte),
+        ("minor", ctypes.c_ubyte),
+    )
+
+
+_LossHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p)
+_ErrorHandler = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.POINTER(_ErrorEvent))
+_BAD_WINDOW = 3
+# Requests of GLFW about the window of another program, by their numbers in Xproto.h.
+_TO_OTHERS = {2, 18, 20, 24, 25}
+"""ChangeWindowAttributes, ChangeProperty, GetProperty, ConvertSelection and SendEvent."""
 
 
 def watch_display() -> None:
-    """Install the handler that exits cleanly if the connection to the X server is lost.
+    """Install the handlers of lost windows and of a lost connection.
 
     Called before GLFW starts, because the connection may be lost while a window is created. Further
     calls have no effect.
@@ -31,15 +58,27 @@ def watch_display() -> None:
     if _library is None:
         _library = _open_library()
         if _library is not None:
-            _before.append(_library.XSetIOErrorHandler(_handler))
+            _before[:] = (
+                _library.XSetIOErrorHandler(_loss_handler),
+                _library.XSetErrorHandler(_error_handler),
+            )
 
 
 def stop_watching() -> None:
-    """Restore Xlib's previous handler."""
+    """Restore Xlib's previous handlers."""
     global _library
     if _library is not None:
-        _library.XSetIOErrorHandler(_before.pop())
+        _library.XSetIOErrorHandler(_before[0])
+        _library.XSetErrorHandler(_before[1])
         _library = None
+
+
+def _pass_over(display: Any, event: Any) -> int:
+    """Ignore an answer to a window that is gone; leave any other error to the previous handler."""
+    found = event.contents
+    if found.error == _BAD_WINDOW and found.request in _TO_OTHERS:
+        return 0
+    return int(_before[1](display, event))
 
 
 def _leave(_: Any) -> int:
@@ -60,12 +99,16 @@ def _open_library() -> ctypes.CDLL | None:
         library = ctypes.CDLL(_LIBRARY)
     except OSError:  # GLFW is linked without Xlib
         return None
-    library.XSetIOErrorHandler.argtypes = [_Handler]
-    library.XSetIOErrorHandler.restype = _Handler
+    library.XSetIOErrorHandler.argtypes = [_LossHandler]
+    library.XSetIOErrorHandler.restype = _LossHandler
+    library.XSetErrorHandler.argtypes = [_ErrorHandler]
+    library.XSetErrorHandler.restype = _ErrorHandler
     return library
 
 
-# Xlib has one handler per process and may call it at any time, so it must stay alive.
-_handler = _Handler(_leave)
+# Xlib has one handler of each kind per process and may call it at any time, so both must stay
+# alive.
+_loss_handler = _LossHandler(_leave)
+_error_handler = _ErrorHandler(_pass_over)
 _library: ctypes.CDLL | None = None
 _before: list[Any] = []

@@ -76,7 +76,7 @@ def test_layout_cut_or_changed_anywhere_is_not_given_to_imgui():
     ]
     longer = [whole + b"\n", whole + whole, LAYOUT.encode(), b"\xff" * 99]
     for data in (*cut, *flipped, *longer):
-        with pytest.raises(ValueError, match="written|decode"):
+        with pytest.raises(ValueError, match=r"written|decode"):
             checked(data)
     for data in (cut[-1], LAYOUT.encode()):
         path.write_bytes(data)
