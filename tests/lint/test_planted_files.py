@@ -41,6 +41,16 @@ def skel(old: str, new: str) -> dict[str, str]:
     return {"a.skel": skel_text.GOOD.replace(old, new, 1)}
 
 
+# A leg with a knee, which the motion lacks.
+LEG = """balljoint Hips { offset 0 1 0
+  balljoint LeftUpLeg { offset 0.1 0 0
+    balljoint LeftLeg { offset 0 -0.4 0
+      balljoint LeftFoot { offset 0 -0.5 0 } } } }
+"""
+LEG_SKIN = skin_text.POSITIONS + skin_text.NORMALS + skin_text.TRIANGLES + (
+    "skinweights 3 { 1 0 1 1 0 1 1 0 1 }\n"
+    f"bindings 4 {{ {skin_text.MATRIX * 4} }}\n"
+)  # fmt: skip
 RIG = {"a.skel": skel_text.GOOD, "a.skin": skin_text.GOOD}
 
 # Values by name: (texts, code, severity, file, line).
@@ -83,6 +93,8 @@ FAULTS: dict[str, tuple[dict[str, str], str, str, str, int | None]] = {
                           "a.anim", 12),
     "clip alone": ({"a.anim": CLIP}, "F004", "error", "a.anim", None),
     "obj index": ({"a.obj": "v 0 0 0\nf 1 1 2\n"}, "F002", "error", "a.obj", 2),
+    "knee at rest": ({"leg.skel": LEG, "leg.skin": LEG_SKIN, "a.bvh": bvh_text.GOOD}, "C018",
+                     "warning", "a.bvh", None),
     "bvh frame rate": ({"a.bvh": bvh_text.GOOD.replace("0.0333333", "25")}, "C017", "warning",
                        "a.bvh", None),
     "second offset": ({"a.bvh": bvh_text.GOOD.replace("0.1 0.0 0.0", "0.1 0 0 1 2 3")}, "F006",

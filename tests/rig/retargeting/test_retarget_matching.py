@@ -9,8 +9,10 @@ import pytest
 from faults import told
 from rig.retargeting.two_people import BODY, EXACT, HIK, bones, figure_of, moving, places
 
+from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.phrase import Phrase
 from viewer.errors import RigError
+from viewer.rig.figure import Figure
 from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.motion.timing import Timing
 from viewer.rig.retargeting.retarget import retarget, scaled_motion
@@ -219,3 +221,47 @@ def test_scaled_motion_scales_all_lengths() -> None:
         np.testing.assert_allclose(after[name], 0.01 * place, atol=1e-14)
     with pytest.raises(RigError, match="expected a factor above 0, found 0"):
         scaled_motion(motion, 0.0)
+
+
+def limb_warnings(motion: SkeletonMotion, figure: Figure, mapping=None) -> list[Diagnostic]:
+    return [note for note in retarget(motion, figure, mapping)[1] if note.code == "C018"]
+
+
+def renamed(table: dict, **names: str) -> dict:
+    return {names.get(name, name): (names.get(parent, parent), at)
+            for name, (parent, at) in table.items()}  # fmt: skip
+
+
+def test_limbs_without_a_recognised_joint_of_the_motion_are_a_warning() -> None:
+    body = figure_of(BODY, "body")
+    assert limb_warnings(moving(figure_of(HIK, "walk")), body) == []
+    foreign = renamed(HIK, LeftLeg="Knie_l", RightLeg="Knie_r")
+    (found,) = limb_warnings(moving(figure_of(foreign, "walk")), body)
+    assert str(found) == (
+        "left_knee, right_knee of body stay at rest: nothing in walk is recognised as these joints "
+        "(unused: Knie_l, Knie_r); match them in the Joint match panel or with --joint-map"
+    )
+    pairs = {"Knie_l": "left_knee", "Knie_r": "right_knee"}
+    assert limb_warnings(moving(figure_of(foreign, "walk")), body, pairs) == []
+
+
+def test_limbs_without_a_recognised_joint_of_the_figure_are_a_warning() -> None:
+    body = figure_of(renamed(BODY, left_elbow="codo"), "body")
+    (found,) = limb_warnings(moving(figure_of(HIK, "walk")), body)
+    assert (found.key, found.values["parts"]) == ("C018.limbs-unknown", ["left elbow"])
+    assert found.values["idle"] == ["codo"]
+
+
+def test_knees_that_never_bend_in_a_moving_leg_are_a_warning() -> None:
+    motion, body = moving(figure_of(HIK, "walk")), figure_of(BODY, "body")
+    names, rotations = motion.figure.skeleton.names, motion.clip.rotations.copy()
+    for name in ("LeftLeg", "RightLeg"):
+        rotations[:, names.index(name)] = [0, 0, 0, 1]
+    (found,) = limb_warnings(replace(motion, clip=replace(motion.clip, rotations=rotations)), body)
+    assert (found.key, found.values["names"]) == ("C018.limbs-still", ["left_knee", "right_knee"])
+    # A figure that does not move at all is no fault, nor is a single stiff knee.
+    still = np.broadcast_to([0.0, 0.0, 0.0, 1.0], rotations.shape)
+    assert limb_warnings(replace(motion, clip=replace(motion.clip, rotations=still)), body) == []
+    one = motion.clip.rotations.copy()
+    one[:, names.index("LeftLeg")] = [0, 0, 0, 1]
+    assert limb_warnings(replace(motion, clip=replace(motion.clip, rotations=one)), body) == []

@@ -28,6 +28,7 @@ CODES = {
         "lower the motion (--ground); none if the person stands on something",
     ),
     "C017": Code("warning", "implausible frame time", "write seconds, or set the rate (--fps)"),
+    "C018": Code("warning", "limbs at rest", "match their joints (--joint-map)"),
 }
 
 MESSAGES = {

@@ -14,7 +14,8 @@ MESSAGES = {
     "again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n:#matching joint}; not recognised in {motion:text}: "
-    "{unused:list}; in {figure:text}: {idle:list}; match them with --joint-map",
+    "{unused:list}; in {figure:text}: {idle:list}; match them in the Joint match panel or with "
+    "--joint-map",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
@@ -30,6 +31,15 @@ MESSAGES = {
     "F007.joints-matched-as-follows": "{motion:text} drives {n} of {all} joints of {figure:text}: "
     "{pairs:list}",
     "F007.joints-at-rest": "joints kept at rest: {names:list12}",
+    "C018.limbs-unmatched": "{names:list} of {figure:text} {n:?stays|stay} at rest: nothing in "
+    "{motion:text} is recognised as {n:?this joint|these joints} (unused: {unused:list}); match "
+    "{n:?it|them} in the Joint match panel or with --joint-map",
+    "C018.limbs-unknown": "no joint of {figure:text} is recognised as {parts:or}: {motion:text} "
+    "cannot move {n:?it|them} (at rest: {idle:list}); match {n:?it|them} in the Joint match panel "
+    "or with --joint-map",
+    "C018.limbs-still": "{names:list} of {figure:text} never bend, because {partners:list} of "
+    "{motion:text} never do; if this is wrong, match other joints in the Joint match panel or with "
+    "--joint-map",
     "F007.joints-without-partner": "joints of {motion:text} that drive nothing: {names:list12}",
     "F007.rest-asked": "rest pose of {motion:text}: frame {frame}, as requested",
     "F007.rest-frame": "rest pose of {motion:text}: frame {frame}, {pose}, because its zero pose "

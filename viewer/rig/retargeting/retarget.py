@@ -14,13 +14,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
-from viewer.rig.arrays import Floats, Ints
+from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs, conjugate, multiply
 from viewer.rig.geometry.rotation import matrix_to_quaternion, quaternion_to_matrix
@@ -31,6 +32,7 @@ from viewer.rig.retargeting.expression_weights import expression_weights
 from viewer.rig.retargeting.ground_offset import ground_offset
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.retargeting.joint_matches import Matches, match_joints
+from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.retargeting.path_scale import path_scale
 from viewer.rig.retargeting.rest_poses import (
     RestPose,
@@ -40,10 +42,14 @@ from viewer.rig.retargeting.rest_poses import (
     up_rotation,
 )
 from viewer.rig.retargeting.source_rest import SourceRest, with_source_rest, with_upright_rest
-from viewer.rig.skeleton import Skeleton, joint_label
+from viewer.rig.skeleton import Skeleton, joint_label, joint_labels
 
 __all__ = ["Retargeted", "retarget", "retargeted", "scaled_motion"]
 
+_LIMBS = (("hip", "knee", "ankle"), ("shoulder", "elbow", "wrist"))
+_SIDES = ("left", "right")
+# Largest rotation of a joint that never moves, and least one of a joint that moves, in radians.
+_NEVER, _MOVING = np.radians(0.01), np.radians(5.0)
 _STILL = 1e-6  # minimum motion of used position channels, as a fraction of the skeleton's size
 
 
@@ -208,7 +214,8 @@ def retargeted(
         shape_weights=weights,
     )
     scaled = Diagnostic("F007.path-scaled", values={"scale": scale, "by": by})
-    notes = [*matches.notes, *rested, scaled, *notes, *missing]
+    idle = [] if mapping else _limbs_at_rest(motion, figure, matches, rotations)
+    notes = [*matches.notes, *idle, *rested, scaled, *notes, *missing]
     return Retargeted(clip, notes, motion, matches, job.to_target, scale)
 
 
@@ -396,3 +403,64 @@ def _path(parents: Ints, joint: int) -> list[int]:
 
 def _unit(quaternions: Floats) -> Floats:
     return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
+
+
+def _limbs_at_rest(
+    motion: SkeletonMotion, figure: Figure, matches: Matches, rotations: Floats
+) -> list[Diagnostic]:
+    """Return warnings about thighs, knees, upper arms and elbows that stay at rest throughout.
+
+    Mostly their names have no known meaning, or a wrong one.
+
+    ``rotations`` (N, J, 4): local rotations of the figure.
+    """
+    source, target = motion.figure.require_skeleton(), figure.require_skeleton()
+    mine, theirs = joint_labels(target), joint_labels(source)
+    places = {name: joint for joint, name in enumerate(matches.names) if name}
+    meanings = joint_meanings(source)
+    called = {"motion": motion.figure.name, "figure": figure.name}
+    unmatched, unknown = [], []
+    for limb, side in product(_LIMBS, _SIDES):
+        has_limb = any(f"{side}_{part}" in places for part in limb)
+        for name in (f"{side}_{part}" for part in limb[:2]):
+            if name in places and matches.partners[places[name]] < 0:
+                unmatched.append(mine[places[name]])
+            elif name not in places and name in meanings and has_limb:
+                unknown.append(name.replace("_", " "))
+    found = []
+    if unmatched:
+        used = set(matches.partners.tolist())
+        # Joints without a meaning are the likely ones.
+        unused = [name for j, name in enumerate(theirs) if j not in used and not meanings[j]]
+        values = {**called, "n": len(unmatched), "names": unmatched, "unused": unused}
+        found.append(Diagnostic("C018.limbs-unmatched", values=values))
+    if unknown:
+        idle = [mine[j] for j in np.flatnonzero(matches.partners < 0) if not matches.names[j]]
+        values = {**called, "n": len(unknown), "parts": unknown, "idle": idle}
+        found.append(Diagnostic("C018.limbs-unknown", values=values))
+    is_still, is_moving = _extent(rotations)
+    for upper, lower, _ in _LIMBS:
+        joints = [places.get(f"{side}_{part}", -1) for part in (upper, lower) for side in _SIDES]
+        if min(joints) < 0 or (matches.partners[joints] < 0).any():
+            continue
+        if is_moving[joints[:2]].all() and is_still[joints[2:]].all():
+            values = {
+                **called,
+                "names": [mine[joint] for joint in joints[2:]],
+                "partners": [theirs[matches.partners[joint]] for joint in joints[2:]],
+            }
+            found.append(Diagnostic("C018.limbs-still", values=values))
+    return found
+
+
+def _extent(rotations: Floats) -> tuple[Bools, Bools]:
+    """Return which joints never move, and which do: (J,) each; neither if there are no frames."""
+    if not len(rotations):
+        still = np.zeros(rotations.shape[1], dtype=bool)
+        return still, still
+    # The chord of two unit quaternions is half the angle between small rotations.
+    first = rotations[:1]
+    chords = np.minimum(
+        np.linalg.norm(rotations - first, axis=2), np.linalg.norm(rotations + first, axis=2)
+    ).max(axis=0)
+    return chords < 0.5 * _NEVER, chords > 0.5 * _MOVING
