@@ -220,7 +220,7 @@ def test_last_pose_is_held_in_gaps(body: Figure, tmp_path: Path) -> None:
 def test_first_pose_is_held_in_a_gap_at_the_start(body: Figure, tmp_path: Path) -> None:
     found, notes = write(body_animation(body, 2, [-1, -1, 0, 1]), tmp_path)
     assert found.frames[0] == found.frames[1] == found.frames[2] != found.frames[3]
-    assert notes[1] == "missing frames 0 to 1: the last pose is held"
+    assert notes[1] == "missing frames 0 to 1: the first pose is held"
 
 
 def test_gaps_are_interpolated_on_the_shorter_arc(tmp_path: Path) -> None:

@@ -74,6 +74,15 @@ def test_longer_gaps_remain_and_are_reported():
     assert scene.actors[0].clip.timing.present.all()
 
 
+@pytest.mark.parametrize(("longest", "frames"), [(0.5, 15), (1.5, 45), (0.4, 12)])
+def test_longest_gap_may_be_given_in_seconds(longest, frames):
+    # At 30 frames per second, a gap of N frames lasts N / 30 seconds.
+    for missing, is_left in ((frames, False), (frames + 1, True)):
+        scene = Scene([person(0, 0, 10), person(1, 10 + missing, 60)])
+        clean_up(scene, CleanUp(merged=((0, 1),), interpolates=True, longest_gap=longest))
+        assert bool((~scene.actors[0].clip.timing.present).any()) == is_left
+
+
 def test_person_tracked_twice_is_merged_with_the_frames_of_the_first():
     scene = Scene([person(0, 0, 30, x=0.0), person(1, 28, 60, x=0.1)])
     notes = clean_up(scene, CleanUp(merged=((1, 0),)))

@@ -84,7 +84,7 @@ def clean_up_of(arguments: argparse.Namespace) -> CleanUp:
     return CleanUp(
         merged=tuple(arguments.merge_ids),
         interpolates=arguments.fill_gaps is not None,
-        longest_gap=arguments.fill_gaps or None,
+        longest_gap=1.0 if arguments.fill_gaps is None else arguments.fill_gaps,
         smoothing=arguments.smooth,
         locks_feet=arguments.lock_feet,
         grounds=arguments.ground,

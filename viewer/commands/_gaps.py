@@ -9,28 +9,27 @@ from typing import Any
 
 from viewer.phrases import printable
 
-__all__ = ["ONE_SECOND", "add_gap_arguments"]
+__all__ = ["add_gap_arguments"]
 
-ONE_SECOND = 0
-"""Value of ``fill_gaps`` for gaps of up to a second."""
-
-_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|1s)%s)?"
+_ONE_SECOND = 1.0
+_LIMIT = r"interpolate(?::(?P<limit>[1-9][0-9]{0,8}|[0-9]{1,6}(?:\.[0-9]{1,6})?s)%s)?"
 _PATTERNS = {
     "view": _LIMIT % "",
     "check": "interpolate",
     "write": rf"(?P<alone>hold|split)|{_LIMIT % '(?:,(?P<rest>hold|split))?'}",
 }
 _WHAT = {
-    "view": "gaps in captures: interpolate all, or those of up to N frames or one second (1s)",
+    "view": "gaps in captures: interpolate all, or those of up to N frames or N seconds (2s)",
     "check": "gaps in captures: interpolate all",
-    "write": "gaps in captures: hold the last pose, split the file, or interpolate all or those of "
-    "up to N frames or one second (1s), as in interpolate:10,split (default: missing frames are "
-    "omitted from EasyMocap, .obj and arrays; other formats hold the last pose)",
+    "write": "gaps in captures: hold the pose before the gap (at the start, the first pose), split "
+    "the file, or interpolate all or those of up to N frames or N seconds (2s), as in "
+    "interpolate:10,split (default: missing frames are omitted from EasyMocap, .obj and arrays; "
+    "other formats hold poses)",
 }
 _METAVAR = {
-    "view": "interpolate[:N]",
+    "view": "interpolate[:N|:Ns]",
     "check": "interpolate",
-    "write": "hold|split|interpolate[:N]",
+    "write": "hold|split|interpolate[:N|:Ns]",
 }
 
 
@@ -40,15 +39,15 @@ def add_gap_arguments(group: argparse._ArgumentGroup, use: str) -> None:
     ``group``: options of a command.
     ``use``: ``"view"``; ``"check"`` for commands that do not clean up; ``"write"``.
     Parsing sets ``gaps``: ``"hold"``, ``"split"`` or None; ``interpolate_gaps``: whether all gaps
-      are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, in frames,
-      ``ONE_SECOND`` or None.
+      are interpolated; ``fill_gaps``: the longest gap that clean-up interpolates, frames as an
+      integer or seconds as a float, or None.
     """
     group.add_argument("--gaps", action=_Gaps, metavar=_METAVAR[use], help=_WHAT[use], const=use)
     hidden = argparse.SUPPRESS
     group.add_argument("--interpolate-gaps", action="store_true", help=hidden)
     if use == "check":
         return
-    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=ONE_SECOND, help=hidden)
+    group.add_argument("--fill-gaps", nargs="?", type=_longest, const=_ONE_SECOND, help=hidden)
 
 
 class _Gaps(argparse.Action):
@@ -73,8 +72,9 @@ class _Gaps(argparse.Action):
         limit = parts.get("limit")
         namespace.interpolate_gaps = limit is None and parts.get("alone") is None
         if use != "check":
-            frames = ONE_SECOND if limit == "1s" else int(limit or 0)
-            namespace.fill_gaps = None if limit is None else frames
+            is_time = limit is not None and limit.endswith("s")
+            longest = float(limit[:-1]) if limit is not None and is_time else int(limit or 0)
+            namespace.fill_gaps = None if limit is None else longest
 
 
 def _longest(text: str) -> int:

@@ -35,7 +35,9 @@ def gaps_note(present: Bools, first_frame: int, closing: str, **how: str) -> lis
     """
     if present.all():
         return []
-    done = Phrase({**_CLOSED, **how}[closing])
+    is_early, is_late = not present[0], not present[int(present.argmax()) :].all()
+    held = "held-both" if is_early and is_late else "held-first" if is_early else "held-last"
+    done = Phrase({**_CLOSED, **how}[closing], poses=Phrase(held))
     return [Diagnostic("X004.closed", values={**_gaps(present, first_frame), "how": done})]
 
 

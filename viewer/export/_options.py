@@ -14,7 +14,7 @@ QUATERNIONS = ("xyzw", "wxyz")
 """Orders of quaternion components in arrays."""
 
 GAPS = {
-    "hold": "hold the last pose",
+    "hold": "hold the pose before the gap; at the start, the first pose",
     "interpolate": "interpolate between the frames around the gap, rotations along the shorter arc",
     "split": "one file for each run of frames",
 }

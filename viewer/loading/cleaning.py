@@ -199,10 +199,11 @@ def _trimmed(
 
 
 def _interpolated(
-    actor: Actor, clip: Captured, longest: int | None
+    actor: Actor, clip: Captured, longest: int | float
 ) -> tuple[Captured, list[Diagnostic]]:
     timing = clip.timing
-    limit = max(1, round(timing.frame_rate)) if longest is None else longest
+    # A gap of N frames lasts N / rate seconds, so that files at 29.97 and 30 fps agree.
+    limit = longest if isinstance(longest, int) else round(longest * timing.frame_rate)
     clip, gaps = interpolate_gaps(clip, limit)
     notes = []
     if gaps.closed:

@@ -23,8 +23,8 @@ class CleanUp:
         Numbers of people whose tracks belong to one person, who keeps the first number.
     interpolates : bool
         Whether gaps are interpolated.
-    longest_gap : int or None
-        Longest gap to interpolate, frames; None for one second.
+    longest_gap : int or float
+        Longest gap to interpolate: frames as an integer, seconds as a float.
     smoothing : OneEuro, SavitzkyGolay or None
         The filter.
     locks_feet : bool
@@ -40,7 +40,7 @@ class CleanUp:
 
     merged: tuple[tuple[int, ...], ...] = ()
     interpolates: bool = False
-    longest_gap: int | None = None
+    longest_gap: int | float = 1.0
     smoothing: OneEuro | SavitzkyGolay | None = None
     locks_feet: bool = False
     grounds: bool = False

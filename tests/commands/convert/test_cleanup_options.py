@@ -11,7 +11,7 @@ from formats.synthetic_smpl import model
 
 from viewer.cli import run
 from viewer.commands._cleanup import clean_up_of
-from viewer.commands._gaps import ONE_SECOND, add_gap_arguments
+from viewer.commands._gaps import add_gap_arguments
 from viewer.commands._usage import Parser
 from viewer.commands.convert import add_arguments
 from viewer.rig.cleanup.one_euro import OneEuro
@@ -40,7 +40,7 @@ def test_filters_are_parsed(text, expected):
 def test_other_options_are_parsed():
     found = parsed("--merge-ids", "3,7", "--merge-ids=1, 2", "--trim=5:", "--fill-gaps")
     assert found.merged == ((3, 7), (1, 2))
-    assert found.frames == (5, None) and found.interpolates and found.longest_gap is None
+    assert found.frames == (5, None) and found.interpolates and found.longest_gap == 1.0
     assert parsed("--fill-gaps", "12").longest_gap == 12
     assert parsed().is_empty
 
@@ -51,7 +51,9 @@ def test_other_options_are_parsed():
         ("hold", ["--gaps", "hold"], ("hold", False, None)),
         ("interpolate", ["--interpolate-gaps"], (None, True, None)),
         ("interpolate:12", ["--fill-gaps", "12"], (None, False, 12)),
-        ("interpolate:1s", ["--fill-gaps"], (None, False, ONE_SECOND)),
+        ("interpolate:1s", ["--fill-gaps"], (None, False, 1.0)),
+        ("interpolate:2s", ["--gaps=interpolate:2.0s"], (None, False, 2.0)),
+        ("interpolate:0.5s,split", ["--gaps=interpolate:0.50s,split"], ("split", False, 0.5)),
         ("interpolate:12,split", ["--gaps=split", "--fill-gaps=12"], ("split", False, 12)),
     ],
 )
@@ -69,7 +71,7 @@ def test_option_of_gaps_has_the_meaning_of_its_older_names(text, older, results)
     ("use", "text"),
     [
         *(("write", text) for text in ("", "fill", "split,hold", "interpolate,split")),
-        *(("write", f"interpolate:{limit}") for limit in ("0", "2s", "5,", "5,5", "")),
+        *(("write", f"interpolate:{limit}") for limit in ("0", "s", "2 s", "-1s", "5,", "5,5", "")),
         *(("view", text) for text in ("hold", "interpolate:5,split")),
         *(("check", text) for text in ("hold", "interpolate:5")),
     ],

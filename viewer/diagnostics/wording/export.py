@@ -208,8 +208,11 @@ PHRASES = {
     "lost-spring-joints": "{n:#spring joint}",
     "lost-centers": "{n:#spring centre}",
     # Replacements of missing frames
-    "pose-held": "the last pose is held",
-    "pose-held-and-marked": "the last pose is held, and the frames are marked in present",
+    "held-last": "the last pose is held",
+    "held-first": "the first pose is held",
+    "held-both": "the last pose is held, at the start the first",
+    "pose-held": "{poses}",
+    "pose-held-and-marked": "{poses}, and the frames are marked in present",
     "interpolated": "interpolated",
     "interpolated-and-held": "interpolated, held at both ends",
     "interpolated-and-marked": "interpolated along the shorter arc, and marked in present",
