@@ -154,7 +154,8 @@ def drive_somebody(
     drive : Drive
         Motion of another skeleton.
     cast : Cast
-        Its actor gets the clip.
+        The figure's actor gets the clip. If none matches, the first one keeps the drive without a
+        clip.
     placement : (4, 4)
         Applied to that actor.
     among : sequence of Actor, optional
@@ -173,13 +174,14 @@ def drive_somebody(
         If no figure matches, although a joint map is given.
     """
     refusal: RigError | None = None
+    refused: Actor | None = None
     for actor in cast.actors if among is None else among:
         if actor.clip is not None or not actor.figure.is_attached:
             continue
         try:
             clip, notes = driven_clip(drive, actor.figure)
         except RigError as problem:
-            refusal = refusal or problem
+            refusal, refused = refusal or problem, refused or actor
             continue
         actor.clip, actor.drive = clip, drive
         actor.placement = placement @ actor.placement
@@ -187,6 +189,8 @@ def drive_somebody(
         return True, ""
     if refusal is not None and drive.joint_map is not None:
         raise map_refusal(refusal, path)
+    if refused is not None:
+        refused.drive = drive  # the user may match its joints in the Joint match panel
     return False, "" if refusal is None else refusal.cause
 
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from app.retargeting.driven import driven_scene
+from app.tiny import write_rig
 from imgui_bundle import imgui
 
 from viewer.app.core.reasons import no_panel
@@ -171,6 +172,33 @@ def test_saved_maps_can_be_loaded(panel, tmp_path):
 def test_figures_without_a_driving_motion_have_no_panel(hand):
     assert no_edit(hand.state) == "no motion of another skeleton drives this figure"
     assert "Joint match" not in hand.state.item_rects
+
+
+def test_a_motion_that_matches_nothing_is_matched_in_the_panel(drive, tmp_path):
+    """This is when the panel is needed: the figure stood still beside the motion without one."""
+    joints = "a", "b", "c", "d"
+    head = "".join(f"{'JOINT' if i else 'ROOT'} {name} {{ OFFSET 0 {10 * i} 0 "
+                   f"CHANNELS {3 if i else 6} {'' if i else 'Xposition Yposition Zposition '}"
+                   "Zrotation Xrotation Yrotation " for i, name in enumerate(joints))  # fmt: skip
+    path = tmp_path / "walk.bvh"
+    path.write_text(f"HIERARCHY {head} {'}' * 4} MOTION Frames: 2 Frame Time: 0.1\n"
+                    f"{'0 ' * 15}\n{'0 ' * 6}{'90 0 0 ' * 3}\n")  # fmt: skip
+    hand = drive(*write_rig(tmp_path), path)
+    state = hand.state
+    assert [actor.clip is None for actor in state.scene.actors] == [True, False]
+    assert no_panel(state, "drive") == no_edit(state) == ""
+    hand.show_panel("Joint match")
+    hand.step(3)
+    shown = shown_match(state)
+    assert set(shown.partners.tolist()) == {-1} and shown.source.labels == joints
+    match_joint(state, 1, 2)
+    hand.step(2)
+    actor = state.actor
+    assert actor.clip is not None and partner(hand, shown.target.labels[1])[0] == "c"
+    # The joint has the world rotation of c in the last frame: 180 degrees about z.
+    assert abs(actor.clip.rotations[1, 1]) == pytest.approx([0, 0, 1, 0], abs=1e-9)
+    match_joint(state, 1, -1)
+    assert "Joint match panel" in state.error
 
 
 def test_undo_of_other_edits_keeps_frames_loaded_since(panel):

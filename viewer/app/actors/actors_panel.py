@@ -122,7 +122,7 @@ def _draw_springs(state: AppState, actor: Actor) -> None:
 
 def _draw_feet(state: AppState, actor: Actor) -> None:
     """Draw the switch for feet, if the motion of another skeleton drives the chosen actor."""
-    if actor.drive is None:
+    if actor.drive is None or actor.clip is None:
         return
     why, is_on = no_edit(state), plants_feet(state)
     if checkbox(state, "Feet on the ground", is_on, why) != is_on:

@@ -60,9 +60,12 @@ def no_panel(state: AppState, needs: str) -> str:
 
 
 def no_drive(state: AppState) -> str:
-    """Return the reason why the chosen actor has no joint match."""
+    """Return the reason why the chosen actor has no joint match.
+
+    A motion that matches too few joints does not move the figure yet.
+    """
     actor = state.actor
-    if actor.drive is not None and isinstance(actor.clip, SampledClip):
+    if actor.drive is not None and (actor.clip is None or isinstance(actor.clip, SampledClip)):
         return ""
     return "no motion of another skeleton drives this figure"
 

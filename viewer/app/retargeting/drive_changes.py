@@ -20,7 +20,10 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.scene import Actor
 
-__all__ = ["change_drive", "no_edit", "shown_drive"]
+__all__ = ["NOT_DRIVEN", "change_drive", "no_edit", "shown_drive"]
+
+NOT_DRIVEN = "too few joints match, so the motion does not move this figure: choose its joints"
+"""What to do if a motion does not move a figure yet."""
 
 _SHORT = 1000  # maximum number of frames, of all people together, that are retargeted without a job
 

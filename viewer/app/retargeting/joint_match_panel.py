@@ -16,7 +16,7 @@ from viewer.app.core.widgets import (
     note_item,
     same_line_if_room,
 )
-from viewer.app.retargeting.drive_changes import no_edit
+from viewer.app.retargeting.drive_changes import NOT_DRIVEN, no_edit
 from viewer.app.retargeting.match_actions import (
     ask_for_map,
     ask_where_to_save,
@@ -81,10 +81,14 @@ def _draw_buttons(state: AppState, shown: Shown) -> None:
         imgui.text_colored(ink(WARNING), f"{len(shown.unused)} unused")
         names = [shown.source.labels[joint] for joint in shown.unused]
         explain(f"joints of the motion that drive nothing: {printable(', '.join(names), 1000)}")
+    if state.actor.clip is None:
+        imgui.push_style_color(imgui.Col_.text, ink(WARNING))
+        imgui.text_wrapped(NOT_DRIVEN)
+        imgui.pop_style_color()
     for label, act, why, what in (
         ("Automatic", match_automatically, is_automatic(state), "match all joints automatically"),
         ("Load map…", ask_for_map, no_edit(state), "match the joints as in a joint map file"),
-        ("Save map…", ask_where_to_save, "", "write the match, for --joint-map or to edit it"),
+        ("Save map…", ask_where_to_save, "", "write the match as a text file, to edit or load it"),
     ):
         same_line_if_room(label)
         if button(state, label, why):

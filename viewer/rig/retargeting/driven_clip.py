@@ -60,14 +60,18 @@ def driven_clip(drive: Drive, figure: Figure) -> tuple[SampledClip, list[Diagnos
 
 
 def matches_of(drive: Drive, figure: Figure) -> Matches:
-    """Return the match of a drive's joints with a figure's; errors as of ``match_joints``."""
+    """Return the match of a drive's joints with a figure's, which may be too small to drive it.
+
+    Raises RigError if the joint map names a missing joint or lists a joint twice.
+    """
     source = drive.motion.figure
     skeletons = source.require_skeleton(), figure.require_skeleton()
-    return match_joints(*skeletons, drive.joint_map, (source.name, figure.name))
+    titles = source.name, figure.name
+    return match_joints(*skeletons, drive.joint_map, titles, is_complete=False)
 
 
 def full_map(drive: Drive, figure: Figure) -> JointMap:
-    """Return the match with a figure as a complete joint map; errors as of ``match_joints``."""
+    """Return the match with a figure as a complete joint map; errors as of ``matches_of``."""
     source, target = drive.motion.figure.require_skeleton(), figure.require_skeleton()
     return joint_map_of(matches_of(drive, figure).partners, source, target)
 

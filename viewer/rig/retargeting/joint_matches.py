@@ -58,6 +58,7 @@ def match_joints(
     target: Skeleton,
     mapping: Mapping[str, str] | JointMap | None,
     titles: tuple[str, str],
+    is_complete: bool = True,
 ) -> Matches:
     """Match joints by mapping, then by the meaning of names, then by equal names.
 
@@ -73,11 +74,15 @@ def match_joints(
         target.
     titles : (str, str)
         Names of the two skeletons in messages.
+    is_complete : bool
+        Whether enough joints must match to drive the target; otherwise the match is a beginning,
+        to be completed by the user.
 
     Raises
     ------
     RigError
-        If too few joints match, or the mapping names a missing joint or lists a joint twice.
+        If too few joints match although enough must, or the mapping names a missing joint or lists
+        a joint twice.
     """
     plain = _comparable(source.names), _comparable(target.names)
     meanings = joint_meanings(source), joint_meanings(target)
@@ -90,7 +95,7 @@ def match_joints(
         _match_by_names(partners, plain, meanings)
     is_hierarchy = _has_same_hierarchy(source, target, plain) and np.array_equal(partners, own)
     is_enough = is_hierarchy or _is_enough(partners, meanings, plain)
-    if not (is_enough or (mapping and (partners >= 0).any())):
+    if is_complete and not (is_enough or (mapping and (partners >= 0).any())):
         raise _misfit(source, target, partners, titles)
     origins = _origins(source, target, partners, meanings)
     if is_hierarchy:

@@ -9,7 +9,7 @@ from viewer.rig.figure import Figure
 from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.joint_matches import Matches
 from viewer.rig.retargeting.rest_poses import rest_of, up_rotation
-from viewer.rig.retargeting.source_rest import with_source_rest
+from viewer.rig.retargeting.source_rest import with_source_rest, with_upright_rest
 
 __all__ = ["front_axes", "rest_positions"]
 
@@ -32,7 +32,7 @@ def rest_positions(drive: Drive, figure: Figure) -> tuple[Floats, Floats]:
     source, target : (S, 3), (J, 3)
         Positions in the figure's axes, each in its own unit.
     """
-    motion = with_source_rest(drive.motion, drive.source_rest)[0].figure
+    motion = with_source_rest(with_upright_rest(drive.motion), drive.source_rest)[0].figure
     axes = up_rotation(motion.up, figure.up)
     source = rest_of(motion.require_skeleton(), axes, figure.up).points
     return source, rest_of(figure.require_skeleton(), np.eye(3), figure.up).points
