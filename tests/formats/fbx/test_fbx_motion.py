@@ -7,10 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from formats.fbx.tiny_fbx import QUAD_5000, write_joints, write_strip
+from formats.fbx.tiny_fbx import QUAD_5000, write_joints, write_strip, write_two_strips
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.cli import run
 from viewer.formats._fbx.contents import target_weights
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.instances import pose_actors
@@ -160,3 +161,47 @@ def test_vertices_without_weights_follow_the_node_of_their_mesh(tmp_path: Path) 
     for at, expected in (([1.0, 2.0, 0.0], [-2.0, 1.0, 0.0]), ([0.0, 1.0, 0.0], [0.0, 1.0, 0.0])):
         (found, *_) = moved[(rest == at).all(axis=1)]
         assert_allclose(found, expected, atol=1e-6)
+
+
+def test_animations_of_one_name_stay_with_their_figures(tmp_path: Path) -> None:
+    scene = viewer.load(write_two_strips(tmp_path))
+    numbers = [[each.number for each in actor.figure.animations] for actor in scene.actors]
+    assert numbers == [[0], [1]]
+    for actor in scene.actors:
+        assert posed(actor, 1.0)[:, 0].min() == pytest.approx(-1.0, abs=1e-6)
+    # Both are written as animations of their own, although name and range are equal.
+    out = tmp_path / "two.glb"
+    assert run(["convert", str(tmp_path / "strip.fbx"), "-o", str(out)]) == 0
+    written = viewer.load(out)
+    assert [[each.number for each in a.figure.animations] for a in written.actors] == [[0], [1]]
+
+
+CAMERA = {
+    "    Material: 30,": """    Model: 60, "Model::Shot", "Camera" {
+        Version: 232
+        Properties70:  { P: "Lcl Translation", "Lcl Translation", "", "A",-5,1,0 }
+    }
+    NodeAttribute: 61, "NodeAttribute::Shot", "Camera" {
+        Properties70:  {
+            P: "FieldOfView", "FieldOfView", "", "A",90
+            P: "ApertureMode", "enum", "", "",2
+            P: "AspectWidth", "double", "Number", "",200
+            P: "AspectHeight", "double", "Number", "",100
+        }
+    }
+    Material: 30,""",
+    'C: "OO",20,0': 'C: "OO",20,0\n    C: "OO",60,0\n    C: "OO",61,60',
+}
+
+
+def test_cameras_look_along_x_of_their_node(tmp_path: Path) -> None:
+    scene = viewer.load(write_strip(tmp_path, edits=CAMERA))
+    (view,) = scene.views
+    assert view.name == "Shot"
+    # A vertical angle of 90 degrees sees half the height at half of it; the width is twice.
+    assert view.intrinsic[1, 1] == pytest.approx(view.size[1] / 2)
+    assert view.size[0] == 2 * view.size[1]
+    # 3 in front of the camera at x = -5, 1 above it, and 2 to its right: x, -y and z of its axes.
+    point = view.rotation @ [-2.0, 2.0, 2.0] + view.translation
+    assert_allclose(point, [2.0, -1.0, 3.0], atol=1e-12)
+    assert scene.actors[0].figure.require_skeleton().names == ("RootNode", "low", "high", "Shot")

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
-__all__ = ["QUAD_5000", "SECOND", "write_humanoid", "write_joints", "write_strip"]
+__all__ = [
+    "QUAD_5000",
+    "SECOND",
+    "write_humanoid",
+    "write_joints",
+    "write_strip",
+    "write_two_strips",
+]
 
 SECOND = 46186158000
 """Ticks of one second."""
@@ -242,6 +250,29 @@ def write_humanoid(path: Path, bones: dict[str, tuple[str, tuple[float, float, f
         "",
     ]
     path.write_text("\n".join(lines))
+    return path
+
+
+def write_two_strips(folder: Path) -> Path:
+    """Write two strips, each with joints, blend shape and an animation ``Bend`` of its own."""
+    path = write_strip(folder)
+    head, rest = path.read_text().split("Objects:  {")
+    objects, connections = rest.split("}\nConnections:  {")
+
+    def other(text: str) -> str:
+        text = re.sub(r"(?m)^(    \w+: )(\d+),", lambda m: f"{m[1]}{int(m[2]) + 100},", text)
+        raised = r'C: "(O.)",(\d+),(\d+)'
+        return re.sub(
+            raised,
+            lambda m: f'C: "{m[1]}",{int(m[2]) + 100},{int(m[3]) + 100 * (m[3] != "0")}',
+            text.replace("Model::", "Model::other "),
+        )
+
+    connections = connections.rstrip().removesuffix("}")
+    path.write_text(
+        f"{head}Objects:  {{{objects}{other(objects)}}}\n"
+        f"Connections:  {{{connections}{other(connections)}}}\n"
+    )
     return path
 
 

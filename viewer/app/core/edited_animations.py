@@ -48,7 +48,7 @@ def with_edited_keys(animations: Animations, actor: Actor) -> Figure:
     found = list(actor.figure.animations)
     for index, clip in aside.items():
         old, read = found[index], partial(_same, clip)
-        found[index] = Animation(old.name, clip.start, clip.end, read, old.place)
+        found[index] = Animation(old.name, clip.start, clip.end, read, old.place, old.number)
     return replace(actor.figure, animations=tuple(found))
 
 

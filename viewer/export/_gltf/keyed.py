@@ -28,7 +28,9 @@ _RATE = 60.0  # frames per second at which channels of different interpolation a
 
 
 class Clips:
-    """The animations of a file: clips of its figures with equal name and range are merged.
+    """The animations of a file: clips of several figures are merged if they are one animation.
+
+    Its name, its range, and its number in the file that was read are then equal.
 
     Times in glTF are not negative, so an animation with earlier keys is shifted as a whole.
 
@@ -73,7 +75,7 @@ class Clips:
 
     def _put(self, clip: TransformClip, keys: _Keys, taken: Collection[int]) -> int:
         """Add keys to the animation shared with another figure, or to a new one."""
-        name = (clip.name, clip.start, clip.end, first_time(clip))
+        name = (clip.name, clip.number, clip.start, clip.end, first_time(clip))
         known = self._known.setdefault(name, [])
         common = next((index for index in known if index not in taken), -1)
         item: dict[str, Any] = {"name": text_of(clip.name)} if clip.name else {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from functools import partial
@@ -17,6 +18,7 @@ from viewer.formats._fbx.meshes import Placed, mesh_on_node, on_nodes, skin_of
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._nodes.content import (
     NodeAnimation,
+    NodeCamera,
     NodeChannel,
     NodeFile,
     NodeMesh,
@@ -31,6 +33,9 @@ from viewer.rig.units import METRES, UNIT_NAMES
 __all__ = ["node_file", "target_weights"]
 
 
+_STRAIGHT = 180.0  # limit of a field of view, degrees
+# Translation, rotation and scale that turn -z to +x: -90 degrees about y.
+_TO_CAMERA = np.array([0.0, 0.0, 0.0, 0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5), 1.0, 1.0, 1.0])
 _BINARY = b"Kaydara FBX Binary"  # first bytes of the binary variant
 _UNSTRUCTURED = re.compile(rb'"[^"]*"|;[^\n]*')  # strings and comments of the text variant
 _CONNECTED = 6000  # version since which objects are connected by a section of their own
@@ -44,6 +49,8 @@ def node_file(source: Source) -> NodeFile:
     _check_values(source, told, "")
     _check_indices(source, arrays, told)
     _say_unused(source, told)
+    n_joints = len(told["names"])
+    cameras, of_camera = _add_cameras(told, arrays)
     count = len(told["names"])
     meshes: list[NodeMesh] = []
     skins: list[NodeSkin] = []
@@ -68,7 +75,7 @@ def node_file(source: Source) -> NodeFile:
             of_node[node] = first_mesh[key]
             if skin is not None:
                 skin_of_node[node] = min(first_skin + at_node, len(skins) - 1)
-    tree = _tree(told["names"], arrays, of_node, skin_of_node)
+    tree = _tree(told["names"], arrays, of_node, skin_of_node, of_camera)
     return NodeFile(
         source.path.stem,
         tree,
@@ -76,9 +83,12 @@ def node_file(source: Source) -> NodeFile:
         meshes=tuple(meshes),
         skins=tuple(skins),
         materials=materials_of(source, arrays, told),
-        animations=_animations(source, told, tree),
+        cameras=cameras,
+        animations=_animations(source, told),
         up=told["up"],
         unit=_unit(told["unit"]),
+        # Unanimated joints of a skeleton, such as its ends, stay joints.
+        named_nodes=frozenset(range(n_joints) if told["stacks"] else ()),
         asset={"generator": told["creator"], "version": f"{told['version'] / 1000:g}"},
     )
 
@@ -168,7 +178,37 @@ def _place_of_keys(told: dict[str, Any], track: dict[str, Any]) -> Phrase:
     return Phrase("fbx-keys", node=name, path=track["path"])
 
 
-def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints) -> NodeTree:
+def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera, ...], Ints]:
+    """Return the cameras, and the camera of each node, after adding a node for each.
+
+    A camera of an FBX looks along +x of its node instead of -z.
+    """
+    made, parents, of_node = [], [], [-1] * len(told["names"])
+    for number, camera in enumerate(told["cameras"]):
+        angle, aspect = camera["angle"], camera["aspect"]
+        made.append(
+            NodeCamera(
+                camera["name"],
+                None if angle is None or not 0.0 < angle < _STRAIGHT else math.radians(angle),
+                aspect if aspect > 0.0 else None,
+                camera["height"],
+                camera["near"] if camera["near"] > 0.0 else None,
+                camera["far"] if camera["far"] > camera["near"] else None,
+            )
+        )
+        parents += camera["nodes"]
+        of_node += [number] * len(camera["nodes"])
+        told["names"] += [told["names"][node] for node in camera["nodes"]]
+    added, same = np.tile(_TO_CAMERA, (len(parents), 1)), np.tile(np.eye(4), (len(parents), 1, 1))
+    arrays["parents"] = np.append(arrays["parents"], parents).astype(np.int32)
+    arrays["local"] = np.concatenate([arrays["local"], added])
+    arrays["geometry"] = np.concatenate(
+        [arrays["geometry"], np.tile(np.eye(4), (len(added), 1, 1))]
+    )
+    return tuple(made), np.array(of_node, dtype=np.int32)
+
+
+def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints, cameras: Ints) -> NodeTree:
     local, parents = arrays["local"], arrays["parents"]
     # The root has no name in the file; this is its name in the FBX SDK.
     named = (
@@ -183,7 +223,7 @@ def _tree(names: list[str], arrays: Arrays, meshes: Ints, skins: Ints) -> NodeTr
         scales=local[:, 7:],
         meshes=meshes,
         skins=skins,
-        cameras=np.full(len(names), -1, dtype=np.int32),
+        cameras=cameras,
     )
 
 
@@ -214,8 +254,7 @@ def _say_reduced(source: Source, arrays: Arrays, prefix: str, mesh: dict[str, An
             source.warn("F007.fbx-in-betweens", shape=shape["name"], n=shape["place"])
 
 
-def _animations(source: Source, told: dict[str, Any], tree: NodeTree) -> tuple[NodeAnimation, ...]:
-    everything = frozenset(range(tree.n_nodes))
+def _animations(source: Source, told: dict[str, Any]) -> tuple[NodeAnimation, ...]:
     meshes: dict[int, int] = {}  # mesh of each blend channel
     for at, mesh in enumerate(told["meshes"]):
         meshes |= dict.fromkeys((shape["element"] for shape in mesh["shapes"]), at)
@@ -224,7 +263,7 @@ def _animations(source: Source, told: dict[str, Any], tree: NodeTree) -> tuple[N
             stack["name"],
             stack["start"],
             stack["end"],
-            everything,
+            frozenset(stack["nodes"]),
             partial(_channels, source, told, meshes, number),
         )
         for number, stack in enumerate(told["stacks"])

@@ -15,7 +15,6 @@ _METHODS = ("lbs", "lbs", "dqs", "mix")  # method of each value of ufbx.Skinning
 # Elements without equivalent, by the list of the scene that contains them.
 _UNUSED = {
     "lights": "light",
-    "cameras": "camera",
     "nurbs_curves": "NURBS curve",
     "nurbs_surfaces": "NURBS surface",
     "line_curves": "line",
@@ -70,15 +69,38 @@ def contents_of(kept: KeptScene) -> dict[str, Any]:
         "textures": [
             _texture(kept, at, each) for at, each in enumerate(kept.items(scene, "textures"))
         ],
+        "cameras": [_camera(kept, each) for each in kept.items(scene, "cameras")],
         "stacks": [
             {
                 "name": str(kept.get(stack, "name")),
                 "start": float(stack.time_begin),
                 "end": float(stack.time_end),
+                "nodes": _moved(kept, stack, nodes),
             }
             for stack in kept.items(scene, "anim_stacks")
         ],
     }
+
+
+def _moved(kept: KeptScene, stack: Any, nodes: list[Any]) -> list[int]:
+    """Return the nodes that a stack moves, or whose blend shapes it changes."""
+    elements = {
+        int(kept.get(each, "element").element_id)
+        for layer in kept.items(stack, "layers")
+        for each in kept.items(layer, "anim_props")
+    }
+    found: set[int] = set()
+    for index, node in enumerate(nodes):
+        owners = [node]
+        if node.is_scale_helper or node.is_scale_compensate_parent:
+            owners.append(kept.get(node, "parent"))
+        mesh = kept.get(node, "mesh")
+        if mesh is not None and len(kept.get(mesh, "blend_deformers")):
+            deformers = kept.items(mesh, "blend_deformers")
+            owners += [mesh, *(each for one in deformers for each in kept.items(one, "channels"))]
+        if any(each is not None and int(each.element_id) in elements for each in owners):
+            found.add(index)
+    return sorted(found)
 
 
 def _add_nodes(kept: KeptScene, nodes: list[Any]) -> None:
@@ -205,6 +227,20 @@ def _shapes(kept: KeptScene, mesh: Any, put: Any) -> list[dict[str, Any]]:
                     }
                 )
     return told
+
+
+def _camera(kept: KeptScene, camera: Any) -> dict[str, Any]:
+    is_parallel = int(kept.get(camera, "projection_mode")) == 1
+    angle, height = kept.get(camera, "field_of_view_deg").y, kept.get(camera, "orthographic_size").y
+    return {
+        "name": str(kept.get(camera, "name")),
+        "nodes": [int(node.typed_id) for node in kept.items(camera, "instances")],
+        "angle": None if is_parallel else float(angle),
+        "aspect": float(camera.aspect_ratio),
+        "height": float(height) if is_parallel else 0.0,
+        "near": float(camera.near_plane),
+        "far": float(camera.far_plane),
+    }
 
 
 def _material(kept: KeptScene, material: Any) -> dict[str, Any]:

@@ -64,10 +64,13 @@ def animations_of(
             animation.name,
             animation.start,
             animation.end,
-            _clip(animation, read),
+            _clip(animation, read, number),
             animation.pointer,
+            number,
         )
-        for animation, read in zip(animations, _bound(readers, joints, columns), strict=True)
+        for number, (animation, read) in enumerate(
+            zip(animations, _bound(readers, joints, columns), strict=True)
+        )
         if any(node in joints or node in columns for node in animation.nodes)
     )
 
@@ -94,10 +97,10 @@ def _bound(
 
 
 def _clip(
-    animation: NodeAnimation, channels: Callable[[], tuple[TransformChannel, ...]]
+    animation: NodeAnimation, channels: Callable[[], tuple[TransformChannel, ...]], number: int
 ) -> Callable[[], TransformClip]:
     start, end, extras = animation.start, animation.end, animation.extras
-    return lambda: TransformClip(animation.name, channels(), start, end, extras)
+    return lambda: TransformClip(animation.name, channels(), start, end, extras, number)
 
 
 def _channel(

@@ -24,9 +24,11 @@ class Animation:
         Returns the keys, or raises a ``FormatError``; called at most once.
     place : str
         JSON pointer to the animation in the file; empty if unknown.
+    number : int
+        Index of the animation in its file, which may move several figures; -1 if unknown.
     """
 
-    __slots__ = ("_clip", "_read", "end", "name", "place", "start")
+    __slots__ = ("_clip", "_read", "end", "name", "number", "place", "start")
 
     def __init__(
         self,
@@ -35,9 +37,10 @@ class Animation:
         end: float,
         read: Callable[[], TransformClip],
         place: str = "",
+        number: int = -1,
     ) -> None:
         self.name, self.start, self.end, self._read = name, start, end, read
-        self.place = place
+        self.place, self.number = place, number
         self._clip: TransformClip | None = None
 
     def plays(self, clip: object) -> bool:

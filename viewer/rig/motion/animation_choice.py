@@ -94,16 +94,21 @@ def chosen_animation(figures: Sequence[Figure], wanted: str) -> Animation | None
 def counterpart(figure: Figure, animation: Animation) -> int:
     """Return the index of a figure's counterpart of another figure's animation, or -1.
 
-    Figures of one file have animations with the same names; the range distinguishes animations of
-    equal name.
+    An animation of a file may move several figures, and two of its animations may have the same
+    name. If the file's numbers are unknown, the range distinguishes animations of equal name.
     """
     span = animation.start, animation.end
     found = [
         (other is not animation, (other.start, other.end) != span, index)
         for index, other in enumerate(figure.animations)
-        if other is animation or other.name == animation.name
+        if other is animation or _is_same(other, animation)
     ]
     return min(found)[-1] if found else -1
+
+
+def _is_same(one: Animation, other: Animation) -> bool:
+    is_known = one.number >= 0 and other.number >= 0
+    return one.number == other.number if is_known else one.name == other.name
 
 
 def own_first(figure: Figure, others: Sequence[Figure]) -> int:

@@ -110,6 +110,8 @@ class TransformClip:
         Playback range in seconds.
     extras : Any
         Application data of its file, as parsed from JSON; None if there is none.
+    number : int
+        Index of its animation in the file, which may move several figures; -1 if unknown.
     """
 
     name: str
@@ -117,6 +119,7 @@ class TransformClip:
     start: float
     end: float
     extras: Any = None
+    number: int = -1
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", float(self.start))
