@@ -43,7 +43,7 @@ def test_invalid_numbers_are_refused_with_their_place(
 def test_products_of_valid_transforms_are_refused_when_they_are_out_of_reach(
     tmp_path: Path,
 ) -> None:
-    scaled = '\nP: "Lcl Scaling", "Lcl Scaling", "", "A",1e30,1e30,1e30'
+    scaled = '\nP: "Lcl Scaling", "Lcl Scaling", "", "A",1e17,1e17,1e17'
     low = 'Model: 21, "Model::low", "LimbNode" { Version: 232 }'
     edits = {
         MOVED: MOVED + scaled,

@@ -16,16 +16,7 @@ from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Bools, Floats, Ints
 
-__all__ = [
-    "archive_of",
-    "are_indices",
-    "corners_of",
-    "finite",
-    "finite_or_nan",
-    "invalid_numbers",
-    "number_problem",
-    "within_reach",
-]
+__all__ = ["archive_of", "are_indices", "corners_of", "finite", "finite_or_nan", "within_reach"]
 
 
 _ROWS = {
@@ -76,12 +67,12 @@ def finite(
     FormatError
         If a number is not finite; the message states the key and the number.
     """
-    numbers, bad = invalid_numbers(values)
+    numbers, bad = _invalid(values)
     if bad is None:
         return numbers
     rows = np.flatnonzero(bad.reshape(len(bad), -1).any(axis=1)) if bad.ndim else np.zeros(1, int)
     of = rows if places is None else places[rows]
-    message, found = number_problem(numbers, bad)
+    message, found = _problem(numbers, bad)
     if part:
         found["at"] = Phrase(_ROWS[part], index=int(of[0]))
     archive.refuse(
@@ -104,10 +95,10 @@ def finite_or_nan(archive: Archive, key: str, values: NDArray[Any]) -> Floats:
 
     The reader turns such frames into gaps, see ``_frame_gaps.py``.
     """
-    numbers, bad = invalid_numbers(values)
+    numbers, bad = _invalid(values)
     if bad is None:
         return numbers
-    message, found = number_problem(numbers, bad)
+    message, found = _problem(numbers, bad)
     archive.leave_gap(f"F003.{message}", item=key, **found)
     return np.where(bad, np.nan, numbers)
 
@@ -128,7 +119,7 @@ def within_reach(archive: Archive, key: str, found: Floats) -> Floats:
     return np.where(far, np.nan, found)
 
 
-def invalid_numbers(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
+def _invalid(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
     """Return numbers as float64, and a mask of those not finite or beyond single precision."""
     # Views of a pickle may be unaligned, and are copied because computing with them is slow.
     is_ready = values.dtype == np.float64 and values.flags.aligned
@@ -141,7 +132,7 @@ def invalid_numbers(values: NDArray[Any]) -> tuple[Floats, Bools | None]:
         return numbers, np.asarray(~(np.abs(numbers) <= LARGEST))
 
 
-def number_problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
+def _problem(numbers: Floats, bad: Bools) -> tuple[str, dict[str, Any]]:
     """Return the message about the first invalid number, without its code, and its values."""
     first = np.argwhere(bad)[0].tolist()
     found = float(numbers[tuple(first)])

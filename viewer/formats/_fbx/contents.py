@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 
 from viewer.diagnostics import Phrase
-from viewer.formats._archive.checking import invalid_numbers, number_problem
 from viewer.formats._fbx.child import run_worker
 from viewer.formats._fbx.materials import materials_of
 from viewer.formats._fbx.meshes import Placed, mesh_on_node, on_nodes, skin_of
 from viewer.formats._fbx.message import Arrays
 from viewer.formats._nodes.content import (
+    REACH,
     NodeAnimation,
     NodeCamera,
     NodeChannel,
@@ -106,15 +106,16 @@ def _check_end(source: Source, version: int) -> None:
 
 
 def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Phrase]) -> None:
-    """Refuse a message with a number that is not finite or that single precision cannot hold."""
+    """Refuse a message with a number that is not finite or out of reach."""
     for name, array in arrays.items():
         if array.dtype != np.float64:
             continue
-        numbers, bad = invalid_numbers(array)
-        if bad is not None:
-            kind, found = number_problem(numbers, bad)
-            row = int(np.argwhere(bad)[0][0])
-            raise source.fault(f"F003.{kind}", **found | {"item": place(name, row), "at": ""})
+        bad = ~(np.abs(array) <= REACH)
+        if bad.any():
+            row, found = int(np.argwhere(bad)[0][0]), float(array[bad][0])
+            kind = "limit" if math.isfinite(found) else "finite"
+            at = place(name, row)
+            raise source.fault(f"F003.{kind}", item=at, found=found, limit=REACH, at="")
 
 
 def _check_values(source: Source, told: Any, path: str) -> None:
@@ -199,12 +200,11 @@ def _add_cameras(told: dict[str, Any], arrays: Arrays) -> tuple[tuple[NodeCamera
         parents += camera["nodes"]
         of_node += [number] * len(camera["nodes"])
         told["names"] += [told["names"][node] for node in camera["nodes"]]
-    added, same = np.tile(_TO_CAMERA, (len(parents), 1)), np.tile(np.eye(4), (len(parents), 1, 1))
+    added = np.tile(_TO_CAMERA, (len(parents), 1))
+    same = np.tile(np.eye(4), (len(parents), 1, 1))
     arrays["parents"] = np.append(arrays["parents"], parents).astype(np.int32)
     arrays["local"] = np.concatenate([arrays["local"], added])
-    arrays["geometry"] = np.concatenate(
-        [arrays["geometry"], np.tile(np.eye(4), (len(added), 1, 1))]
-    )
+    arrays["geometry"] = np.concatenate([arrays["geometry"], same])
     return tuple(made), np.array(of_node, dtype=np.int32)
 
 

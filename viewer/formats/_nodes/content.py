@@ -24,6 +24,7 @@ from viewer.rig.motion.transform_clip import Interpolation, TransformPath
 from viewer.rig.springs.springs import Springs
 
 __all__ = [
+    "REACH",
     "NodeAnimation",
     "NodeCamera",
     "NodeChannel",
@@ -34,6 +35,9 @@ __all__ = [
     "NodeTree",
     "Primitive",
 ]
+
+REACH = 1e18
+"""Largest coordinate that can be drawn: the squares of lengths must fit into single precision."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

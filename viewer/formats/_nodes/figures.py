@@ -8,7 +8,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.formats._nodes.bindings import bind_rigid, bind_skins, inverse_binds
-from viewer.formats._nodes.content import NodeFile
+from viewer.formats._nodes.content import REACH, NodeFile
 from viewer.formats._nodes.facts import facts_of
 from viewer.formats._nodes.grouping import Members, group_nodes, is_skinned, scene_order
 from viewer.formats._nodes.joints import Joints, make_joints, rest_worlds, skeleton_of
@@ -18,7 +18,6 @@ from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
 from viewer.formats._nodes.views import Carrier, views_of
-from viewer.formats._text.numbers import LARGEST
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
@@ -113,13 +112,11 @@ def _worlds(joints: Joints, source: Source) -> Floats:
     """Return the rest transforms of the joints of nodes; refuse those that are out of reach."""
     with np.errstate(over="ignore", invalid="ignore"):
         worlds = rest_worlds(joints)
-    far = ~(np.abs(worlds) <= LARGEST).all(axis=(1, 2))
+    far = ~(np.abs(worlds) <= REACH).all(axis=(1, 2))
     if far.any():
         joint = int(far.argmax())
-        found = worlds[joint].flat[int((~(np.abs(worlds[joint]) <= LARGEST)).argmax())]
-        raise source.fault(
-            "F003.joint-reach", joint=joints.names[joint], limit=LARGEST, found=found
-        )
+        found = worlds[joint].flat[int((~(np.abs(worlds[joint]) <= REACH)).argmax())]
+        raise source.fault("F003.joint-reach", joint=joints.names[joint], limit=REACH, found=found)
     return worlds
 
 
@@ -133,11 +130,11 @@ def _check_positions(
     for piece in pieces:
         with np.errstate(over="ignore", invalid="ignore"):
             reach = np.abs(piece.baked).max() * np.abs(piece.primitive.positions).max(initial=1.0)
-            far = ~(reach * palette[piece.influences.joints] <= LARGEST)
+            far = ~(reach * palette[piece.influences.joints] <= REACH)
         if far.any():
             joint = int(piece.influences.joints[far.argmax()])
             name = joints.names[joint]
-            raise source.fault("F003.bind-reach", joint=name, limit=LARGEST)
+            raise source.fault("F003.bind-reach", joint=name, limit=REACH)
 
 
 def _is_skinned(file: NodeFile, node: int) -> bool:
