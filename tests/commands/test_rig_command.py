@@ -279,6 +279,15 @@ def test_author_is_required_before_the_transfer(folder, tmp_path, monkeypatch, c
     assert "add --vrm-author NAME and --vrm-licence" in capsys.readouterr().err
 
 
+def test_human_bones_are_required_before_the_transfer(folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(rig, "transfer", lambda *_, **__: pytest.fail("transferred"))
+    target, meta = str(next(folder.glob("*.obj"))), ["--vrm-author", "Ada"]
+    licence = ["--vrm-licence", "https://vrm.dev/licenses/1.0/"]
+    output = ["-o", str(tmp_path / "a.vrm")]
+    assert run(["rig", target, "--from", "fox", *output, *meta, *licence]) == 2
+    assert "12 required human bones not found: leftUpperLeg" in capsys.readouterr().err
+
+
 def test_target_is_never_replaced(folder, capsys):
     target = folder / "scan.obj"
     before = target.read_bytes()

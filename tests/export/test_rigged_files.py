@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import faults
@@ -13,12 +14,15 @@ from numpy.testing import assert_allclose
 pytest.importorskip("scipy")
 
 import viewer
+from viewer import formats
 from viewer.autorig.pipeline import transfer
 from viewer.errors import UnsupportedFormatError
 from viewer.export._rigged_files import files_of, without_correctives, write_rigged
 from viewer.rig.blendshapes import Correctives
 from viewer.rig.figure import Figure
+from viewer.rig.kinematics import world_matrices
 from viewer.rig.pose import rest_pose
+from viewer.rig.posing.pose_record import apply_record
 from viewer.rig.skinning import deform
 
 
@@ -34,6 +38,24 @@ def rigged():
     pose.dofs[6:] = 0.2, -0.1, 0.7
     target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
     return target, transfer(template, pose, target)
+
+
+def test_pose_file_fits_a_skeleton_whose_rest_rotations_became_angles(tmp_path):
+    """The .skel has no rest rotations: angles of the pose file are those of its joints."""
+    plain = arm()
+    turned = np.random.default_rng(7).normal(size=(plain.skeleton.n_joints, 4))
+    turned /= np.linalg.norm(turned, axis=1, keepdims=True)
+    joints = replace(plain.skeleton, rest_rotations=turned)
+    bound = np.linalg.inv(world_matrices(joints, rest_pose(joints)))
+    template = Figure("arm", plain.mesh, joints, replace(plain.skin, inverse_bind=bound))
+    pose = rest_pose(joints)
+    pose.dofs[-3:] = 0.2, -0.1, 0.7
+    target = viewer.Mesh(*deform(template, pose), plain.mesh.triangles)
+    write_rigged(transfer(template, pose, target), tmp_path / "arm.skel")
+    again = viewer.load(tmp_path / "arm.skel", tmp_path / "arm.skin").actors[0]
+    record = formats.read(formats.Source.open(tmp_path / "arm.json"))
+    assert apply_record(record, again.figure, again.pose) == []
+    assert_allclose(deform(again.figure, again.pose)[0], target.positions, atol=1e-9)
 
 
 def test_file_names_of_rigged_meshes_depend_on_the_format():

@@ -28,6 +28,7 @@ from viewer.commands._writing.vrm_meta import add_vrm_arguments, vrm_meta
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
 from viewer.errors import FormatError, RigError, ViewerError
+from viewer.export import check_figure, exporter_for
 from viewer.export._rigged_files import files_of, write_rigged
 from viewer.export._vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
@@ -180,6 +181,9 @@ def run(arguments: argparse.Namespace) -> int:
     if output is not None and output.suffix.lower() == ".vrm":
         checked_meta(meta, target.name)  # checked early, as the rig transfer takes long
     template = _template(arguments, inputs)
+    if output is not None and output.suffix.lower() != ".npz":
+        # The rigged mesh gets the template's joints, and the rig transfer takes long.
+        check_figure(exporter_for(output), template.figure)
     settings = _settings(arguments, template, output)
     clips = read_clips(arguments, _files(arguments), template.figure)
     files = [] if output is None else [*files_of(output), *(clip.path for clip in clips)]

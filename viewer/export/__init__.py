@@ -30,6 +30,7 @@ __all__ = [
     "MotionOptions",
     "VrmMeta",
     "animation_for",
+    "check_figure",
     "export",
     "export_animation",
     "export_clips",
@@ -77,6 +78,7 @@ EXPORTERS = {
         "mesh, joints, limits, weights, texture",
         "blend shapes, pose correctives",
         needs="skeleton",
+        is_particular=True,
     ),
     "anim": Exporter(
         "clip: keys of a course rig",
@@ -86,6 +88,7 @@ EXPORTERS = {
         writes_pose=False,
         writes_motion=True,
         needs="skeleton",
+        is_particular=True,
     ),
     "gltf": Exporter(
         "glTF: mesh, skin and motion",
@@ -102,6 +105,7 @@ EXPORTERS = {
         "mesh, weights, materials, shapes, human bones, expressions, springs, meta data",
         "pose, motion, joint limits, pose correctives",
         needs="skeleton",
+        is_particular=True,
     ),
     "vrma": Exporter(
         "VRM animation: motion of a humanoid",
@@ -111,6 +115,7 @@ EXPORTERS = {
         writes_pose=False,
         writes_motion=True,
         needs="skeleton",
+        is_particular=True,
     ),
     "bvh": Exporter(
         "BVH: skeleton and motion",
@@ -129,6 +134,7 @@ EXPORTERS = {
         writes_pose=False,
         writes_motion=True,
         keeps_world=True,
+        is_particular=True,
     ),
     "smplx": Exporter(
         "SMPL-X for robots (GMR, PHC)",
@@ -137,6 +143,7 @@ EXPORTERS = {
         "scale, hands of SMPL",
         writes_pose=False,
         writes_motion=True,
+        is_particular=True,
     ),
     "easymocap": Exporter(
         "EasyMocap: a folder of frames",
@@ -146,6 +153,7 @@ EXPORTERS = {
         writes_pose=False,
         writes_motion=True,
         keeps_world=True,
+        is_particular=True,
     ),
 }
 """Modules in this folder, each with ``export(actor, path, skinning)``."""
@@ -364,6 +372,20 @@ def export_animation(
     if len(animation.frames.present) == 1:
         return notes  # a pose was requested
     return notes + rate_note(animation) + other_animations_note(animation.figure, animation.motion)
+
+
+def check_figure(key: str, figure: Figure) -> None:
+    """Raise RigError if an exporter cannot write a figure, before any work is done for it.
+
+    Parameters
+    ----------
+    key : str
+        A key of ``EXPORTERS``.
+    figure : Figure
+        Only its joints, their names and its unit matter.
+    """
+    if EXPORTERS[key].is_particular:
+        import_module(f"{__name__}.{key}").require(figure)
 
 
 def animation_for(

@@ -34,6 +34,9 @@ class Exporter:
         animations of a figure with their own keys.
     writes_several : bool
         Whether its module has ``export_figures``, which writes several figures to one file.
+    is_particular : bool
+        Whether its module has ``require(figure)``, which raises RigError for figures whose joints
+        the format cannot hold.
     needs : "mesh", "skeleton" or ""
         The part without which nothing of a figure can be written.
     """
@@ -47,6 +50,7 @@ class Exporter:
     keeps_world: bool = False
     writes_keys: bool = False
     writes_several: bool = False
+    is_particular: bool = False
     needs: Literal["mesh", "skeleton", ""] = ""
 
     def holds(self, actor: Actor) -> bool:

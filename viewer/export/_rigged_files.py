@@ -13,9 +13,11 @@ from viewer.autorig.rigged import Rigged
 from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
+from viewer.export._course_rig import course_pose, course_skeleton
 from viewer.formats import all_or_none
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
+from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import pose_weights
 
@@ -76,11 +78,17 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     with all_or_none(files):
         notes += export(Actor(figure, figure_pose(figure)), skel)
         notes += export(Actor(Figure(figure.name, figure.mesh, up=figure.up)), obj)
-        written, *lost = export(Actor(figure, rigged.pose), json)
+        written, *lost = export(Actor(*_posed_skeleton(figure, rigged.pose)), json)
     notes += [replace(written, key="X001.target-pose"), *lost]
     if rigged.figure.correctives is not None:
         notes.append(Diagnostic("X003.rigged-correctives"))
     return notes
+
+
+def _posed_skeleton(figure: Figure, pose: Pose) -> tuple[Figure, Pose]:
+    """Return a figure and pose whose angles are those of the written ``.skel``."""
+    course = course_skeleton(figure.require_skeleton(), figure_pose(figure))
+    return course_pose(figure, pose) if course.turned else (figure, pose)
 
 
 def without_correctives(rigged: Rigged) -> Figure:

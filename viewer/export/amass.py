@@ -36,6 +36,7 @@ from viewer.export._options import GAPS, MotionOptions
 from viewer.formats import Source, all_or_none, keeping_written, save_arrays
 from viewer.formats.amass import read
 from viewer.rig.arrays import Floats
+from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
 __all__ = ["export_animation", "padded", "write_layout"]
@@ -82,6 +83,11 @@ def export_animation(
     if len(animation.frames.shape_weights) > 1:
         notes.append(Diagnostic("X005.shape-rows"))
     return notes
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure without the joints of an SMPL-family body."""
+    member_of_figure(figure, "an AMASS motion", ("pelvis",))
 
 
 def write_layout(

@@ -28,7 +28,7 @@ from viewer.rig.motion.sampled_animation import SampledAnimation, frames_at
 from viewer.rig.scalars import length_text
 from viewer.rig.skeleton import Skeleton
 
-__all__ = ["export_animation"]
+__all__ = ["export_animation", "require"]
 
 _RULES: tuple[Tangent, ...] = ("linear", "smooth")
 _BLOCK = 4096  # frames measured per block
@@ -66,12 +66,8 @@ def export_animation(
         If a file cannot be written.
     """
     figure, frames = animation.figure, animation.frames
+    require(figure)
     skeleton = figure.require_skeleton()
-    if not is_course_rig(skeleton):
-        raise RigError(
-            f".anim needs a root translation and three angles per joint, as in .skel files; "
-            f"{figure.name} has other DOFs"
-        )
     if options.closing not in GAPS:
         raise RigError(
             f'handling of gaps: expected one of {", ".join(GAPS)}, found "{options.closing}"'
@@ -88,6 +84,15 @@ def export_animation(
             notes.append(Diagnostic("X003.clip-placement"))
         return notes + _left_out(figure, frames)
     return _export_frames(animation, skeleton, path, options)
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure whose DOFs are not those of ``.skel`` files."""
+    if not is_course_rig(figure.require_skeleton()):
+        raise RigError(
+            f".anim needs a root translation and three angles per joint, as in .skel files; "
+            f"{figure.name} has other DOFs"
+        )
 
 
 def _export_frames(

@@ -45,6 +45,7 @@ from viewer.phrases import printable
 from viewer.progress import report
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.person import person_label
+from viewer.rig.figure import Figure
 from viewer.rig.motion.evaluation import frames_between
 from viewer.rig.motion.sampled_animation import SampledAnimation
 
@@ -134,6 +135,11 @@ def export_animations(
         *errors,
         *notes,
     ]
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure without the joints of an SMPL-family body."""
+    member_of_figure(figure, "an EasyMocap folder", ("pelvis", "wrist"))
 
 
 def _of_person(person: int, note: Diagnostic) -> Diagnostic:

@@ -9,22 +9,27 @@ import numpy as np
 
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.errors import RigError
-from viewer.export._course_rig import course_skeleton
+from viewer.export._course_rig import CourseSkeleton, course_skeleton
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.posed import PoseLosses
 from viewer.formats import Source, all_or_none, keeping_written, read, write
 from viewer.formats.skin import lost_parts
+from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.mesh import without_seams
-from viewer.rig.pose import Pose, rest_pose
+from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
+from viewer.rig.skeleton import joint_label
 from viewer.rig.skin import skin_rows
-from viewer.rig.skinning import Skinning, deform, skin_used
+from viewer.rig.skinning import Skinning, deform, joint_matrices, skin_used
 
-__all__ = ["export"]
+__all__ = ["export", "require"]
+
+_ROUNDED = 1e-5  # scales in files differ from 1 by less than this if they are rounded
+_FLAT = 1e-12  # determinant below which a joint counts as scaled to 0
 
 
 def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
@@ -34,10 +39,9 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     translation is added to the root's offset.
     """
     figure, pose = actor.figure, actor.pose
-    if figure.skeleton is None or pose is None:
-        raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
-    whole = scaled(shaped(figure, pose.shape_weights), pose.figure_scale)
-    rig, sources = _as_rig(whole, pose, skinning)
+    require(figure)
+    assert figure.skeleton is not None and pose is not None  # figures with joints have a pose
+    course, rig, sources = _as_rig(actor, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
     notes = [Diagnostic("X001.skel", skel, values={"n": figure.skeleton.n_joints})]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
@@ -51,7 +55,13 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         if figure.mesh is not None and rig.mesh.n_vertices != figure.mesh.n_vertices:
             counts = {"before": figure.mesh.n_vertices, "after": rig.mesh.n_vertices}
             notes.append(Diagnostic("X005.seams", values=counts))
-    return notes + _lost(figure) + error
+    return notes + _changed(actor, course) + _lost(figure) + error
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure that the format cannot hold."""
+    if figure.skeleton is None:
+        raise RigError(f"figure {figure.name} has no skeleton to write as .skel")
 
 
 def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
@@ -62,19 +72,62 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
     return [skel, skin, *(skin.parent / name.replace("\\", "/") for name in pictures if name)]
 
 
-def _as_rig(figure: Figure, pose: Pose, skinning: Skinning) -> tuple[Figure, np.ndarray | None]:
+def _as_rig(actor: Actor, skinning: Skinning) -> tuple[CourseSkeleton, Figure, np.ndarray | None]:
     """Return the figure in the form of the files, and the original vertex of each split vertex."""
+    pose = actor.require_pose()
+    figure = scaled(shaped(actor.figure, pose.shape_weights), pose.figure_scale)
     skeleton, mesh, skin = figure.require_skeleton(), figure.mesh, figure.skin
-    posed, order = course_skeleton(skeleton, pose)
+    course = course_skeleton(skeleton, pose)
+    posed, order = course.skeleton, course.order
     if mesh is None:
-        return Figure(figure.name, skeleton=posed), None
+        return course, Figure(figure.name, skeleton=posed), None
     split, sources = without_seams(mesh)
     if skin is None:
-        return Figure(figure.name, split, posed), sources
+        return course, Figure(figure.name, split, posed), sources
     used = skin_rows(skin_used(skin, skinning), sources)
     place = np.argsort(order).astype(np.int32)
-    moved = replace(used, joints=place[used.joints], inverse_bind=used.inverse_bind[order])
-    return Figure(figure.name, split, posed, moved), sources
+    bound = skin.inverse_bind[order]
+    if course.is_scaled:
+        bound = _scaling_bindings(actor, course)
+    moved = replace(used, joints=place[used.joints], inverse_bind=bound)
+    return course, Figure(figure.name, split, posed, moved), sources
+
+
+def _scaling_bindings(actor: Actor, course: CourseSkeleton) -> Floats:
+    """Return inverse binding matrices that scale as the posed joints do: (J, 4, 4).
+
+    With the skinning matrices M of the figure and the matrices W of the unscaled joints in the same
+    pose, both in the scaled figure, they are W^-1 M.
+    """
+    figure, pose = actor.figure, actor.require_pose()
+    skin = shaped(figure, pose.shape_weights).require_skin()
+    palette = joint_matrices(figure, pose) @ skin.inverse_bind
+    palette[:, :3, :3] /= pose.figure_scale  # the mesh is scaled already
+    joints = world_matrices(course.skeleton, rest_pose(course.skeleton))
+    bound = np.linalg.inv(joints) @ palette[course.order]
+    flat = np.abs(np.linalg.det(bound[:, :3, :3])) < _FLAT
+    if flat.any():
+        skeleton, joint = figure.require_skeleton(), int(course.order[flat.argmax()])
+        raise RigError(
+            f".skin cannot store joint {joint_label(skeleton, joint)}, which is scaled to 0: show "
+            "it, or choose .glb"
+        )
+    return bound
+
+
+def _changed(actor: Actor, course: CourseSkeleton) -> list[Diagnostic]:
+    """Return notes about data in another form."""
+    skeleton, notes = actor.figure.require_skeleton(), list[Diagnostic]()
+    for key, joints in (("turned", course.turned), ("unlimited", course.unlimited)):
+        if joints:
+            names = [joint_label(skeleton, joint) for joint in joints]
+            notes.append(Diagnostic(f"X005.skel-{key}", values={"n": len(names), "names": names}))
+    if (np.abs(actor.require_pose().scales - 1.0) > _ROUNDED).any():
+        notes.append(Diagnostic("X005.skel-scaled"))
+    if course.renamed:
+        values = {"n": len(course.renamed), "names": course.renamed}
+        notes.append(Diagnostic("X005.skel-names", values=values))
+    return notes
 
 
 def scaled(figure: Figure, factor: float) -> Figure:

@@ -22,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from viewer.diagnostics import Diagnostic
-from viewer.export._family_frames import FamilyFrames
+from viewer.export._family_frames import FamilyFrames, member_of_figure
 from viewer.export._options import MotionOptions
 from viewer.export.amass import padded, write_layout
+from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.smpl_family import FAMILY
 
@@ -74,6 +75,11 @@ def export_animation(
     if len(animation.figure.require_skeleton().names) != len(_MEMBER.names):
         notes.append(Diagnostic("X005.as-smplx", values={"figure": animation.figure.name}))
     return notes
+
+
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure without the joints of an SMPL-family body."""
+    member_of_figure(figure, "an SMPL-X motion", ("pelvis",))
 
 
 def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, NDArray[Any]]:

@@ -102,6 +102,11 @@ def export(
     return gltf.export(still, path, skinning, optimizes, extend) + notes
 
 
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure that lacks a required human bone."""
+    human_bones(figure)
+
+
 def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
     """Raise RigError if neither the file nor the options name an author."""
     if not any(record.extensions["VRMC_vrm"]["meta"]["authors"]):

@@ -88,6 +88,11 @@ def export_animation(
     return notes
 
 
+def require(figure: Figure) -> None:
+    """Raise RigError for a figure that lacks a required human bone."""
+    human_bones(figure)
+
+
 def _unhidden(figure: Figure, frames: Frames) -> tuple[Figure, Frames]:
     """Return joints without scales of 0, which hide them, so that they have world rotations."""
     skeleton = figure.require_skeleton()

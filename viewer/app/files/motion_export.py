@@ -20,6 +20,7 @@ from viewer.export import (
     Exporter,
     MotionOptions,
     animation_for,
+    check_figure,
     export_animation,
     export_clips,
     export_figures,
@@ -256,6 +257,8 @@ def _write(
     scene: Scene, parts: Sequence[_Part], key: str, options: MotionOptions
 ) -> list[Diagnostic]:
     notes: list[Diagnostic] = []
+    for part in parts:
+        check_figure(key, part.actor.figure)
     for part in parts:
         if EXPORTERS[key].writes_keys and part.frames is None and keeps_keys(scene, part.actor):
             actor = upright_actor(scene, part.actor)

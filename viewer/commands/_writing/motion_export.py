@@ -18,6 +18,7 @@ from viewer.export import (
     EXPORTERS,
     MotionOptions,
     animation_for,
+    check_figure,
     export_animation,
     files_written,
     motion_exporters,
@@ -166,6 +167,8 @@ def write_motions(
     key = _exporter(arguments, output, scene)
     all_written = written_actors(arguments, output, scene)
     actors, lacking = able_actors(all_written, key)
+    for actor in actors:
+        check_figure(key, actor.figure)
     is_pose = asks_one_pose(arguments, output, scene)
     is_one = EXPORTERS[key].writes_several and is_together(output, options)
     paths = [output] * len(actors) if is_one else motion_paths(output, actors)

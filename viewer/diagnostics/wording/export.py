@@ -132,6 +132,14 @@ MESSAGES = {
     "X005.polygons": "polygons of the original file are written as triangles ({polygons})",
     "X005.material-names": "{n:#material|has|have} another name in the file, because names must "
     "be unique: {names:list8}",
+    "X005.skel-turned": "{n:#joint|has|have} a rest rotation, a constraint or another order of "
+    "rotations: the pose in the file contains {n:?its|their} whole rotation ({names:list8})",
+    "X005.skel-unlimited": "limits of {n:#joint} are omitted, because {n:?its|their} angles in the "
+    "file are others: {names:list8}",
+    "X005.skel-scaled": "joints are scaled, which .skel cannot store: the bindings of the .skin "
+    "scale the vertices, and bones keep their lengths when the file is posed",
+    "X005.skel-names": "{n:#name} of joints {n:?is|are} changed, because .skel has no braces or "
+    "keywords in names: {names:list8}",
     "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
     "X005.unit-unknown": "lengths are unchanged: the unit of {figure:text} is unknown",
