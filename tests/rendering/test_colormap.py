@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from viewer.rendering.colormap import colormap
+from viewer.rendering.colormap import colormap, named_map
+from viewer.rendering.options import COLORMAPS
 
 # Matrices from sRGB to CIE XYZ (IEC 61966-2-1), and from XYZ to the lightness of OKLab (Ottosson
 # 2020).
@@ -61,3 +63,27 @@ def test_any_number_of_colours_spans_the_same_map():
         step = 255 / (count - 1)
         if step == int(step):
             assert np.array_equal(colormap(count), whole[:: int(step)])
+
+
+@pytest.mark.parametrize(
+    ("name", "first", "middle", "last"),
+    [
+        # As published: #440154, #21918c and #fde725 are viridis at 0, 1/2 and 1.
+        ("viridis", 0x440154, 0x21918C, 0xFDE725),
+        ("magma", 0x000004, 0xB73779, 0xFCFDBF),
+        ("inferno", 0x000004, 0xBC3754, 0xFCFFA4),
+        ("plasma", 0x0D0887, 0xCC4778, 0xF0F921),
+        ("cividis", 0x00224E, 0x7D7C78, 0xFEE838),
+        ("turbo", 0x30123B, 0xA4FC3C, 0x7A0403),
+        ("coolwarm", 0x3B4CC0, 0xDDDCDC, 0xB40426),
+    ],
+)
+def test_named_maps_have_the_published_colours(name, first, middle, last):
+    pixels = named_map(name)
+    assert pixels.shape == (256, 4) and (pixels[:, 3] == 255).all()
+    found = pixels[[0, 128, 255], :3].astype(int) @ [1 << 16, 1 << 8, 1]
+    assert found.tolist() == [first, middle, last]
+
+
+def test_every_name_has_a_map():
+    assert all(len(named_map(name)) == 256 for name in COLORMAPS if name != "auto")

@@ -9,7 +9,7 @@ import numpy as np
 
 from viewer.errors import RigError, ViewerError
 from viewer.phrases import printable
-from viewer.rendering.options import DisplayOptions
+from viewer.rendering.options import COLORMAPS, DisplayOptions
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.number_text import number_text
@@ -48,6 +48,14 @@ def add_scalar_arguments(group: argparse._ArgumentGroup) -> None:
         "--scalar-range=-20:20 if A is below 0",
     )
     group.add_argument(
+        "--colormap",
+        choices=COLORMAPS,
+        metavar="NAME",
+        help=f"colours of a continuous quantity, as in matplotlib: {', '.join([*COLORMAPS][1:])} "
+        "(default: auto, dark violet to yellow, or blue through white to red if values have a "
+        "sign)",
+    )
+    group.add_argument(
         "--isolines",
         action=argparse.BooleanOptionalAction,
         help="isolines at every tenth of the range (default: for weights only)",
@@ -72,11 +80,15 @@ def set_scalar(arguments: argparse.Namespace, options: DisplayOptions) -> None:
     """
     if arguments.scalar:
         options.shading, options.scalar = "scalar", arguments.scalar
-    for name in ("legend", "scalar_range", "isolines"):
+    for name in ("legend", "scalar_range", "isolines", "colormap"):
         if getattr(arguments, name) not in (None, False) and options.shading != "scalar":
             option = f"--{name.replace('_', '-')}"
             raise ViewerError(f"{option}: expected --scalar NAME, to which it applies")
     options.legend, options.isolines = arguments.legend, arguments.isolines
+    if arguments.colormap is not None:
+        if find_quantity(options.scalar).kind in _WHOLE:
+            raise ViewerError(f"--colormap: {options.scalar} has one colour per integer")
+        options.colormap = arguments.colormap
     if arguments.scalar_range is not None:
         if find_quantity(options.scalar).kind in _WHOLE:
             raise ViewerError(f"--scalar-range: {options.scalar} has one colour per integer")

@@ -1,16 +1,20 @@
-"""Colour maps of scalar quantities: perceptually uniform and colour-blind safe."""
+"""Colour maps of scalar quantities: two of our own, and those that other programs name."""
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 
+from viewer.resources import resource
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.srgb import encode_srgb
 
-__all__ = ["colormap", "diverging_map", "oklab"]
+__all__ = ["colormap", "diverging_map", "named_map", "oklab"]
 
-# Anchors in OKLab (Ottosson 2020): lightness rises linearly from violet through red to yellow, so
-# the map works in greyscale and for colour-blind people, like matplotlib's "inferno".
+# Our own maps are perceptually uniform and colour-blind safe. The anchors are in OKLab (Ottosson
+# 2020): lightness rises linearly from violet through red to yellow, so the map works in greyscale
+# and for colour-blind people, like matplotlib's "inferno".
 _ANCHORS = np.array(
     [
         [0.24, 0.020, -0.075],
@@ -64,6 +68,22 @@ def diverging_map(count: int = 256) -> Bytes:
     [245, 245, 245, 255]
     """
     return _pixels(_DIVERGING, _DIVERGING_PLACES, count)
+
+
+@cache
+def named_map(name: str) -> Bytes:
+    """Return a map of ``assets/colormaps.txt`` as pixels: (256, 4) sRGB with alpha.
+
+    >>> named_map("viridis")[[0, -1]].tolist()
+    [[68, 1, 84, 255], [253, 231, 37, 255]]
+    """
+    lines = resource("assets", "colormaps.txt").read_text("ascii").splitlines()
+    first = lines.index(name) + 1
+    pixels = np.full((256, 4), 255, dtype=np.uint8)
+    digits = bytes.fromhex("".join(lines[first : first + 16]))
+    pixels[:, :3] = np.frombuffer(digits, dtype=np.uint8).reshape(256, 3)
+    pixels.flags.writeable = False
+    return pixels
 
 
 def _pixels(anchors: Floats, places: Floats, count: int) -> Bytes:

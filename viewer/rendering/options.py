@@ -10,6 +10,7 @@ from viewer.rig.skinning import Skinning
 __all__ = [
     "BACKGROUNDS",
     "BONES",
+    "COLORMAPS",
     "MATCAPS",
     "OPACITIES",
     "QUALITIES",
@@ -32,6 +33,18 @@ SHOWN = {
 
 MATCAPS = {"clay": "Clay", "chrome": "Chrome"}
 """Images of lit spheres for the shading ``"matcap"``, with their labels in menus."""
+
+COLORMAPS = {
+    "auto": "Automatic",
+    "viridis": "Viridis",
+    "magma": "Magma",
+    "inferno": "Inferno",
+    "plasma": "Plasma",
+    "cividis": "Cividis",
+    "turbo": "Turbo (rainbow)",
+    "coolwarm": "Cool to warm",
+}
+"""Colour maps of scalar quantities, with their labels in menus: see ``DisplayOptions.colormap``."""
 
 BONES = {
     "auto": "Automatic",
@@ -156,6 +169,9 @@ class DisplayOptions:
     scalar_range : (float, float) or None
         Range of the colour map, in the unit of the legend; None for the range of the values, or a
         range that excludes outliers for quantities with a robust range.
+    colormap : str
+        A key of ``COLORMAPS``; ``"auto"`` is dark violet to yellow, or blue through white to red
+        for quantities with a sign.
     isolines : bool or None
         Draw lines at every tenth of the range; None for the quantity's default.
     legend : bool
@@ -209,6 +225,7 @@ class DisplayOptions:
     skinning: Skinning = field(default_factory=Skinning)
     scalar: str = "weight"
     scalar_range: tuple[float, float] | None = None
+    colormap: str = "auto"
     isolines: bool | None = None
     legend: bool = False
     reduced: bool = False

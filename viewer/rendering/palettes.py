@@ -12,7 +12,7 @@ from viewer.rig.srgb import decode_srgb, encode_srgb
 __all__ = ["NOTHING", "count_palette", "joint_palette", "part_palette"]
 
 NOTHING = (52, 54, 58)
-"""Colour of missing weights or numbers, sRGB: a dark grey that no colour map contains."""
+"""Colour of missing weights or numbers, sRGB: a dark grey that our own maps do not contain."""
 
 # The first seven are from Okabe and Ito (2008). Each following colour is the colour of a regular
 # sRGB grid that is farthest in OKLab from all previous colours, for normal vision, protanopia and

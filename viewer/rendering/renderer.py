@@ -23,7 +23,7 @@ from viewer.rendering.lighting import Lighting
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.outlined import Outlined
 from viewer.rendering.overlays import Overlays, draw_overlays
-from viewer.rendering.passes.background_pass import BackgroundPass
+from viewer.rendering.passes.background_pass import BackgroundPass, is_light
 from viewer.rendering.passes.ground_pass import GroundPass
 from viewer.rendering.passes.instance_pass import draw_instances
 from viewer.rendering.passes.joint_pass import JointPass
@@ -182,7 +182,7 @@ class Renderer:
         if options.outline:
             self.late.outline_pass.draw([Outlined(*selected)], scene, view, options, target)
         if options.legend and options.shading == "scalar" and meshes:
-            self._draw_legend(target.size)
+            self._draw_legend(target.size, is_light(options.background))
 
     def _draw_layers(
         self,
@@ -353,10 +353,10 @@ class Renderer:
         context.blend_func = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
         context.depth_func = "<"
 
-    def _draw_legend(self, size: tuple[int, int]) -> None:
+    def _draw_legend(self, size: tuple[int, int], is_light: bool) -> None:
         assert self.legend is not None  # meshes were drawn with values, so there is a legend
         note = f"an image of {size[0]} x {size[1]} pixels has no room for a legend"
-        if not self.late.legend_pass.draw(self.legend, size) and note not in self.notes:
+        if not self.late.legend_pass.draw(self.legend, size, is_light) and note not in self.notes:
             self.notes.append(note)
 
     def _draw_skeleton(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.colormap import colormap, diverging_map
+from viewer.rendering.colormap import colormap, diverging_map, named_map
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
 from viewer.rig.arrays import Bytes, Floats
@@ -141,7 +141,10 @@ def look_of(
         return ScalarLook(_category_colors(name, figure), ends, is_whole=True)
     if quantity.kind == "discrete":
         return ScalarLook(count_palette(max(round(ends[1]), 1)), ends, is_whole=True)
-    colors = diverging_map() if quantity.kind == "diverging" else colormap()
+    if options.colormap != "auto":
+        colors = named_map(options.colormap)
+    else:
+        colors = diverging_map() if quantity.kind == "diverging" else colormap()
     isolines = quantity.isolines if options.isolines is None else options.isolines
     # A weight of 0 must be distinguishable from a small weight.
     is_typical = quantity.robust and options.scalar_range is None

@@ -68,6 +68,7 @@ class ScalarQuantities:
         key = (
             name,
             options.scalar_range,
+            options.colormap,
             options.isolines,
             *((id(mesh), mesh.scalars.version) for _, mesh in meshes),
             *map(id, figures),

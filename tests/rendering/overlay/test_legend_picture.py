@@ -42,6 +42,23 @@ def test_bar_runs_from_the_first_to_the_last_colour():
     assert places[1] - places[0] == pytest.approx((places[-1] - places[0]) * 62 / 251, abs=2)
 
 
+@pytest.mark.parametrize("is_light", [False, True])
+def test_text_contrasts_with_the_panel_and_what_is_behind_it(is_light):
+    """WCAG 2 asks for a contrast of at least 4.5 for text."""
+    pixels = legend_pixels(legend("weight:j1", [0, 1, 0, 0, 0, 0]), SIZE, is_light)
+    behind = 255.0 if is_light else 60.0
+    alpha = pixels[..., 3:] / 255.0
+    seen = (alpha * pixels[..., :3] + (1.0 - alpha) * behind) / 255.0
+    linear = np.where(seen <= 0.04045, seen / 12.92, ((seen + 0.055) / 1.055) ** 2.4)
+    luminance = linear @ [0.2126, 0.7152, 0.0722]
+    panel = luminance[1, 1]
+    heading = luminance[: len(luminance) // 4]
+    text = heading.min() if is_light else heading.max()
+    brighter, darker = max(panel, text), min(panel, text)
+    assert (panel > 0.5) == is_light
+    assert (brighter + 0.05) / (darker + 0.05) > 4.5
+
+
 def test_isolines_are_on_the_bar():
     found = legend("weight:j1", [0, 1, 0, 0, 0, 0])
     with_lines, without = (legend_pixels(one, SIZE) for one in (found, replace(found, lines=())))

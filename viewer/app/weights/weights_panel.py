@@ -23,6 +23,7 @@ from viewer.app.core.widgets import (
 from viewer.app.weights.actions import no_view, show_scalar, shown_joint, start_heat_map, unpin
 from viewer.app.weights.state import Weights
 from viewer.phrases import printable
+from viewer.rendering.options import COLORMAPS
 from viewer.rendering.scalar_look import TYPICAL
 from viewer.rig.figure import Figure
 from viewer.rig.number_text import short_number
@@ -145,6 +146,8 @@ def _draw_range(state: AppState, key: str) -> None:
             _end_field(state, "From", low, unit, -math.inf, high),
             _end_field(state, "To", high, unit, low, math.inf),
         )
+    with disabled(state, why):
+        options.colormap = choice(state, "Colours", options.colormap, COLORMAPS)
 
 
 def _end_field(

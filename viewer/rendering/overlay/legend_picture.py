@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -26,10 +26,22 @@ _MOST = 0.9  # maximum fraction of the image's width and height
 _WIDE, _WIDER = 0.3, 0.45
 _LONGEST = 40  # maximum number of characters of a name
 _BAR = 14.0  # width of the bar, in text heights
-_PANEL, _TEXT, _FAINT, _LINE = (20, 22, 26, 214), (240, 242, 245), (176, 182, 190), (12, 12, 14)
+_LINE = (12, 12, 14)  # isolines, sRGB
 
 
-def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
+class _Ink(NamedTuple):
+    """Colours of the panel, of its text, and of less important text: sRGB and alpha."""
+
+    panel: tuple[int, int, int, int]
+    text: tuple[int, int, int]
+    faint: tuple[int, int, int]
+
+
+_ON_DARK = _Ink((20, 22, 26, 214), (240, 242, 245), (176, 182, 190))
+_ON_LIGHT = _Ink((255, 255, 255, 214), (28, 30, 34), (92, 98, 106))
+
+
+def legend_pixels(legend: Legend, size: tuple[int, int], is_light: bool = False) -> Bytes | None:
     """Return a legend's pixels, sized for an image.
 
     Many named items are set in several columns, then in smaller text, then in wider columns; items
@@ -41,6 +53,8 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
         The legend.
     size : (int, int)
         Width and height of the image that contains the legend, pixels.
+    is_light : bool
+        Whether the legend is dark text on a light panel, for light backgrounds.
 
     Returns
     -------
@@ -52,7 +66,7 @@ def legend_pixels(legend: Legend, size: tuple[int, int]) -> Bytes | None:
     least = max(round(_SMALLER * letters), _SIZES[0])
     tries = [(height, _WIDE) for height in range(letters, least - 1, -1)] + [(least, _WIDER)]
     for height, fraction in tries:
-        drawing = _Drawing(legend, height, size, fraction)
+        drawing = _Drawing(legend, height, size, fraction, _ON_LIGHT if is_light else _ON_DARK)
         if not drawing.columns.left_out:
             break
     return drawing.pixels()
@@ -62,11 +76,11 @@ class _Drawing:
     """Layout of a legend, from top to bottom: lines of text, then a bar or columns of swatches."""
 
     def __init__(
-        self, legend: Legend, letters: int, size: tuple[int, int], fraction: float
+        self, legend: Legend, letters: int, size: tuple[int, int], fraction: float, ink: _Ink
     ) -> None:
         from PIL import Image, ImageDraw
 
-        self.legend, self.letters, self.size = legend, letters, size
+        self.legend, self.letters, self.size, self.ink = legend, letters, size, ink
         self.font = Typeface(letters)
         self.gap = max(letters // 2, 3)
         self.line = round(1.35 * letters)
@@ -93,10 +107,10 @@ class _Drawing:
         whole = width + 2 * gap, height + 2 * gap
         if whole[0] > _MOST * self.size[0] or whole[1] > _MOST * self.size[1]:
             return None
-        image = self.new("RGBA", whole, _PANEL)
+        image = self.new("RGBA", whole, self.ink.panel)
         draw = self.draw_on(image)
         y = gap
-        self.font.draw(draw, (gap, y), legend.heading, _TEXT)
+        self.font.draw(draw, (gap, y), legend.heading, self.ink.text)
         y += self.line
         if self.bar_height:
             self._draw_bar(draw, gap, y, width)
@@ -104,7 +118,7 @@ class _Drawing:
         self._draw_entries(draw, y)
         y += self.columns.rows * self.line
         if legend.note:
-            self.font.draw(draw, (gap, y), legend.note, _FAINT)
+            self.font.draw(draw, (gap, y), legend.note, self.ink.faint)
         return np.array(image)
 
     def _columns_width(self) -> int:
@@ -141,9 +155,9 @@ class _Drawing:
             draw.line([(x, top), (x, bottom)], _LINE)
         for tick in self.legend.ticks:
             x = first + round(tick.place * (length - 1))
-            draw.line([(x, bottom), (x, bottom + self.gap // 2)], _TEXT)
+            draw.line([(x, bottom), (x, bottom + self.gap // 2)], self.ink.text)
             corner = (x - self._width(tick.text) / 2, bottom + self.gap // 2)
-            self.font.draw(draw, corner, tick.text, _TEXT)
+            self.font.draw(draw, corner, tick.text, self.ink.text)
 
     def _draw_entry(
         self,
@@ -156,8 +170,10 @@ class _Drawing:
         side = self.letters
         if color is not None:
             edge = top + 0.15 * side
-            draw.rectangle([(left, edge), (left + side, edge + side)], color, _FAINT)
-        self.font.draw(draw, (left + 1.6 * side, top), text, _TEXT if color else _FAINT)
+            draw.rectangle([(left, edge), (left + side, edge + side)], color, self.ink.faint)
+        self.font.draw(
+            draw, (left + 1.6 * side, top), text, self.ink.text if color else self.ink.faint
+        )
 
     def _width(self, text: str) -> int:
         return int(np.ceil(self.font.length(text)))

@@ -12,7 +12,7 @@ from viewer.rendering.gpu.target import Target
 from viewer.rendering.gpu.upload import checked
 from viewer.rendering.options import BACKGROUNDS
 
-__all__ = ["BackgroundPass", "parse_color"]
+__all__ = ["BackgroundPass", "is_light", "parse_color"]
 
 _BOTTOM, _TOP = (0.80, 0.83, 0.86), (0.36, 0.43, 0.52)  # sRGB
 _CLEARED = {
@@ -41,6 +41,20 @@ def parse_color(text: str) -> tuple[float, float, float]:
         raise ViewerError(f'background: expected {names} or "#rrggbb", found "{text}"')
     red, green, blue = (int(digits[i : i + 2], 16) / 255.0 for i in (0, 2, 4))
     return red, green, blue
+
+
+def is_light(background: str) -> bool:
+    """Return whether dark text is easier to read on a background: white, or a light colour.
+
+    The gradient is dark at the top, where legends are, and what is behind the others is unknown.
+
+    >>> is_light("white"), is_light("#e9ebee"), is_light("#303840"), is_light("gradient")
+    (True, True, False, False)
+    """
+    if background in BACKGROUNDS:
+        return background == "white"
+    red, green, blue = parse_color(background)
+    return 0.299 * red + 0.587 * green + 0.114 * blue > 0.5  # perceived brightness, Rec. 601
 
 
 class BackgroundPass:

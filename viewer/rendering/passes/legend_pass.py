@@ -30,9 +30,9 @@ class LegendPass:
         self._program = programs.drawing("overlay")
         self._array = context.vertex_array(self._program, [])
         self._texture: moderngl.Texture | None = None
-        self._drawn: tuple[Legend, tuple[int, int]] | None = None
+        self._drawn: tuple[Legend, tuple[int, int], bool] | None = None
 
-    def draw(self, legend: Legend, size: tuple[int, int]) -> bool:
+    def draw(self, legend: Legend, size: tuple[int, int], is_light: bool = False) -> bool:
         """Draw a legend into the upper left corner of the bound framebuffer.
 
         Parameters
@@ -41,14 +41,17 @@ class LegendPass:
             The legend; its texture is cached until a different one is drawn.
         size : (int, int)
             Width and height of the image, pixels.
+        is_light : bool
+            Whether the background is light, which the legend then is too.
 
         Returns
         -------
         bool
             Whether there was room for the legend.
         """
-        if self._drawn is None or self._drawn[0] is not legend or self._drawn[1] != size:
-            self._prepare(legend, size)
+        wanted = legend, size, is_light
+        if self._drawn is None or self._drawn[0] is not legend or self._drawn[1:] != wanted[1:]:
+            self._prepare(*wanted)
         if self._texture is None:
             return False
         margin = max(round(_MARGIN * size[1]), 2)
@@ -61,11 +64,11 @@ class LegendPass:
             self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
         return True
 
-    def _prepare(self, legend: Legend, size: tuple[int, int]) -> None:
+    def _prepare(self, legend: Legend, size: tuple[int, int], is_light: bool) -> None:
         from viewer.rendering.overlay.legend_picture import legend_pixels
 
         self._free()
-        pixels = legend_pixels(legend, size)
+        pixels = legend_pixels(legend, size, is_light)
         if pixels is not None:
             # Blending expects premultiplied alpha, and the first row of a texture is at the bottom.
             multiplied = pixels.astype(np.float64)
@@ -73,7 +76,7 @@ class LegendPass:
             data = np.ascontiguousarray(np.rint(multiplied[::-1]).astype(np.uint8))
             self._texture = self.context.texture(data.shape[1::-1], 4, data.tobytes())
             self._texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-        self._drawn = legend, size
+        self._drawn = legend, size, is_light
 
     def _free(self) -> None:
         if self._texture is not None:
