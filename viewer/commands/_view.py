@@ -68,6 +68,12 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="D",
         help="distance from the target, in scene units (default: the whole scene is visible)",
     )
+    group.add_argument(
+        "--look-at",
+        metavar="NAME",
+        help="aim at a joint or an actor instead of the centre: head, fox/head, or 1:pelvis for a "
+        "captured person; --distance sets how close (in videos: where it is at the start)",
+    )
     group.add_argument("--orthographic", action="store_true", help="parallel projection")
     group.add_argument(
         "--view",
@@ -120,6 +126,13 @@ def add_display_arguments(parser: argparse.ArgumentParser) -> None:
         "smoother edges (default: final for pictures, normal for videos)",
     )
     _add_switches(group)
+    group.add_argument(
+        "--opacity",
+        type=number,
+        default=1.0,
+        metavar="0..1",
+        help="opacity of the figures (default: 1)",
+    )
     group.add_argument(
         "--hide-part",
         action="append",
@@ -183,6 +196,8 @@ def camera_of(
 ) -> Camera:
     """Return the requested camera; it frames the points unless its distance is given."""
     if arguments.view is not None:
+        if arguments.look_at is not None:
+            raise ViewerError("--view and --look-at: expected one of them, found both")
         view = _find_view(scene, arguments.view)
         from viewer.rig.captures.carried_view import view_in
 
@@ -197,6 +212,10 @@ def camera_of(
             raise ViewerError(f"--inclination: expected -90 to 90, found {arguments.inclination:g}")
         camera.inclination = arguments.inclination
     fit(camera, points, size[0] / size[1])
+    if arguments.look_at is not None:
+        from viewer.rendering.framing import find_follow
+
+        camera.target = find_follow(scene, arguments.look_at).origin
     if arguments.distance is not None:
         if arguments.distance <= 0:
             raise ViewerError(f"--distance: expected more than 0, found {arguments.distance:g}")
@@ -240,7 +259,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         parse_color(arguments.background)
     if arguments.samples < 1:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
-    for name in ("metallic", "roughness", "image-brightness"):
+    for name in ("metallic", "roughness", "image-brightness", "opacity"):
         value = getattr(arguments, name.replace("-", "_"))
         if not 0.0 <= value <= 1.0:
             raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
@@ -293,6 +312,36 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
         if given is not None and scene.images is None:
             notes.append(f"{option}: no file is a capture with calibrated cameras")
     return notes
+
+
+def follow_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+    """Return a message if several joints or actors have the name that the camera aims at."""
+    from viewer.rendering.framing import follow_candidates
+
+    option, name = "--follow", getattr(arguments, "follow", None)
+    if name is None:
+        option, name = "--look-at", arguments.look_at
+    actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
+    # A person's body and keypoints count as one match.
+    others = [
+        actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
+    ]
+    if not others:
+        return []
+    # Actors without a number are all different.
+    count = len({-1 - i if a.person is None else a.person for i, a in enumerate(actors)})
+    person, called = others[0].person, printable(name, 60)
+    how = "" if person is None else f" ({option} {person}:{called} selects another)"
+    return [
+        f"{option} {called}: {count} match; the first one, {printable(actors[0].name, 60)}, is "
+        f"chosen{how}"
+    ]
+
+
+def set_opacity(arguments: argparse.Namespace, scene: Scene) -> None:
+    """Make all figures translucent if that is requested."""
+    for actor in scene.actors:
+        actor.opacity *= arguments.opacity
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:

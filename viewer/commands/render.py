@@ -24,8 +24,10 @@ from viewer.commands._view import (
     camera_notes,
     camera_of,
     display_of,
+    follow_notes,
     hide_parts,
     parse_size,
+    set_opacity,
     warn_of_missing,
 )
 from viewer.errors import UnsupportedFormatError, ViewerError
@@ -99,6 +101,7 @@ def run(arguments: argparse.Namespace) -> int:
         print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(arguments)
     hide_parts(arguments, scene, options)
+    set_opacity(arguments, scene)
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
     if request is not None and request.kind == "onion":
@@ -128,9 +131,12 @@ def _draw_still(
     check_targets([output], inputs_of(arguments, scene), arguments.force)
     points = scene_points(scene, options.show)
     box = bounding_box(points)
+    if arguments.follow is not None:
+        arguments.look_at = arguments.follow  # like one frame of a video that follows it
+    print_warnings(follow_notes(arguments, scene))
     camera = camera_of(arguments, scene, with_cameras(scene, options, points), size)
     if arguments.panels:
-        fits = arguments.distance is None and arguments.view is None
+        fits = (arguments.distance, arguments.view, arguments.look_at) == (None, None, None)
         pixels = _draw_panels(scene, size, camera, options, box, arguments.gpu, fits)
     else:
         is_chosen = arguments.quality is not None

@@ -26,7 +26,9 @@ from viewer.commands._view import (
     add_display_arguments,
     camera_of,
     display_of,
+    follow_notes,
     hide_parts,
+    set_opacity,
     warn_of_missing,
 )
 from viewer.formats import free_path, opened_text
@@ -113,7 +115,7 @@ def run(arguments: argparse.Namespace) -> int:
         options=options,
         paths=scene_files(arguments),
         scale=arguments.scale,
-        fit_distance=arguments.distance is None and arguments.view is None,
+        fit_distance=(arguments.distance, arguments.view, arguments.look_at) == (None, None, None),
         builders=start.builders,
         plays=arguments.play,
         motion=motion_settings(arguments),
@@ -142,7 +144,8 @@ def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
     clean(scene, changes)
     print_warnings(apply_pose(scene, arguments))
     hide_parts(arguments, scene, options)
-    print_warnings(warn_of_missing(scene, options))
+    set_opacity(arguments, scene)
+    print_warnings(warn_of_missing(scene, options) + follow_notes(arguments, scene))
     prepare_scene(scene)
     points = scene_points(scene, options.show)
     return _Start(scene, builders, points, camera_of(arguments, scene, points, SIZE))

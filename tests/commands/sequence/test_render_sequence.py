@@ -177,8 +177,8 @@ def test_follow_reports_the_chosen_person_if_two_have_the_joint(draw, pair):
     size = "16x16"
     said = draw(pair, "a.mp4", "--follow", "pelvis", size=size)
     assert said.err == (
-        "warning: --follow pelvis: 2 match; the first one, take 3, is followed "
-        "(--follow 5:pelvis follows another)\n"
+        "warning: --follow pelvis: 2 match; the first one, take 3, is chosen "
+        "(--follow 5:pelvis selects another)\n"
     )
     for index, name in enumerate(("5:pelvis", "take 3:head", "smpl 5/left_foot", "5", "Take 3")):
         assert draw(pair, f"{index}.mp4", "--follow", name, size=size).err == ""
@@ -190,7 +190,7 @@ def test_follow_reports_the_chosen_person_if_two_have_the_joint(draw, pair):
 
 def test_follow_of_unnumbered_figures_reports_the_first(draw, walk):
     said = draw([*walk, *walk[:2]], "x.mp4", "--follow", "arm", size="16x16")
-    assert said.err == ("warning: --follow arm: 2 match; the first one, tiny, is followed\n")
+    assert said.err == ("warning: --follow arm: 2 match; the first one, tiny, is chosen\n")
 
 
 def test_shapes_overridden_by_a_capture_are_reported(draw, pair):
@@ -273,8 +273,8 @@ def test_contact_sheet_of_a_turntable_is_drawn(draw, tmp_path):
         ("x.mp4", "--speed 0", "--speed: expected 0.001 to 1000 or their negatives, found 0"),
         (
             "x.png",
-            "--follow root",
-            "--follow: expected a video, contact sheet or numbered images",
+            "--follow root --look-at root",
+            "--follow and --look-at: expected one of them, found both",
         ),
         (
             "x.mp4",

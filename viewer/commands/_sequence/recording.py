@@ -13,7 +13,7 @@ from viewer.commands._numbers import number
 from viewer.commands._output import PICTURES, inputs_of
 from viewer.commands._scene import print_warnings
 from viewer.commands._sequence.frame_numbers import parse_range
-from viewer.commands._view import camera_of
+from viewer.commands._view import camera_of, follow_notes
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.formats import check_targets
 from viewer.interrupts import hold, poll
@@ -68,7 +68,7 @@ def add_sequence_arguments(parser: argparse.ArgumentParser) -> None:
         "--follow",
         metavar="NAME",
         help="follow an actor or joint with the camera: fox, head, or fox/head; captured people "
-        "by number: 1 or 1:pelvis",
+        "by number: 1 or 1:pelvis (a single picture: aim at it)",
     )
     group.add_argument(
         "--video-quality",
@@ -126,8 +126,8 @@ def _check_options(arguments: argparse.Namespace, kind: str) -> None:
         for option in ("frame", "time"):
             if getattr(arguments, option) is not None:
                 raise ViewerError(f"--frames and --{option}: expected one of them, found both")
-    if arguments.follow is not None and not kind:
-        raise ViewerError("--follow: expected a video, contact sheet or numbered images")
+    if arguments.follow is not None and arguments.look_at is not None:
+        raise ViewerError("--follow and --look-at: expected one of them, found both")
     _check_onion(arguments, kind)
     for option in ("speed", "video-quality"):
         given = getattr(arguments, option.replace("-", "_"))
@@ -218,10 +218,10 @@ def draw_sequence(
     points = with_cameras(scene, options, points)
     aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
     sink = _sink(request, arguments, options, shots, outputs, size, aspect)
-    print_warnings([*shots.notes, *_follow_notes(scene, arguments), *getattr(sink, "notes", [])])
+    print_warnings([*shots.notes, *follow_notes(arguments, scene), *getattr(sink, "notes", [])])
     recording.size = frame_size = getattr(sink, "cell", size)
     recording.camera = camera_of(arguments, scene, points, frame_size)
-    if arguments.distance is None:
+    if arguments.distance is None and arguments.look_at is None:
         fit_turntable(recording.camera, points, frame_size[0] / frame_size[1], shots.turntable)
     title = f"drawing {printable(outputs[0].name)}"
     hold()
@@ -296,28 +296,6 @@ def _recording(
     if request.kind == "sheet" and is_free and shots.moves:
         recording.shifts = level_shifts(recording)
     return recording
-
-
-def _follow_notes(scene: Scene, arguments: argparse.Namespace) -> list[str]:
-    """Return a message about the followed actor if a name is ambiguous."""
-    from viewer.rendering.framing import follow_candidates
-
-    name = arguments.follow
-    actors = [] if name is None else [scene.actors[i] for i, _ in follow_candidates(scene, name)]
-    # A person's body and keypoints count as one match.
-    others = [
-        actor for actor in actors[1:] if actor.person is None or actor.person != actors[0].person
-    ]
-    if not others:
-        return []
-    # Actors without a number are all different.
-    count = len({-1 - i if a.person is None else a.person for i, a in enumerate(actors)})
-    person = others[0].person
-    how = "" if person is None else f" (--follow {person}:{printable(name, 60)} follows another)"
-    return [
-        f"--follow {printable(name, 60)}: {count} match; the first one, "
-        f"{printable(actors[0].name, 60)}, is followed{how}"
-    ]
 
 
 def _summary(
