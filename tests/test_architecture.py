@@ -36,7 +36,7 @@ PARTS = {
     "formats": {"media", "rig", "interrupts", "streams"},
     "rendering": {"rig", "interrupts", "resources"},
     "export": {"autorig", "formats", "media", "rig", "interrupts"},
-    "loading": {"formats", "rig", "resources"},
+    "loading": {"formats", "models", "rig", "interrupts"},
     "app": {
         *("autorig", "export", "formats", "lint", "loading", "manual", "media", "models"),
         *("rendering", "rig", "interrupts", "resources"),
@@ -44,7 +44,7 @@ PARTS = {
     "lint": {"loading", "formats", "rig"},
     "batching": {"formats", "media", "interrupts", "streams", "version"},
     "manual": {"resources"},
-    "models": {"formats", "interrupts", "media"},
+    "models": {"formats", "interrupts", "media", "resources"},
     "interrupts": set(),
     "resources": set(),
     "streams": set(),

@@ -116,20 +116,21 @@ def test_bundled_body_ignores_shapes_and_expressions_of_the_files(tmp_path):
         (
             "a",
             {"shapes": [[1.0] * 10]},
-            ", without the shape coefficients of the files, which do not apply to it",
+            ", to which the shape coefficients of the files do not apply",
         ),
         (
             "b",
             {"shapes": [[1.0] * 10], "expression": [[0.0] * 10]},
-            ", without the shape and expression coefficients of the files, which do not apply to "
-            "it",
+            ", to which the shape and expression coefficients of the files do not apply",
         ),
         ("c", {}, ""),
     ):
         folder = tmp_path / name / "smpl"
         folder.mkdir(parents=True)
         (folder / "000000.json").write_text(json.dumps([person(0, 0.0) | extra]))
-        text = f"{tmp_path / name}: drawn with the bundled body{lost} (--model selects another)"
+        text = (
+            f"{tmp_path / name}: drawn with the bundled body{lost} (--model selects another body)"
+        )
         assert load(tmp_path / name).warnings == (text,)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from measure import interleaved, report
 
 from viewer.formats import Source, easymocap, read
-from viewer.loading.bundled import bundled_body
+from viewer.loading import bundled_body
 from viewer.loading.capturing import Builder
 
 FRAMES = 10_000

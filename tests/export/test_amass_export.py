@@ -227,7 +227,7 @@ def test_losses_are_reported(family, tmp_path):
 
 
 def test_export_of_the_bundled_body_states_the_model_of_its_shape(tmp_path):
-    from viewer.loading.bundled import bundled_body
+    from viewer.loading import bundled_body
 
     figure = viewer.load(bundled_body()).actors[0].figure
     motion = family_motion(24, shape=None)

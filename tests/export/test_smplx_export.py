@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import faults
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from viewer.errors import RigError
 from viewer.export import MotionOptions, export_animation
 from viewer.formats import Source, read
+from viewer.rig.smpl_family import ShapeSpace
 
 ATOL = 1e-12  # metres and radians
 COUNTS = {"smpl": 24, "smplh": 52, "smplx": 55}
@@ -89,10 +92,21 @@ def test_changing_shape_is_averaged_and_gaps_are_marked(family, tmp_path):
     shape[:, 0] = [1, 2, 3, 6]
     motion = family_motion(55, rows=np.array([0, 1, -1, 2, 3]), shape=shape)
     arrays, notes = written(family_animation(family["smplx"], motion), tmp_path / "a.npz")
-    # The pose before the gap is held, so its shape counts twice: (1 + 2 + 2 + 3 + 6) / 5.
-    assert arrays["betas"][0] == pytest.approx(2.8)
+    # The pose before the gap is held in the file, but does not count: (1 + 2 + 3 + 6) / 4.
+    assert arrays["betas"][0] == pytest.approx(3.0)
     assert arrays["present"].tolist() == [True, True, False, True, True]
-    assert any("betas are its average" in note for note in notes)
+    assert any("betas are its average over 4 frames" in note for note in notes)
+
+
+def test_gender_is_written_and_shapes_of_other_models_are_not(family, tmp_path):
+    shape = np.full((1, 10), 2.0)
+    female = replace(family["smplh"], shape_space=ShapeSpace("SMPL+H", "female"))
+    animation = family_animation(female, family_motion(52, shape=shape))
+    arrays, _ = written(animation, tmp_path / "h.npz", key="amass")
+    assert arrays["gender"] == "female" and (arrays["betas"][:10] == 2.0).all()
+    arrays, notes = written(animation, tmp_path / "x.npz")
+    assert arrays["gender"] == "female" and not arrays["betas"].any()
+    assert any("SMPL+H do not apply to SMPL-X and are written as 0" in note for note in notes)
 
 
 def test_file_is_read_back(family, tmp_path):

@@ -14,7 +14,7 @@ from viewer.errors import FormatError
 from viewer.formats import Source, amass, detect, read
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.posing.pose_record import PoseRecord
-from viewer.rig.smpl_family import FAMILY
+from viewer.rig.smpl_family import FAMILY, ShapeSpace
 
 SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names
 NO_RATE = ("F007.motion-no-rate", None, {"rate": 30.0})
@@ -71,7 +71,7 @@ def test_first_release_is_read(tmp_path):
     timing = motion.timing
     assert (timing.frame_rate, timing.rows.tolist(), timing.holds) == (120.0, [0, 1, 2, 3], True)
     assert (motion.hands, motion.expression, motion.world_rotations) == ({}, None, None)
-    assert motion.facts == (("gender", "male"),)
+    assert motion.shape_space == ShapeSpace("SMPL+H", "male")
 
 
 @pytest.mark.parametrize(
@@ -81,12 +81,12 @@ def test_first_release_is_read(tmp_path):
         (np.array(b"female"), "female"),
         (np.array(["female"]), "female"),
         (np.array("b'female'"), "female"),
-        (np.array("female", dtype=object), None),
+        (np.array("female", dtype=object), "female"),
     ],
 )
 def test_gender_is_accepted_in_several_spellings(tmp_path, gender, said):
     path = saved(tmp_path / "a.npz", **first_release(gender=gender))
-    assert dict(motion_of(path)[0].facts).get("gender") == said
+    assert motion_of(path)[0].shape_space == ShapeSpace("SMPL+H", said)
 
 
 @pytest.mark.parametrize("key", ["mocap_framerate", "mocap_frame_rate", "fps"])
@@ -133,7 +133,7 @@ def test_second_release_is_read(tmp_path):
     )
     motion, warnings = motion_of(path)
     assert (motion.joint_names, motion.up, warnings) == (SMPLX, "z", [])
-    assert motion.facts == (("gender", "neutral"), ("made for", "smplx"))
+    assert motion.shape_space == ShapeSpace("SMPL-X", "neutral")
 
 
 def test_split_keys_without_poses_are_read(tmp_path):

@@ -205,6 +205,15 @@ def test_invalid_parents_in_pig_are_found(
     assert [(f.code, f.file, f.line) for f in found] == [(code, folder / "parents.txt", line)]
 
 
+def test_motion_of_another_gender_is_found(tmp_path: Path) -> None:
+    model, motion = tmp_path / "SMPLH_MALE.npz", tmp_path / "walk.npz"
+    np.savez(model, **synthetic_smpl.model("smplh"))
+    still = {"poses": np.zeros((2, 156)), "trans": np.zeros((2, 3)), "betas": np.zeros(10)}
+    np.savez(motion, **still, gender="female", mocap_framerate=60.0)
+    (found,) = [f for f in lint_files([model, motion])[1] if f.severity != "note"]
+    assert (found.code, found.severity, found.file) == ("C019", "warning", motion)
+
+
 def test_gaps_and_low_confidence_in_captures_are_found(tmp_path: Path) -> None:
     frames = {frame: [capture_files.points(0)] for frame in range(20)}
     del frames[7], frames[8]
@@ -252,7 +261,8 @@ def test_every_code_is_produced_by_a_planted_fault() -> None:
     from lint.planted import FAULTS as FIGURES
 
     planted = {code for _, code, *_ in FAULTS.values()} | {c for _, c, *_ in FIGURES.values()}
-    planted |= {code for _, code in MODELS.values()} | {"F001"}
+    # C019: test_motion_of_another_gender_is_found.
+    planted |= {code for _, code in MODELS.values()} | {"F001", "C019"}
     planted |= set(GLTF)
     # A readable file cannot cause these codes, which are remarks and not errors.
     assert set(CODES) - planted == {"F007"}

@@ -1,5 +1,7 @@
 """Results of SAM 3D Body with the Momentum Human Rig, compared with the vertices of the file."""
 
+import shutil
+
 import numpy as np
 from formats.mhr.mhr_files import N_EXPRESSIONS, N_IDENTITY, N_JOINTS, NAMES, forward, write
 from formats.video_mocap.tool_files import wham_file
@@ -7,7 +9,7 @@ from formats.vrm.swinging import swinging
 from numpy.testing import assert_allclose
 
 from viewer.loading import MotionSettings, load
-from viewer.models import family_model, save_model_folder
+from viewer.models import save_model_folder
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.skinning import deform
 
@@ -53,18 +55,18 @@ def files(tmp_path):
 
 
 def test_figure_is_read_from_the_model_folder(tmp_path):
-    settings = MotionSettings(find_model=family_model)
+    settings = MotionSettings()
     scene = load(files(tmp_path), motion=settings)
     assert [actor.figure.name for actor in scene.actors] == ["mhr"]
     assert "F007.own-model" in [note.key for note in scene.diagnostics]
 
 
 def test_bodies_of_other_files_use_their_model(tmp_path):
-    settings = MotionSettings(find_model=family_model)
+    settings = MotionSettings()
     other = wham_file(tmp_path)
     scene = load(files(tmp_path), other, motion=settings)
-    assert "mhr" not in [actor.figure.name for actor in scene.actors]
-    assert any(actor.figure.points is not None for actor in scene.actors)
+    names = [actor.figure.name for actor in scene.actors]
+    assert names.count("mhr") == 1 and set(names) == {"mhr", "body"}
 
 
 def test_points_are_shown_without_the_model(tmp_path):
@@ -84,7 +86,7 @@ def test_parameters_drive_another_figure_through_the_model_of_the_folder(tmp_pat
     hero.write_bytes(swinging(turn=False).glb())
     skeleton = load(hero).actors[0].figure.skeleton
     pairs = [(skeleton.names[skeleton.humanoid.joints["leftLowerArm"]], "joint_3")]
-    settings = MotionSettings(find_model=family_model, model=hero, joint_map=JointMap(tuple(pairs)))
+    settings = MotionSettings(model=hero, joint_map=JointMap(tuple(pairs)))
     (actor,) = (scene := load(files(tmp_path), motion=settings)).actors
     assert actor.figure.name == "hero" and actor.drive.motion.figure.skeleton.n_joints == N_JOINTS
     keys = [note.key for note in scene.diagnostics]
@@ -94,6 +96,9 @@ def test_parameters_drive_another_figure_through_the_model_of_the_folder(tmp_pat
 def test_figure_that_parameters_cannot_drive_is_reported(tmp_path):
     hero = tmp_path / "hero.vrm"
     hero.write_bytes(swinging(turn=False).glb())
-    scene = load(files(tmp_path), motion=MotionSettings(model=hero))
+    photo = files(tmp_path)
+    save_model_folder(tmp_path)
+    shutil.rmtree(tmp_path / "models")
+    scene = load(photo, motion=MotionSettings(model=hero))
     assert [actor.figure.points is not None for actor in scene.actors] == [True]
     assert "F007.model-of-parameters" in [note.key for note in scene.diagnostics]

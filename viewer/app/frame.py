@@ -54,7 +54,6 @@ from viewer.formats import FORMATS
 from viewer.loading import Contents, MotionSettings, bundled_body, bundled_files
 from viewer.loading.additions import add_to_actor
 from viewer.loading.capturing import Builder
-from viewer.models import family_model
 from viewer.phrases import printable
 from viewer.rendering.gpu.context import is_software
 from viewer.rendering.gpu.program import Programs
@@ -292,7 +291,7 @@ class Frame:
         opened = state.paths or bundled_files()
         up = state.of(Preferences).up
         rig, state.of(Files).rig = state.of(Files).rig, ""
-        settings = MotionSettings(up=up or "", rig=rig, find_model=family_model, springs=True)
+        settings = MotionSettings(up=up or "", rig=rig, springs=True)
         state.of(Files).loader = Loader(paths, attempts, self.wake, settings, opened)
 
     def _take_loaded(self) -> None:

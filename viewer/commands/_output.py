@@ -7,7 +7,7 @@ from pathlib import Path
 
 from viewer.commands._pose import pose_files
 from viewer.commands._scene import scene_files
-from viewer.models import resolve
+from viewer.models import named_files, resolve
 from viewer.rig.scene import Scene
 
 PICTURES = (".png", ".jpg", ".jpeg", ".bmp", ".gif", ".ppm", ".tga", ".tif", ".tiff", ".webp")
@@ -20,7 +20,7 @@ def inputs_of(arguments: argparse.Namespace, scene: Scene | None = None) -> list
     ``arguments``: arguments of a command that opens a scene.
     ``scene``: the opened scene; if omitted, only the named files are returned.
     """
-    model = [] if arguments.model is None else [resolve(arguments.model)]
+    model = [] if arguments.model is None else named_files(arguments.model, arguments.gender or "")
     more = [*model, *map(resolve, arguments.motion)]
     more += [] if arguments.joint_map is None else [arguments.joint_map]
     named = [Path(file) for file in (*scene_files(arguments), *pose_files(arguments), *more)]

@@ -20,9 +20,10 @@ from viewer.errors import FormatError, ViewerError
 from viewer.formats import SUFFIXES, Source
 from viewer.loading import MotionSettings, begin, bundled_body, bundled_files, read_files
 from viewer.loading.cleaning_settings import CleanUp
-from viewer.models import resolve
+from viewer.models import named_files, resolve
 from viewer.progress import report
 from viewer.rig.scene import Scene
+from viewer.rig.smpl_family import GENDERS
 from viewer.rig.units import METRES
 from viewer.streams import summary_stream
 
@@ -126,8 +127,14 @@ def _add_driving_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--model",
         metavar="FIGURE",
-        help="body model for captured bodies, or figure that a BVH file drives (default: one of "
-        "FILES; for captured bodies, otherwise the bundled body)",
+        help="body model for captured bodies, or figure that a BVH file drives: a file, or a name "
+        "such as smplx, smplx:female, body or fox (default: one of FILES; for captured bodies, "
+        "otherwise their model in the model folder, or the bundled body)",
+    )
+    group.add_argument(
+        "--gender",
+        choices=GENDERS,
+        help="gender of the body model for captured bodies (default: as stated by their files)",
     )
     group.add_argument(
         "--motion",
@@ -212,13 +219,11 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
 
     Raises ViewerError if there are both a video and a folder of images.
     """
-    from viewer.models import family_model
-
     if arguments.video is not None and arguments.images is not None:
         raise ViewerError("--video and --images: expected one of them, found both")
-    model = None if arguments.model is None else resolve(arguments.model)
     return MotionSettings(
-        model=None if model is None else Path(model),
+        model=arguments.model,
+        gender=arguments.gender or "",
         rig=arguments.rig or "",
         lod=arguments.lod or "",
         frame_rate=arguments.fps,
@@ -227,7 +232,6 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         source_rest=arguments.source_rest,
         feet=arguments.feet == "on",
         joint_map=_joint_map(arguments),
-        find_model=family_model,
         up=arguments.up or "",
         unit=arguments.unit or "",
         flat_hands=None if arguments.hands is None else arguments.hands == "flat",
@@ -237,7 +241,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         images=None if arguments.images is None else Path(arguments.images),
         video=None if arguments.video is None else Path(arguments.video),
         animation=arguments.animation or "",
-        motions=tuple(Path(resolve(file)) for file in arguments.motion),
+        motions=tuple(resolve(file) for file in arguments.motion),
         springs=arguments.springs == "on",
     )
 
@@ -269,7 +273,7 @@ def parse_bytes(text: str, option: str = "--max-size") -> int:
 
 def scene_files(arguments: argparse.Namespace) -> list[str | Path]:
     """Return the files to open: as given or found by name, and the bundled body."""
-    files: list[str | Path] = [resolve(file) for file in arguments.files]
+    files: list[str | Path] = [path for file in arguments.files for path in named_files(file)]
     if arguments.body:
         files.append(bundled_body())
     return files

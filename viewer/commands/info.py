@@ -125,6 +125,8 @@ def _describe_motions(actor: Actor) -> dict[str, Any]:
     parts: dict[str, Any] = {}
     if actor.clip is not None:
         parts["clip"] = describe_clip(actor.clip)
+        space = actor.shape_space
+        parts["clip"] |= {"model": space.model or None, "gender": space.gender or None}
     if actor.figure.animations:
         parts["animations"] = describe_animations(actor)
     return parts

@@ -33,7 +33,8 @@ from viewer.export._rigged_files import files_of, write_rigged
 from viewer.export._vrm.meta import checked_meta
 from viewer.formats import MESHES, Source, all_or_none, check_targets
 from viewer.loading import MotionSettings, bundled_body, bundled_files, load
-from viewer.models import resolve
+from viewer.models import named_files, resolve
+from viewer.models.bundled import BUNDLED
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.rig.figure import Figure
@@ -43,7 +44,6 @@ from viewer.streams import require_stdout, summary_stream
 
 __all__ = ["add_arguments", "run"]
 
-_BUNDLED = ("body", "fox")
 _SMOOTHING = 10  # number of iterations if --smooth has no value
 
 
@@ -280,13 +280,11 @@ def _files(arguments: argparse.Namespace) -> list[Path]:
 
 
 def _template_files(name: str) -> list[Path]:
-    if name in _BUNDLED and not Path(name).exists():
-        return [bundled_body()] if name == "body" else list(bundled_files())
-    path = resolve(name)
-    near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, _BUNDLED)
+    path, *others = named_files(name)
+    near = "" if path.exists() or len(path.parts) != 1 else did_you_mean(name, [*BUNDLED])
     if near:
         raise FormatError(Diagnostic("F001.no-template", path, values={"near": near}))
-    return [path]
+    return [path, *others]
 
 
 def _check_numbers(arguments: argparse.Namespace) -> None:

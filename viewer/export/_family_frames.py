@@ -9,7 +9,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import MotionOptions
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import rotation_vector_to_matrix
@@ -17,7 +17,7 @@ from viewer.rig.motion.body_motion import root_positions
 from viewer.rig.motion.evaluation import Frames
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.smpl_family import FAMILY, Member
+from viewer.rig.smpl_family import FAMILY, Member, ShapeSpace
 from viewer.rig.units import METRES, UNIT_NAMES
 
 _OWN_SHAPE = "stature"  # a blend shape of the bundled body; SMPL's blend shapes are numbered
@@ -40,6 +40,10 @@ class FamilyFrames:
         J0, the rest position of the root, metres.
     shape, expression : (F, S) or (1, S)
         Coefficients; one row if they are constant.
+    present : (F,) bool
+        Whether the person is present; the other arrays are filled elsewhere.
+    gender : str
+        Gender of the body.
     """
 
     member: Member
@@ -48,6 +52,8 @@ class FamilyFrames:
     roots: Floats
     shape: Floats
     expression: Floats
+    present: Bools
+    gender: str
 
     @property
     def has_expression(self) -> bool:
@@ -111,7 +117,11 @@ def up_axis(options: MotionOptions) -> str:
 
 
 def family_frames(
-    animation: SampledAnimation, frames: Frames, member: Member, options: MotionOptions
+    animation: SampledAnimation,
+    frames: Frames,
+    member: Member,
+    options: MotionOptions,
+    model: str = "",
 ) -> tuple[FamilyFrames, list[Diagnostic]]:
     """Return an animation as parameters of the family.
 
@@ -122,6 +132,7 @@ def family_frames(
     ``frames``: its frames; rows of missing frames are undefined.
     ``member``: from ``member_of_figure``.
     ``options``: only the up axes are used.
+    ``model``: title of the model in whose space coefficients are written; the member's if empty.
     Returns ``frames``: one row per frame.
     Returns ``notes``: notes about data without a parameter in the family, with its size.
     Raises RigError if a value of a present frame is not finite.
@@ -148,19 +159,29 @@ def family_frames(
         kind: [index for index, group in enumerate(groups) if group == kind]
         for kind in ("shape", "expression")
     }
+    coefficients = {kind: frames.shape_weights[:, listed] for kind, listed in columns.items()}
+    notes: list[Diagnostic] = []
+    space = ShapeSpace(model or member.title)
+    if not space.shares_coefficients(figure.shape_space):
+        if any(rows.any() for rows in coefficients.values()):
+            values = {"own": figure.shape_space.model, "other": space.model}
+            notes.append(Diagnostic("X003.other-shape-space", values=values))
+        coefficients = {kind: np.zeros((1, rows.shape[1])) for kind, rows in coefficients.items()}
+    present = animation.frames.present
     found = FamilyFrames(
         member,
         _vectors(rotations),
         translations,
         roots,
-        frames.shape_weights[:, columns["shape"]],
-        frames.shape_weights[:, columns["expression"]],
+        coefficients["shape"],
+        coefficients["expression"],
+        present,
+        animation.gender or "neutral",
     )
-    present = frames.present
     parts = (found.vectors, found.translations)
     if not all(np.isfinite(part[present]).all() for part in parts):
         raise RigError(f"{animation.name}: expected finite numbers in every frame")
-    notes = _losses(frames, skeleton, moved[:, 1:]) + _own_shapes(figure)
+    notes += _losses(frames, skeleton, moved[:, 1:]) + _own_shapes(figure)
     return found, notes + _bare_skeleton(figure, roots[0])
 
 

@@ -31,7 +31,9 @@ def read_frames(motion: BodyMotion, animation: SampledAnimation, options: Motion
     figure, count = animation.figure, motion.timing.n_frames
     timing = Timing(motion.timing.frame_rate, np.arange(count, dtype=np.int32))
     moved = motion.translations / METRES[figure.unit]
-    clip, _ = body_clip(replace(motion, timing=timing, translations=moved), figure)
+    # Coefficients were written as they are, so they are read as those of the figure.
+    motion = replace(motion, timing=timing, translations=moved, shape_space=figure.shape_space)
+    clip, _ = body_clip(motion, figure)
     found = frames_of(figure, clip, np.arange(count) / timing.frame_rate)
     if up_axis(options) == options.world_up:
         return found

@@ -2,7 +2,7 @@
 
 ::
 
-    poses (N, 3 J)   trans (N, 3)   betas (S,) or (N, S)   expressions (N, E)   gender "neutral"
+    poses (N, 3 J)   trans (N, 3)   betas (S,) or (N, S)   expressions (N, E)   gender
     surface_model_type   num_betas   mocap_framerate   mocap_frame_rate   up   present (N,)
 
 ``trans`` is transl of V = R (X - J0) + J0 + transl; ``poses`` are rotation vectors in the model's
@@ -42,6 +42,7 @@ from viewer.rig.motion.sampled_animation import SampledAnimation
 __all__ = ["export_animation", "padded", "write_layout"]
 
 Layout = Callable[[FamilyFrames, slice, float, str], dict[str, NDArray[Any]]]
+"""Returns the arrays of a range of rows, given the frame rate and the up axis."""
 
 _FEWEST = 16  # minimum number of shape coefficients, as readers of AMASS require
 _CLOSED = {
@@ -108,7 +109,8 @@ def write_layout(
     if not present.any():
         raise RigError(f"{animation.name}: every frame is missing, so there is nothing to write")
     frames = filled(animation.frames, options.closing == "interpolate")
-    body, notes = family_frames(animation, frames, member, options)
+    model = title if title == "SMPL-X" else member.title
+    body, notes = family_frames(animation, frames, member, options, model)
     is_split = options.closing == "split" and not present.all()
     spans = runs(present) if is_split else [(0, len(present))]
     paths = split_paths(path, len(spans))
@@ -148,7 +150,7 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
         "trans": body.translations[part],
         "betas": shape[0] if len(shape) == 1 else shape[part],
         "num_betas": np.array(shape.shape[1]),
-        "gender": np.array("neutral"),
+        "gender": np.array(body.gender),
         "surface_model_type": np.array(_TYPES[body.member.title]),
         "mocap_framerate": np.array(float(rate)),
         "mocap_frame_rate": np.array(float(rate)),

@@ -111,6 +111,8 @@ def export_animations(
         member = member_of_figure(animation.figure, "an EasyMocap folder", ("pelvis", "wrist"))
         body, losses = family_frames(animation, frames, member, options)
         people.append(_Person(taken, animation, _Records(person, body), Records(member)))
+        if body.gender != "neutral":
+            losses.append(Diagnostic("X003.gender", values={"gender": body.gender}))
         own = [*losses, *filling, *kept_note(frames.present, taken.first_frame)]
         notes += own if len(animations) == 1 else [_of_person(person, note) for note in own]
     first = min(animation.first_frame for animation in animations)

@@ -3,7 +3,7 @@
 ::
 
     root_orient (N, 3)   pose_body (N, 63)   pose_hand (N, 90)   pose_jaw (N, 3)   pose_eye (N, 6)
-    poses (N, 165)   trans (N, 3)   betas (16,)   num_betas   gender "neutral"
+    poses (N, 165)   trans (N, 3)   betas (16,)   num_betas   gender
     mocap_frame_rate   mocap_framerate   mocap_time_length   surface_model_type "smplx"   up
 
 This is the layout of AMASS for SMPL-X: GMR reads ``pose_body``, ``root_orient``, ``trans``,
@@ -69,9 +69,9 @@ def export_animation(
     """
     wanted = replace(options, up=options.up or "z")
     notes = write_layout(animation, path, wanted, "SMPL-X", _arrays)
-    weights = animation.frames.shape_weights
-    if len(weights) > 1:
-        notes.append(Diagnostic("X005.shape-averaged", values={"n": len(weights)}))
+    if len(animation.frames.shape_weights) > 1:
+        n_present = int(animation.frames.present.sum())
+        notes.append(Diagnostic("X005.shape-averaged", values={"n": n_present}))
     if len(animation.figure.require_skeleton().names) != len(_MEMBER.names):
         notes.append(Diagnostic("X005.as-smplx", values={"figure": animation.figure.name}))
     return notes
@@ -91,13 +91,15 @@ def _arrays(body: FamilyFrames, part: slice, rate: float, up: str) -> dict[str, 
     arrays: dict[str, NDArray[Any]] = {
         key: vectors[:, joints].reshape(count, -1) for key, joints in _PARTS.items()
     }
-    shape = padded(body.shape.mean(axis=0, keepdims=True))[0]
+    # Filled frames repeat or blend others and must not count.
+    rows = body.shape if len(body.shape) == 1 else body.shape[body.present]
+    shape = padded(rows.mean(axis=0, keepdims=True))[0]
     return arrays | {
         "poses": vectors.reshape(count, -1),
         "trans": body.translations[part],
         "betas": shape,
         "num_betas": np.array(len(shape)),
-        "gender": np.array("neutral"),
+        "gender": np.array(body.gender),
         "surface_model_type": np.array("smplx"),
         "mocap_frame_rate": np.array(float(rate)),
         "mocap_framerate": np.array(float(rate)),

@@ -25,11 +25,10 @@ from viewer.formats._archive.values import Archive
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
-from viewer.phrases import printable
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
-from viewer.rig.smpl_family import FAMILY, members_by_numbers
+from viewer.rig.smpl_family import FAMILY, ShapeSpace, gender_of, members_by_numbers, model_title
 
 __all__ = ["has_frames", "read"]
 
@@ -41,6 +40,8 @@ _EXPRESSIONS = ("expressions", "expression")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 _BODY = members_by_numbers()[66]
 _SMPL, _SMPLX = FAMILY[24].names, FAMILY[55].names
+_FACE = _SMPLX[22:25]
+_MODELS = ("surface_model_type", "model_type", "model")
 # Keys of parts and, by number of columns, the joints that they rotate.
 _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (_ROOTS, {3: _BODY[:1]}),
@@ -145,7 +146,7 @@ def read(source: Source) -> BodyMotion:
         hands={side: held_rows(table, bad) for side, table in hands.items()},
         flat_hands=_flag(archive, "flat_hand_mean"),
         up=_up(archive, is_aist),
-        facts=_facts(archive),
+        shape_space=_shape_space(source, archive, names),
     )
 
 
@@ -355,7 +356,7 @@ def _timed_rows(archive: Archive, count: int, first: str) -> Ints:
 
 
 def _up(archive: Archive, is_aist: bool) -> str:
-    said = _text(archive, "up")
+    said = archive.plain_text("up")
     if said in ("y", "z", "-y", "-z"):
         return said
     if is_aist:
@@ -363,17 +364,6 @@ def _up(archive: Archive, is_aist: bool) -> str:
     # EMAGE is y up, although its files do not state it.
     is_speech = any(archive.has(key) for key in _EXPRESSIONS)
     return "z" if not is_speech and any(archive.has(key) for key in _OF_AMASS) else ""
-
-
-def _text(archive: Archive, key: str) -> str:
-    """Return a string, including bytes converted by ``str``; empty if there is none."""
-    if not archive.has(key):
-        return ""
-    try:
-        text = archive.text(key)
-    except FormatError:  # an object array, whose contents are not needed
-        return ""
-    return text[2:-1] if text.startswith("b'") and text.endswith("'") else text
 
 
 def _notice(source: Source, archive: Archive) -> None:
@@ -386,9 +376,18 @@ def _notice(source: Source, archive: Archive) -> None:
         source.warn("F007.motion-keys", keys=odd)
 
 
-def _facts(archive: Archive) -> tuple[tuple[str, str], ...]:
-    texts = {
-        "gender": _text(archive, "gender"),
-        "made for": _text(archive, "surface_model_type") or _text(archive, "model"),
-    }
-    return tuple((heading, printable(text, 60)) for heading, text in texts.items() if text)
+def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> ShapeSpace:
+    """Return the model and gender; without a statement, the model with the rotated joints."""
+    said = archive.plain_text("gender")
+    gender = gender_of(said)
+    if said and not gender:
+        source.warn("F007.motion-gender", found=said)
+    for key in _MODELS:
+        title = model_title(archive.plain_text(key))
+        if title:
+            return ShapeSpace(title, gender)
+    own = set(names)
+    fitting = [member.title for member in FAMILY.values() if set(member.names) == own]
+    if not fitting and own & set(_FACE):
+        fitting = ["SMPL-X"]
+    return ShapeSpace(fitting[0] if fitting else "", gender)

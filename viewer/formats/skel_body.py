@@ -18,6 +18,7 @@ import numpy as np
 
 from viewer.formats._archive.checking import archive_of, corners_of, finite
 from viewer.formats._archive.values import Archive
+from viewer.formats._smpl.published import published_name
 from viewer.formats._source import Source
 from viewer.rig.arrays import Deferred, Floats, Ints
 from viewer.rig.blendshapes import BlendShapes, Correctives, JointRegressor, regress_joints
@@ -28,6 +29,7 @@ from viewer.rig.geometry.transform import translation_matrix
 from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.skeleton import Skeleton
 from viewer.rig.skin import Skin, skin_from_entries
+from viewer.rig.smpl_family import ShapeSpace, gender_of
 
 __all__ = ["read"]
 
@@ -84,6 +86,7 @@ def read(source: Source) -> Figure:
         blend_shapes=_shapes(archive, len(positions)),
         correctives=_correctives(source, archive, len(positions)),
         joint_regressor=regressor,
+        shape_space=ShapeSpace("SKEL", gender_of(published_name(source.path).partition(":")[2])),
         facts=(("model", "SKEL"), ("pose parameters", ", ".join(DOF_NAMES))),
     )
 

@@ -31,6 +31,7 @@ from viewer.formats._smpl.parts import (
     model_symmetry,
     model_uvs,
 )
+from viewer.formats._smpl.published import published_name
 from viewer.formats._smpl.quaternion_models import coordinate_regressor, quaternion_correctives
 from viewer.formats._source import Source
 from viewer.formats._text.numbers import LARGEST
@@ -45,7 +46,7 @@ from viewer.rig.mesh import Mesh, vertex_normals
 from viewer.rig.posing.pose_vector import PoseLayout
 from viewer.rig.skeleton import ball_skeleton
 from viewer.rig.skin import Skin, skin_from_entries
-from viewer.rig.smpl_family import Member, member_of
+from viewer.rig.smpl_family import Member, ShapeSpace, gender_of, member_of
 
 __all__ = ["KEYS", "read"]
 
@@ -91,6 +92,7 @@ def read(source: Source) -> Figure:
     shapes = model_shapes(source, archive, mesh.n_vertices, member, used)
     correctives, title = _correctives(source, archive, mesh.n_vertices, len(parents), used)
     title = title or (member.title if member else animal.title if animal else "")
+    space = _shape_space(source, archive, title, used)
     return Figure(
         name=source.path.stem,
         mesh=mesh,
@@ -105,8 +107,18 @@ def read(source: Source) -> Figure:
         pose_layout=_layout(len(parents)),
         keypoints=model_keypoints(source, archive, mesh, used),
         symmetry=model_symmetry(source, archive, mesh.n_vertices, used),
-        facts=_facts(archive, title, shapes, correctives, used),
+        facts=_facts(archive, title, space.gender, shapes, correctives, used),
+        shape_space=space,
     )
+
+
+def _shape_space(source: Source, archive: Archive, title: str, used: list[str]) -> ShapeSpace:
+    """Return the model and the gender, which most files state only in their name."""
+    kind, _, variant = published_name(source.path).partition(":")
+    gender = gender_of(archive.plain_text("gender"))
+    if gender:
+        used.append("gender")
+    return ShapeSpace("SMIL" if kind == "smil" else title, gender or gender_of(variant))
 
 
 def _names(member: Member | None, animal: Animal | None, count: int) -> tuple[str, ...]:
@@ -285,6 +297,7 @@ def _correctives(
 def _facts(
     archive: Archive,
     title: str,
+    gender: str,
     shapes: BlendShapes | None,
     correctives: Correctives | None,
     used: list[str],
@@ -296,6 +309,7 @@ def _facts(
     known = [key for key in ignored if key in IGNORED]
     facts = [
         ("model", title or "a model in SMPL's layout"),
+        *([("gender", gender)] if gender else []),
         ("coefficients", ", ".join(counts)),
         ("correctives", f"{correctives.offsets.shape[0] if correctives else 0} columns"),
         ("keys used", ", ".join(used)),

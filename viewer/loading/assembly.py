@@ -12,6 +12,7 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError, RigError
 from viewer.loading.cast import Cast
 from viewer.loading.contents import Contents
+from viewer.loading.pairing import joined_figures
 from viewer.loading.placing import (
     place_side_by_side,
     placed_views,
@@ -21,7 +22,6 @@ from viewer.loading.placing import (
 from viewer.loading.settings import MotionSettings
 from viewer.loading.unused_options import unused_options
 from viewer.rig.arrays import Bytes
-from viewer.rig.figure import Figure
 from viewer.rig.mesh import hidden_parts
 from viewer.rig.scene import Actor, Scene
 
@@ -73,11 +73,9 @@ def begin(
     """
     contents = _with_bodies(contents)
     figures = contents.figures
-    pairs = _pairs([figure for _, figure in figures])
     cast = Cast([])
     group_of = {figure: group for group in contents.groups for figure in group.figures}
-    for pair in pairs:
-        figure = _join([figures[index] for index in pair])
+    for pair, figure in joined_figures(figures):
         called = contents.called.get(figures[pair[-1]][0].resolve(), figure.name)
         origin = figures[pair[-1]][0]
         actor = Actor(
@@ -107,7 +105,7 @@ def begin(
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
     scene.files, scene.images = contents.files, cast.images
     if settings is not None:
-        scene.files += tuple(filter(None, (settings.model, settings.video)))
+        scene.files += (*cast.files, *filter(None, [settings.video]))
     switched = [capture for _, capture in contents.captures if capture.in_space is not None]
     if switched:
         scene.space = switched[0].space
@@ -198,37 +196,6 @@ def _switch_on_springs(cast: Cast, up: str) -> None:
         pose_actor(actor, start)
 
 
-def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
-    """Pair skeletons with skins: by joint count and name, then by joint count, then in order."""
-    complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
-    parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
-    skeletons = [index for index, figure in parts if figure.skeleton is not None]
-    skins = [index for index, figure in parts if figure.skeleton is None]
-    pairs: list[tuple[int, ...]] = [*complete]
-    for fits in (_fits_by_name, _fits, lambda skeleton, skin: True):
-        for index in [*skeletons]:
-            partner = next((skin for skin in skins if fits(figures[index], figures[skin])), None)
-            if partner is not None:
-                skeletons.remove(index)
-                skins.remove(partner)
-                pairs.append((index, partner))
-    pairs += [(index,) for index in skeletons + skins]
-    return sorted(pairs, key=min)
-
-
-def _is_complete(figure: Figure) -> bool:
-    return figure.skeleton is not None and figure.mesh is not None
-
-
-def _fits(skeleton: Figure, skin: Figure) -> bool:
-    bound, joints = skin.skin, skeleton.skeleton
-    return bound is not None and joints is not None and bound.n_joints == joints.n_joints
-
-
-def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
-    return skeleton.name == skin.name and _fits(skeleton, skin)
-
-
 def _give_morphs(contents: Contents, cast: Cast) -> None:
     """Give all blend shape targets to the first mesh with their vertex count."""
     if not contents.morphs:
@@ -287,20 +254,3 @@ def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:
         values = {"figures": [actor.figure.name for actor in actors]}
         raise RigError(Diagnostic("F004.picture", path, values=values))
     chosen.figure = with_texture(chosen.figure, path, pixels)
-
-
-def _join(parts: list[tuple[Path, Figure]]) -> Figure:
-    """Attach a skin to its skeleton, or return an unmatched figure as it is."""
-    if len(parts) == 1:
-        return parts[0][1]
-    paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
-    skeleton, skin = figures[0].skeleton, figures[1].skin
-    assert skeleton is not None  # the first figure of a pair is the skeleton
-    if skin is None:
-        values = {"n": skeleton.n_joints, "skeleton": paths[0]}
-        raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
-    if skin.n_joints != skeleton.n_joints:
-        values = {"n": skin.n_joints, "skeleton": paths[0], "joints": skeleton.n_joints}
-        raise RigError(Diagnostic("B001.joints", paths[1], values=values))
-    facts = (*figures[0].facts, *figures[1].facts)
-    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
 from typing import Literal
@@ -32,6 +32,7 @@ from viewer.rig.retargeting.drive import Drive
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_map import JointMap
 from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["Builder", "joined_points", "joined_timing"]
 
@@ -60,6 +61,10 @@ class Builder:
         Its file or folder, for messages.
     model : Figure
         The figure that shows its bodies.
+    model_of : callable or None
+        Returns the model for bodies of a shape space and messages, if the model depends on it.
+    gender : str
+        Gender of all people, as stated by the user; empty for that of the files.
     called : str
         Base name of all people; the capture's name if empty.
     keeps_shape : bool
@@ -96,6 +101,8 @@ class Builder:
     capture: Capture
     model: Figure
     called: str = ""
+    model_of: Callable[[ShapeSpace], tuple[Figure, Sequence[Diagnostic]]] | None = None
+    gender: str = ""
     keeps_shape: bool = True
     placement: Floats = field(default_factory=lambda: np.eye(4))
     unit: str = ""
@@ -170,7 +177,8 @@ class Builder:
         self._has_parameters |= bool(part.parameters)
         shown = part.parameters if self.model.parameters is not None else {}
         for person, parameters in sorted(shown.items(), key=_order):
-            notes += self._add_driven(person, parameter_clip(parameters, self.model), new)
+            posed = parameter_clip(parameters, self.model)
+            notes += self._add_driven(person, self.model, posed, new)
         points = {person: both for person, both in part.points.items() if person not in shown}
         for person, (layout, clip) in sorted(points.items(), key=_order):
             notes += self._add_points(person, layout, clip, new)
@@ -207,29 +215,34 @@ class Builder:
         self._names_shapes |= motion.shape is not None
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
-        clip, notes = body_clip(motion, self.model)
-        notes += self._add_driven(person, clip, new)
+        space = motion.shape_space
+        model, said = (self.model, ()) if self.model_of is None else self.model_of(space)
+        clip, notes = body_clip(motion, model)
+        notes = [*said, *notes, *self._add_driven(person, model, clip, new)]
+        self._bodies[person].shape_space = replace(space, gender=self.gender or space.gender)
         return [replace(note, path=self.path) for note in notes]
 
-    def _add_driven(self, person: int, clip: SampledClip, new: list[Actor]) -> list[Diagnostic]:
-        """Append a clip of the model, or the motion of the target that it drives."""
+    def _add_driven(
+        self, person: int, model: Figure, clip: SampledClip, new: list[Actor]
+    ) -> list[Diagnostic]:
+        """Append a clip of a model, or the motion of the target that it drives."""
         if self.target is None:
-            self._add_clip(person, clip, new)
+            self._add_clip(person, model, clip, new)
             return []
-        drive = self._drive(clip)
+        drive = self._drive(model, clip)
         actor = self._bodies.get(person)
         if not self._grows and actor is not None and actor.drive is not None:
             actor.drive = _grown(actor.drive, drive)
             self._is_behind = True
             return []
         found, notes = driven_clip(drive, self.target)
-        self._add_clip(person, found, new, drive)
+        self._add_clip(person, self.target, found, new, drive)
         return [replace(note, path=self.path) for note in notes]
 
-    def _drive(self, clip: SampledClip) -> Drive:
+    def _drive(self, model: Figure, clip: SampledClip) -> Drive:
         # Feet are planted at the end, because contacts and the ground need the whole motion.
         up = f"-{self.up}" if self.hangs else self.up
-        return body_drive(self.model, clip, up, self.joint_map, plants_feet=False)
+        return body_drive(model, clip, up, self.joint_map, plants_feet=False)
 
     def _finished(self) -> list[Diagnostic]:
         """At the end, compute the whole motions of driven figures and plant their feet, once."""
@@ -264,12 +277,17 @@ class Builder:
         return notes
 
     def _add_clip(
-        self, person: int, clip: SampledClip, new: list[Actor], drive: Drive | None = None
+        self,
+        person: int,
+        figure: Figure,
+        clip: SampledClip,
+        new: list[Actor],
+        drive: Drive | None = None,
     ) -> None:
         """Append a clip to a person's clip, or add an actor; ``drive``: motion of its source."""
         actor = self._bodies.get(person)
         if actor is None:
-            actor = self._actor(self.target or self.model, clip, person)
+            actor = self._actor(figure, clip, person)
             if self.target is None:
                 actor.color = _COLORS[len(self._bodies) % len(_COLORS)]
             actor.drive = drive
@@ -348,7 +366,7 @@ class Builder:
         clips: list[tuple[Actor, SampledClip, Drive]] = []
         for actor in self._bodies.values():
             assert isinstance(actor.clip, SampledClip)  # set when the actor was created
-            drive = self._drive(actor.clip)
+            drive = self._drive(actor.figure, actor.clip)
             clip, said = driven_clip(drive, target)
             clips.append((actor, clip, drive))
             notes += said

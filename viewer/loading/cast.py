@@ -43,6 +43,8 @@ class Cast:
         Messages from assembling the scene.
     used_options : set of str
         Options that had an effect, see ``unused_options``.
+    files : list of Path
+        Files of body models, which are not among the opened files.
     """
 
     actors: list[Actor]
@@ -54,6 +56,7 @@ class Cast:
     images: CameraImages | None = None
     diagnostics: list[Diagnostic] = field(default_factory=list)
     used_options: set[str] = field(default_factory=set)
+    files: list[Path] = field(default_factory=list)
 
     def note(self, key: str, path: Path | None = None, **values: Any) -> None:
         """Record a message, with the values of its template, about a file if ``path`` is given."""

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.diagnostics import Diagnostic
-from viewer.errors import FormatError, RigError
-from viewer.formats import Source, read
-from viewer.loading.body_driving import body_drive, has_joints, with_joints
-from viewer.loading.bundled import bundled_body
+from viewer.errors import RigError
+from viewer.loading.body_driving import body_drive, with_joints
+from viewer.loading.body_models import BodyModels, Choice
 from viewer.loading.capturing import Builder
 from viewer.loading.cast import Cast
-from viewer.loading.choices import reader_options
 from viewer.loading.contents import Contents
 from viewer.loading.filming import filmed
 from viewer.loading.refusals import map_refusal, model_refusal
@@ -24,7 +23,6 @@ from viewer.loading.settings import MotionSettings
 from viewer.rig.captures.capture import Capture
 from viewer.rig.captures.capture_rate import capture_rate
 from viewer.rig.figure import Figure
-from viewer.rig.figure_group import FigureGroup
 from viewer.rig.geometry.transform import rotation_transform
 from viewer.rig.motion.body_motion import BodyMotion, body_clip, rest_roots
 from viewer.rig.motion.clip import Clip, misfit, suits
@@ -33,15 +31,12 @@ from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.retargeting.driven_clip import driven_clip
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.scene import Actor
-from viewer.rig.smpl_family import FAMILY
+from viewer.rig.smpl_family import FAMILY, ShapeSpace
 
 if TYPE_CHECKING:
     from viewer.loading.skeleton_motions import Lone
 
-__all__ = ["drive", "is_body"]
-
-_ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
-_HIP = "left_hip"
+__all__ = ["drive"]
 
 
 def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
@@ -58,18 +53,18 @@ def drive(contents: Contents, cast: Cast, settings: MotionSettings) -> None:
         _give_clip(path, clip, cast, contents)
     bodies = bool(contents.body_motions or contents.captures)
     drives = bool(contents.skeleton_motions) and settings.drives
-    named = _named_model(cast, settings) if bodies or drives else None
+    models = BodyModels(cast, settings)
+    named = models.named("") if drives else None
     if settings.model is not None and named is None and contents.skeleton_motions:
         cast.note("F007.model-beside", model=settings.model)
         cast.used_options |= {"model", "rig", "lod"}  # no further messages about these options
     lone = _give_skeleton_motions(contents, cast, settings, named)
     if bodies:
         _check_footage(contents, settings)
-        model, is_bundled, target = _model(contents, cast, named, settings)
         for path, body in contents.body_motions:
-            _give_body_motion(path, body, cast, settings, model, is_bundled, target)
+            _give_body_motion(path, body, cast, models)
         for path, capture in contents.captures:
-            _begin_capture(path, capture, cast, settings, model, is_bundled, target)
+            _begin_capture(path, capture, cast, models)
     if lone:
         from viewer.loading.skeleton_motions import agree_on_units
 
@@ -122,104 +117,6 @@ def _give_clip(path: Path, clip: Clip, cast: Cast, contents: Contents) -> None:
     raise RigError(Diagnostic("C009.clip", path, values=values))
 
 
-def is_body(figure: Figure) -> bool:
-    """Return whether a figure can show captured bodies: it has the family's root and a mesh.
-
-    A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
-    root of Unreal's characters has the family's name, too, but their legs do not.
-    """
-    skeleton = figure.skeleton
-    if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
-        return False
-    root, is_file = skeleton.names[0], figure.record is not None
-    return root in _ROOTS and not (is_file and root == _ROOTS[0] and _HIP not in skeleton.names)
-
-
-def _named_model(cast: Cast, settings: MotionSettings) -> Figure | None:
-    """Return the body model given by ``--model``, if any."""
-    path = settings.model
-    if path is None:
-        return None
-    source = Source.open(path)
-    source.options = reader_options(settings)
-    model = read(source)
-    if isinstance(model, FigureGroup):
-        complete = [each for each in model.figures if each.is_attached]
-        model = complete[0] if complete else model.figures[0]
-    if not isinstance(model, Figure) or model.skeleton is None or model.mesh is None:
-        raise source.fault("F002.no-body-model")
-    cast.diagnostics += source.diagnostics.warnings
-    cast.used_options |= {"model", *source.used_options}
-    return model
-
-
-def _model(
-    contents: Contents, cast: Cast, named: Figure | None, settings: MotionSettings
-) -> tuple[Figure, bool, Figure | None]:
-    """Return the figure for captured bodies, and whether it is the bundled body.
-
-    A body model among the files is not shown as a separate actor. The third result is a figure
-    with different joints that the bodies move: that of ``--model``.
-    """
-    if named is not None:
-        moves = [body.joint_names for _, body in contents.body_motions]
-        own = any(has_joints(named, names) for names in moves)
-        is_family = is_body(named) or (own and named.require_skeleton().humanoid is None)
-        has_parameters = _all_have_parameters(contents)
-        if is_family or (named.parameters is not None and has_parameters):
-            return named, False, None
-        # Bodies given by parameters drive another figure via the model of the parameters.
-        carrier = _own_model(cast, contents, settings, "carrier") if has_parameters else None
-        return carrier or _bundled(), carrier is None, named
-    for index, actor in enumerate(cast.actors):
-        if actor.clip is None and is_body(actor.figure):
-            figure = cast.take(index).figure
-            return figure, _is_bundled(figure), None
-    found = _own_model(cast, contents, settings)
-    if found is not None:
-        return found, False, None
-    return _bundled(), True, None
-
-
-def _bundled() -> Figure:
-    body = read(Source.open(bundled_body()))
-    assert isinstance(body, Figure)  # the bundled body is a figure
-    return body
-
-
-def _own_model(
-    cast: Cast, contents: Contents, settings: MotionSettings, use: str = "model"
-) -> Figure | None:
-    """Return the user's model for the first capture whose bodies it fits, if there is one.
-
-    ``use``: ``"model"`` if it is shown, ``"carrier"`` if it moves another figure.
-    """
-    for path, capture in contents.captures:
-        found = settings.find_model(capture.model) if settings.find_model is not None else None
-        if found is None:
-            continue
-        try:
-            model = read(Source.open(found))
-        except FormatError as problem:  # the user has not named this file
-            cast.note("F007.own-model-unreadable", path, problem=problem.diagnostic)
-            continue
-        if isinstance(model, Figure) and (is_body(model) or _all_have_parameters(contents)):
-            cast.note(f"F007.own-{use}", path, model=found.name)
-            return model
-    return None
-
-
-def _all_have_parameters(contents: Contents) -> bool:
-    """Return whether all people are given by the parameters of MHR."""
-    members = {capture.model for _, capture in contents.captures}
-    return members == {"MHR"} and not contents.body_motions
-
-
-def _is_bundled(figure: Figure) -> bool:
-    # Only the bundled body has shapes named after their effects.
-    return figure.blend_shapes is not None and "stature" in figure.blend_shapes.names
-
-
 def _note_bundled(cast: Cast, path: Path, has_shape: bool, has_expression: bool) -> None:
     """Record that the bundled body is shown, and which data it ignores."""
     key = {
@@ -231,44 +128,40 @@ def _note_bundled(cast: Cast, path: Path, has_shape: bool, has_expression: bool)
     cast.note(key, path)
 
 
-def _give_body_motion(
-    path: Path,
-    motion: BodyMotion,
-    cast: Cast,
-    settings: MotionSettings,
-    model: Figure,
-    is_bundled: bool,
-    target: Figure | None,
-) -> None:
+def _give_body_motion(path: Path, motion: BodyMotion, cast: Cast, models: BodyModels) -> None:
+    settings, space = models.settings, motion.shape_space
+    choice = models.choose(path, space, motion.joint_names)
+    cast.diagnostics += choice.notes
     if settings.frame_rate is not None:
         motion = replace(motion, timing=replace(motion.timing, frame_rate=settings.frame_rate))
     lost = motion.shape is not None, motion.expression is not None
-    if is_bundled:
+    if choice.is_bundled:
         motion = replace(motion, shape=None, expression=None)
-    driven = _may_be_driven(cast, settings, target) if is_bundled else []
-    drives, body = bool(driven), model
-    if drives:
-        body = with_joints(model, _known_joints(motion.joint_names, driven, settings))
+    driven = _may_be_driven(cast, settings, choice.target) if choice.drives else []
+    body = choice.figure
+    if driven and choice.is_bundled:
+        body = with_joints(body, _known_joints(motion.joint_names, driven, settings))
     actor, notes = _moved(path, body, motion, cast)
+    actor.shape_space = models.wanted(motion.shape_space)
     up = settings.up or motion.up
     if not up:
         up = _judged_up(path, [actor], cast)
     if up.startswith("-"):
         actor.placement = rotation_transform(0, np.pi)
-    if target is not None:
+    if choice.target is not None:
         cast.diagnostics += notes
-        carried = _carried(path, actor, up, target, cast, settings)
+        carried = _carried(path, actor, up, choice.target, cast, settings)
         cast.add(carried, up[-1], placed=False)
         return
-    if drives and _drives_character(path, motion.name, actor, up, cast, settings):
+    if driven and _drives_character(path, motion.name, actor, up, cast, settings):
         cast.diagnostics += notes
         return
-    if drives:
-        placement = actor.placement
-        actor, notes = _moved(path, model, motion, cast)
-        actor.placement = placement
+    if body is not choice.figure:
+        shown, notes = _moved(path, choice.figure, motion, cast)
+        shown.placement, shown.shape_space = actor.placement, actor.shape_space
+        actor = shown
     cast.diagnostics += notes
-    if is_bundled:
+    if choice.is_bundled:
         _note_bundled(cast, path, *lost)
     cast.add(actor, up[-1], placed=False)
 
@@ -351,35 +244,41 @@ def _judged_up(path: Path, actors: Sequence[Actor], cast: Cast, usual: str = "")
     return up
 
 
-def _with_cameras(capture: Capture, model: Figure, is_bundled: bool) -> Capture:
+def _with_cameras(capture: Capture, choice: Choice) -> Capture:
     """Return a capture with the cameras that depend on the figure that shows its bodies."""
     if capture.views_of is None:
         return capture
-    found = capture.views_of(lambda shape: rest_roots(model, None if is_bundled else shape))
+    found = capture.views_of(
+        lambda shape: rest_roots(choice.figure, None if choice.is_bundled else shape)
+    )
     return replace(capture, views=(*capture.views, *found), views_of=None)
 
 
-def _begin_capture(
-    path: Path,
-    capture: Capture,
-    cast: Cast,
-    settings: MotionSettings,
-    model: Figure,
-    is_bundled: bool,
-    target: Figure | None,
-) -> None:
+def _begin_capture(path: Path, capture: Capture, cast: Cast, models: BodyModels) -> None:
     """Read a capture until the first person appears; the remaining frames are read later."""
-    capture = _with_cameras(capture, model, is_bundled)
+    settings = models.settings
+    choice = models.choose(path, ShapeSpace(capture.model))
+    capture = _with_cameras(capture, choice)
     called = cast.free_title(capture.name)
     cast.diagnostics += capture.warnings
-    driven = _may_be_driven(cast, settings, target) if is_bundled else []
+    if capture.model == "MHR":  # the choice for bodies of other models depends on their genders
+        cast.diagnostics += choice.notes
+    driven = _may_be_driven(cast, settings, choice.target) if choice.drives else []
     members = [each for each in FAMILY.values() if each.title == capture.model]
-    body = model
-    if members and driven:
-        body = with_joints(model, _known_joints(members[0].names, driven, settings))
+    body = choice.figure
+    if members and driven and choice.is_bundled:
+        body = with_joints(body, _known_joints(members[0].names, driven, settings))
     up = settings.up or capture.up
     while True:
-        builder = Builder(capture, body, called=called, keeps_shape=not is_bundled, path=path)
+        builder = Builder(
+            capture,
+            body,
+            called=called,
+            keeps_shape=not choice.is_bundled,
+            path=path,
+            model_of=partial(_model_of, models, path) if body is choice.figure else None,
+            gender=settings.gender,
+        )
         notes: list[Diagnostic] = []
         while not builder.actors and not builder.is_done:
             try:
@@ -391,12 +290,12 @@ def _begin_capture(
         builder.place(up)
         builder.swings, builder.joint_map = settings.springs, settings.joint_map
         builder.plants_feet = settings.feet
-        _carry(builder, cast, target, drives=is_bundled and settings.drives)
-        if builder.target is not None or body is model:
+        _carry(builder, cast, choice.target, drives=choice.drives and settings.drives)
+        if builder.target is not None or body is choice.figure:
             break
-        body = model  # no figure matches, so the bundled body itself is shown
+        body = choice.figure  # no figure matches, so the bundled body itself is shown
     cast.diagnostics += notes
-    if is_bundled and any(actor.figure is model for actor in builder.actors):
+    if choice.is_bundled and any(actor.figure is choice.figure for actor in builder.actors):
         _note_bundled(cast, path, builder.has_shape, builder.has_expression)
     rate = _rate(builder.actors, settings)
     views, images, notes = filmed(capture, capture.views, settings, rate)
@@ -406,6 +305,14 @@ def _begin_capture(
     for actor in builder.actors:
         cast.add(actor, up[-1], placed=True)
     cast.builders.append(builder)
+
+
+def _model_of(
+    models: BodyModels, path: Path, space: ShapeSpace
+) -> tuple[Figure, Sequence[Diagnostic]]:
+    """Return the figure for one person of a capture, and messages about the choice."""
+    choice = models.choose(path, space)
+    return choice.figure, choice.notes
 
 
 def _carry(builder: Builder, cast: Cast, target: Figure | None, drives: bool) -> None:

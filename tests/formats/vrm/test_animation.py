@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.errors import FormatError
 from viewer.loading import MotionSettings
-from viewer.loading.driving import is_body
+from viewer.loading.body_models import is_body
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.skinning import joint_matrices
 

@@ -110,7 +110,7 @@ class Loader:
 
     def _join(self, contents: Contents, paths: Sequence[Path]) -> None:
         """Apply motions to the open figures; motions that match none are shown separately."""
-        from viewer.loading.driving import is_body
+        from viewer.loading.body_models import is_body
 
         opened = read_files(self._opened, settings=self._settings)
         figures = opened.figures

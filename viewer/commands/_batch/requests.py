@@ -17,7 +17,7 @@ from viewer.commands._diff.inputs import input_files
 from viewer.commands._scene import parse_bytes
 from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
-from viewer.models import resolve, save_model_folder
+from viewer.models import named_files, save_model_folder
 from viewer.phrases import listed, printable
 from viewer.version import VERSION
 
@@ -80,7 +80,8 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
 
 def _fixed(arguments: argparse.Namespace) -> list[str]:
     """Return the files that are opened with every item; raise if one is missing."""
-    fixed = [str(resolve(file)) for file in getattr(arguments, "fixed", [])]
+    names = getattr(arguments, "fixed", [])
+    fixed = [str(path) for name in names for path in named_files(name)]
     for file in fixed:
         if not os.path.exists(file):
             raise ViewerError(f"--with: {printable(file, 300)}: no such file or folder")
@@ -136,5 +137,5 @@ def _files_in(command: argparse.Namespace) -> Iterator[str]:
         for text in value if isinstance(value, list) else [value]:
             if name == "reference":
                 yield from map(str, input_files(text))
-            elif isinstance(text, str) and os.path.isfile(resolve(text)):
-                yield str(resolve(text))
+            elif isinstance(text, str):
+                yield from (str(path) for path in named_files(text) if os.path.isfile(path))

@@ -122,7 +122,9 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     if clip.get("kind") == "transforms":
         return _transform_lines(head, clip)
     if "kind" in clip:
-        return [head + _rows_text(clip), *_gap_lines(clip)]
+        made_for = " ".join(filter(None, (clip["gender"], clip["model"])))
+        body = [f"    body: {made_for}"] if made_for else []
+        return [head + _rows_text(clip), *body, *_gap_lines(clip)]
     modes = ", ".join(f"{mode} {count}" for mode, count in clip["extrapolation"].items())
     lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
     if clip["key_times"]:

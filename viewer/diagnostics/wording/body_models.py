@@ -91,6 +91,8 @@ MESSAGES = {
     "F007.motion-no-rate": "no frame rate: the common {rate:g} fps assumed (--fps sets it)",
     "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",
     "F007.motion-tissue": "dmpls (soft tissue) of {n:#frame} omitted",
+    "F007.motion-gender": "gender: expected female, male or neutral, found {found:text}: the "
+    "gender is unknown (--gender sets it)",
     "F007.motion-keys": "ignored unknown keys: {keys:list12}",
     # PIG models
     "F002.pig-folder": "expected a PIG folder; files missing: {missing:list12}",

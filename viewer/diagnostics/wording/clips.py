@@ -29,6 +29,7 @@ CODES = {
     ),
     "C017": Code("warning", "implausible frame time", "write seconds, or set the rate (--fps)"),
     "C018": Code("warning", "limbs at rest", "match their joints (--joint-map)"),
+    "C019": Code("warning", "body of another model", "choose its own model (--model, --gender)"),
 }
 
 MESSAGES = {
@@ -65,6 +66,10 @@ MESSAGES = {
     "{last}: may be one person (--merge-ids {ids} of viewer convert)",
     "C016.foot": "{n:#frame/{all}}: both feet rest up to {height} above the ground, highest "
     "at frame {frame}",
+    "C019.model": "shape coefficients of {other:text} omitted: they do not apply to {own:text} "
+    "({figure:text})",
+    "C019.gender": "made for a {other:text} body, but {figure:text} is {own:text}: size and shape "
+    "differ from the file's",
 }
 
 PHRASES = {

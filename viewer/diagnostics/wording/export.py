@@ -78,6 +78,9 @@ MESSAGES = {
     "{length}, are omitted",
     "X003.clip-shape": ".anim cannot store a shape: blend shape weights are omitted",
     "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
+    "X003.other-shape-space": "the shape coefficients of {own:text} do not apply to {other:text} "
+    "and are written as 0",
+    "X003.gender": "EasyMocap cannot store the gender: open the folder with --gender {gender}",
     "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
     "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
     "X003.bvh-joint-scales": "BVH cannot animate scales of joints ({low:g} to {high:g}): only the "
@@ -163,8 +166,8 @@ MESSAGES = {
     "written with {first:g}",
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
-    "X005.as-smplx": "{figure:text} is not SMPL-X: translations and shape are exact only with an "
-    "SMPL-X model (--model)",
+    "X005.as-smplx": "{figure:text} is not SMPL-X: translations are exact only with an SMPL-X "
+    "model (--model)",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",

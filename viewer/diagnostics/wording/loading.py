@@ -19,6 +19,8 @@ MESSAGES = {
     "F007.unused-images": "--images {value:text} has no effect: no file is a capture",
     "F007.unused-model": "--model {value:text} has no effect: no file has a motion that could "
     "drive it",
+    "F007.unused-gender": "--gender {value:text} has no effect: no file has the motion of a body "
+    "of the SMPL family",
     "F007.model-of-parameters": "--model has no effect: parameters of {member} can drive a figure "
     "only if {member} is in the model folder (viewer models)",
     "F007.model-of-points": "--model has no effect: the capture has only keypoints",
@@ -46,7 +48,11 @@ MESSAGES = {
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
-    "F007.own-model": "drawn with {model:text} from the model folder (--model selects another)",
+    "F007.own-model": "{model:text} from the model folder is used (--model selects another)",
+    "F007.own-model-of-other-gender": "{model:text} is used: the model folder has no {wanted:text} "
+    "model",
+    "F007.own-model-missing": "the model folder has no {wanted:text} model, only {names:list}: "
+    "--gender chooses one",
     "F007.own-carrier": "motion computed with {model:text} from the model folder",
     "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
     "F007.bundled-body": "drawn with the bundled body (--model selects another body)",

@@ -306,7 +306,7 @@ class Archive:
         return Sparse(dense.shape, dense[rows, columns], columns, starts, "csr")
 
     def text(self, key: str) -> str:
-        """Return a single string, which may be stored as a string, bytes, or a one-element array.
+        """Return a single string, stored as a string, bytes, or an array of one of them.
 
         Raises
         ------
@@ -314,6 +314,10 @@ class Archive:
             If the value is none of these.
         """
         value = self.get(key)
+        if isinstance(value, Opaque) and self._objects is not None:
+            value = self._objects(key)
+        if isinstance(value, list) and len(value) == 1:
+            value = value[0]
         if isinstance(value, Deferred) and value.dtype.kind in "SU" and value.shape in ((), (1,)):
             value = value.values().reshape(-1)[0].item()
         if isinstance(value, bytes):
@@ -321,6 +325,16 @@ class Archive:
         if isinstance(value, str):
             return value
         raise self.fault("F002.text", item=key, found=describe(value))
+
+    def plain_text(self, key: str) -> str:
+        """Return a single string, including bytes converted by ``str``; empty if there is none."""
+        if not self.has(key):
+            return ""
+        try:
+            text = self.text(key)
+        except FormatError:
+            return ""
+        return text[2:-1] if text.startswith("b'") and text.endswith("'") else text
 
     def refuse(
         self,

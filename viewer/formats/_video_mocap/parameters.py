@@ -7,6 +7,7 @@
     shape      betas, shape …
     frames     frame_ids, frames …; detection_all (N, C) of CLIFF, whose first column they are
     person     person_id, track_id, id …, one number or name, or one for each row
+    gender     gender, of the body model
     rate       fps, frame_rate, frameRate …, frames per second
 
 Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
@@ -46,7 +47,7 @@ from viewer.formats._video_mocap.rotation_arrays import Form, form_of, rotation_
 from viewer.phrases import counted, printable
 from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.motion.timing import FASTEST, SLOWEST, is_rate
-from viewer.rig.smpl_family import FAMILY, members_by_numbers
+from viewer.rig.smpl_family import FAMILY, gender_of, members_by_numbers
 
 __all__ = ["read", "recognises"]
 
@@ -77,6 +78,7 @@ _SHAPES = (
     *("shapeParameters",),
 )
 _FRAMES = ("frame_ids", "frames", "frame", "frame_id", "frame_idx", "frame_indices")
+_GENDERS = ("gender", "genders")
 _RATES = (
     *("fps", "frame_rate", "frameRate", "framerate", "mocap_framerate", "mocap_frame_rate"),
     *("video_fps", "frames_per_second"),
@@ -118,6 +120,7 @@ class _Layout:
     frame: _Value | None  # one number for all rows
     person: _Value | None
     rate: _Value | None
+    gender: _Value | None
 
     @property
     def count(self) -> int:
@@ -127,7 +130,7 @@ class _Layout:
     @property
     def keys(self) -> list[str]:
         frames = self.frames or self.frame
-        others = (self.place, self.shape, frames, self.person, self.rate)
+        others = (self.place, self.shape, frames, self.person, self.rate, self.gender)
         return [key for key, _ in self.poses] + [value.key for value in others if value]
 
 
@@ -274,7 +277,10 @@ def _layout(
     rate = first(_RATES, lambda scope, key: scope.shape(key) in ((), (1,)))
     place = first((*_WORLD, *_CAMERA), lambda scope, key: _is_place(scope.shape(key), count))
     shape = first(_SHAPES, lambda scope, key: _is_shape(scope.shape(key), count))
-    return _Layout(poses, place, shape, frames, frame, person, rate)
+    gender = of_item(_GENDERS) or first(
+        _GENDERS, lambda scope, key: bool(gender_of(scope.plain_text(key)))
+    )
+    return _Layout(poses, place, shape, frames, frame, person, rate, gender)
 
 
 def _first_form(
@@ -614,6 +620,7 @@ def _joined(tracks: list[Track]) -> Track:
         np.concatenate([track.vectors for track in tracks if track.vectors is not None]),
         np.concatenate([track.translations for track in tracks if track.translations is not None]),
         np.concatenate(shapes) if len(shapes) == len(tracks) else None,
+        gender=tracks[0].gender,
     )
 
 
@@ -635,7 +642,22 @@ def _track(one: _Found) -> Track:
     elif layout.frame is not None and count == 1:
         number = _identities(layout.frame, 1)[0]
         frames = np.array([number if isinstance(number, int) else 0])
-    return Track(frames, _NAMES[vectors.shape[1]], vectors, placed, _coefficients(layout, count))
+    return Track(
+        frames,
+        _NAMES[vectors.shape[1]],
+        vectors,
+        placed,
+        _coefficients(layout, count),
+        gender=_gender(layout.gender),
+    )
+
+
+def _gender(value: _Value | None) -> str:
+    if value is None:
+        return ""
+    if value.item is None:
+        return gender_of(value.archive.plain_text(value.key))
+    return gender_of(str(_identities(value, 1)[0]))
 
 
 def _coefficients(layout: _Layout, count: int) -> Floats | None:

@@ -23,6 +23,7 @@ from viewer.rig.captures.points import PointClip, PointLayout
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.parameter_clip import ParameterMotion
 from viewer.rig.motion.timing import Timing
+from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["Cameras", "Options", "Results", "Track", "capture_of"]
 
@@ -67,6 +68,8 @@ class Track:
         Model parameters, identity, expression and position of the Momentum Human Rig.
     places_root : bool
         As for ``BodyMotion``.
+    gender : str
+        Gender of the body, as stated by the file; empty if it is unknown.
     """
 
     frames: np.ndarray[Any, np.dtype[np.int64]]
@@ -80,6 +83,7 @@ class Track:
     points: Floats | None = None
     rig: tuple[Floats, Floats, Floats, Floats] | None = None
     places_root: bool = False
+    gender: str = ""
 
     def selected(self, chosen: np.ndarray[Any, np.dtype[Any]]) -> Track:
         """Return some of the frames: indices of rows, or a mask (N,)."""
@@ -386,7 +390,7 @@ class _Capture:
             shape=shape,
             hands=track.hands,
             world_rotations=track.world_rotations,
-            facts=self.facts,
+            shape_space=ShapeSpace(self.results.model, track.gender),
         )
 
     def views(self, cameras: Cameras | None) -> tuple[CameraView, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from viewer.rig.hands import Hand
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.shape import joint_shifts, rest_joints
+from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["BodyMotion", "body_clip", "rest_roots", "root_positions"]
 
@@ -49,8 +50,8 @@ class BodyMotion:
         Whether ``hands`` are relative to the flat hand instead of the mean hand.
     up : "y", "z", "-y", "-z" or ""
         World up axis; empty if unknown.
-    facts : tuple of (str, str)
-        Other facts from the file, for ``viewer info``.
+    shape_space : ShapeSpace
+        Model and gender of the body, as stated by the file.
     world_rotations : (N, 3) or None
         Rotation vectors that rotate the whole body about the figure's origin after ``vectors``
         have posed it, V = W (R (X - J0) + J0) + T; requires ``about_origin`` to be False.
@@ -70,7 +71,7 @@ class BodyMotion:
     hands: dict[str, Floats] = field(default_factory=dict)
     flat_hands: bool = False
     up: str = ""
-    facts: tuple[tuple[str, str], ...] = ()
+    shape_space: ShapeSpace = ShapeSpace()
     world_rotations: Floats | None = None
     places_root: bool = False
 
@@ -117,6 +118,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
     RigError
         If the figure has none of the joints.
     """
+    motion, said = _in_space_of(motion, figure)
     skeleton = figure.skeleton
     if skeleton is None or motion.joint_names[0] not in skeleton.names:
         joint = motion.joint_names[0]
@@ -129,7 +131,7 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
             vectors[skeleton.names.index(name)] = motion.vectors[:, column]
         elif motion.vectors[:, column].any():
             lost.append(name)
-    notes = _put_hands(motion, figure, vectors)
+    notes = said + _put_hands(motion, figure, vectors)
     if lost:
         values = {"n": len(lost), "figure": figure.name, "names": lost}
         notes.append(Diagnostic("F007.joints-left-out", values=values))
@@ -161,6 +163,24 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
         shape_weights=weights,
     )
     return clip, notes + more
+
+
+def _in_space_of(motion: BodyMotion, figure: Figure) -> tuple[BodyMotion, list[Diagnostic]]:
+    """Return a motion without coefficients that mean nothing to a figure, and a message.
+
+    Those of another model are dropped: they are weights of other directions. Those of another
+    gender are kept, because the only model at hand may be the neutral one.
+    """
+    own, space = figure.shape_space, motion.shape_space
+    values = {"figure": figure.name, "own": own.title, "other": space.title}
+    if not space.shares_coefficients(own):
+        parts = (motion.shape, motion.expression)
+        is_lost = any(part is not None and part.any() for part in parts)
+        notes = [Diagnostic("C019.model", values=values)] if is_lost else []
+        return replace(motion, shape=None, expression=None), notes
+    if own.gender and space.gender and own.gender != space.gender:
+        return motion, [Diagnostic("C019.gender", values=values)]
+    return motion, []
 
 
 def root_positions(figure: Figure, weights: Floats) -> Floats:

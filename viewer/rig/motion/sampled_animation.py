@@ -56,6 +56,8 @@ class SampledAnimation:
         The motion from which the frames were sampled.
     base : Pose or None
         Provides the properties that the motion does not animate.
+    gender : str
+        Gender of a captured body, else of the body model; empty if it is unknown.
     is_rotated : bool
         Whether the frames are rotated upright, see ``upright_animation``; the motion is never
         rotated.
@@ -68,6 +70,7 @@ class SampledAnimation:
     frames: Frames
     motion: JointMotion
     base: Pose | None = None
+    gender: str = ""
     is_rotated: bool = False
 
 
@@ -109,7 +112,8 @@ def sample_animation(
     shift = motion.timing.first_frame if isinstance(motion, SampledClip) and rate == own else 0
     sampled = frames_of(figure, motion, times, actor.pose, interpolate)
     base = None if actor.pose is None else actor.pose.copy()
-    return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base)
+    gender = actor.shape_space.gender or figure.shape_space.gender
+    return SampledAnimation(actor.name, figure, rate, first + shift, sampled, motion, base, gender)
 
 
 def frames_at(animation: SampledAnimation, times: Floats) -> Frames:

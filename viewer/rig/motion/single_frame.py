@@ -68,7 +68,8 @@ def single_frame(
             frames.shape_weights,
             frames.scales,
         )
-    return SampledAnimation(actor.name, figure, rate, number, frames, motion)
+    gender = actor.shape_space.gender or figure.shape_space.gender
+    return SampledAnimation(actor.name, figure, rate, number, frames, motion, gender=gender)
 
 
 def upright_single_frame(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 from viewer.resources import resource
 
-__all__ = ["bundled_body", "bundled_files"]
+__all__ = ["BUNDLED", "bundled_body", "bundled_files"]
 
 
 def bundled_files() -> tuple[Path, Path]:
@@ -17,3 +18,10 @@ def bundled_files() -> tuple[Path, Path]:
 def bundled_body() -> Path:
     """Return the bundled neutral human body, in SMPL's layout."""
     return resource("assets", "samples", "body.npz")
+
+
+BUNDLED: dict[str, Callable[[], tuple[Path, ...]]] = {
+    "body": lambda: (bundled_body(),),
+    "fox": bundled_files,
+}
+"""Functions that return the files of each bundled figure, by name."""

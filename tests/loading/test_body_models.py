@@ -1,0 +1,234 @@
+"""Body models that are chosen by the model and gender which the files of motions state."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from formats.synthetic_smpl import model
+from numpy.testing import assert_allclose
+
+import viewer
+from viewer.cli import run
+from viewer.loading import MotionSettings
+from viewer.models import save_model_folder
+
+SCALES = {"NEUTRAL": 1.0, "FEMALE": 0.9, "MALE": 1.1}
+LEFT_KNEE, LEFT_HIP = 4, 1
+
+
+def add_model(folder: Path, kind: str, gender: str) -> Path:
+    """Write a model whose size depends on its gender, and its shape directions on nothing."""
+    arrays = model(kind)
+    arrays["v_template"] = SCALES[gender] * arrays["v_template"]
+    path = folder / f"{kind.upper()}_{gender}.npz"
+    np.savez(path, **arrays)
+    return path
+
+
+def thigh(kind: str, gender: str, shape: np.ndarray | None = None) -> float:
+    """Return the distance of knee and hip at rest, from the formula: J = R (T + B beta)."""
+    arrays = model(kind)
+    vertices = SCALES[gender] * arrays["v_template"]
+    if shape is not None:
+        vertices = vertices + arrays["shapedirs"][..., : len(shape)] @ shape
+    joints = arrays["J_regressor"] @ vertices
+    return float(np.linalg.norm(joints[LEFT_KNEE] - joints[LEFT_HIP]))
+
+
+def motion(folder: Path, name: str = "walk", n_joints: int = 52, **arrays) -> Path:
+    """Write a motion as AMASS does; an array that is None is left out."""
+    found = {
+        "poses": np.zeros((3, 3 * n_joints)),
+        "trans": np.zeros((3, 3)),
+        "betas": np.zeros(16),
+        "gender": "female",
+        "mocap_framerate": 60.0,
+        **arrays,
+    }
+    path = folder / f"{name}.npz"
+    np.savez(path, **{key: value for key, value in found.items() if value is not None})
+    return path
+
+
+def shown_thigh(actor: viewer.Actor) -> float:
+    """Return the distance of knee and hip in a shown motion."""
+    joints = viewer.motion(actor).joints("figure")[0]
+    names = actor.figure.skeleton.names
+    return float(np.linalg.norm(joints[names.index("left_knee")] - joints[names.index("left_hip")]))
+
+
+@pytest.fixture
+def models(tmp_path: Path) -> Path:
+    folder = tmp_path / "models"
+    folder.mkdir()
+    for gender in SCALES:
+        add_model(folder, "smplh", gender)
+    save_model_folder(folder)
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("said", "gender"),
+    [
+        ("female", "FEMALE"),
+        (np.array(b"female"), "FEMALE"),
+        (np.array(b"Male"), "MALE"),
+        (np.array("F"), "FEMALE"),
+        (np.array(["m"]), "MALE"),
+        (np.array("b'male'"), "MALE"),
+        (np.array("female", dtype=object), "FEMALE"),
+        (np.array([b"male"], dtype=object), "MALE"),
+        ("unknown", "NEUTRAL"),
+        (None, "NEUTRAL"),
+    ],
+)
+def test_gender_of_the_file_chooses_the_model(models, tmp_path, said, gender):
+    scene = viewer.load(motion(tmp_path, gender=said))
+    (actor,) = scene.actors
+    assert actor.figure.name == f"SMPLH_{gender}"
+    assert shown_thigh(actor) == pytest.approx(thigh("smplh", gender), abs=1e-6)
+    odd = [note.values["found"] for note in scene.diagnostics if note.key == "F007.motion-gender"]
+    assert odd == (["unknown"] if said == "unknown" else [])
+
+
+def test_motions_of_several_genders_have_their_own_models(models, tmp_path):
+    paths = [motion(tmp_path, name, gender=name) for name in ("male", "female", "neutral")]
+    scene = viewer.load(*paths, motion=MotionSettings(model="smplh"))
+    assert [actor.figure.name for actor in scene.actors] == [
+        "SMPLH_MALE",
+        "SMPLH_FEMALE",
+        "SMPLH_NEUTRAL",
+    ]
+
+
+def test_files_with_models_of_several_genders_are_matched(models, tmp_path):
+    paths = [motion(tmp_path, name, gender=name) for name in ("male", "female")]
+    given = [models / "SMPLH_FEMALE.npz", models / "SMPLH_MALE.npz"]
+    scene = viewer.load(*paths, *given)
+    assert [actor.figure.name for actor in scene.actors] == ["SMPLH_MALE", "SMPLH_FEMALE"]
+
+
+def test_people_of_one_file_have_their_own_models(models, tmp_path):
+    pose = {"global_orient": np.zeros((2, 3)), "body_pose": np.zeros((2, 69))}
+    people = {
+        str(person): {**pose, "transl": np.zeros((2, 3)), "gender": gender}
+        for person, gender in enumerate(("female", "male"))
+    }
+    np.savez(tmp_path / "people.npz", results=np.array([people], dtype=object))
+    for gender in ("FEMALE", "MALE"):
+        add_model(models, "smpl", gender)
+    scene = viewer.load(tmp_path / "people.npz")
+    assert [actor.figure.name for actor in scene.actors] == ["SMPL_FEMALE", "SMPL_MALE"]
+    assert [actor.shape_space.gender for actor in scene.actors] == ["female", "male"]
+
+
+def test_other_gender_is_used_with_a_warning(models, tmp_path):
+    path = motion(tmp_path)
+    for settings in (
+        MotionSettings(gender="male"),
+        MotionSettings(model="smplh:male"),
+        MotionSettings(model=models / "SMPLH_MALE.npz"),
+    ):
+        scene = viewer.load(path, motion=settings)
+        assert scene.actors[0].figure.name == "SMPLH_MALE"
+        assert "C019.gender" in [found.key for found in scene.diagnostics]
+    (models / "SMPLH_FEMALE.npz").unlink()
+    keys = [found.key for found in viewer.load(path).diagnostics]
+    assert {"F007.own-model-of-other-gender", "C019.gender"} <= {*keys}
+    (models / "SMPLH_NEUTRAL.npz").unlink()
+    keys = [found.key for found in viewer.load(motion(tmp_path, gender=None)).diagnostics]
+    assert "F007.own-model" in keys  # the only model left
+
+
+def test_missing_gender_is_asked_for(models, tmp_path):
+    (models / "SMPLH_NEUTRAL.npz").unlink()
+    scene = viewer.load(motion(tmp_path, gender=None))
+    (said,) = [note for note in scene.diagnostics if note.key == "F007.own-model-missing"]
+    assert said.values["names"] == ["smplh:female", "smplh:male"]
+    assert scene.actors[0].figure.name == "body"
+
+
+def test_coefficients_of_other_models_are_omitted(models, tmp_path):
+    shape = np.zeros(16)
+    shape[:2] = [1.5, -1.0]
+    for kind in ("smpl", "smplx"):
+        add_model(models, kind, "FEMALE")
+    path = motion(tmp_path, betas=shape)
+    for name, kept in (("smplh", shape[:10]), ("smpl", shape[:10]), ("smplx", None)):
+        scene = viewer.load(path, motion=MotionSettings(model=name))
+        wanted = thigh(name, "FEMALE", kept)
+        assert shown_thigh(scene.actors[0]) == pytest.approx(wanted, abs=1e-6)
+        keys = [found.key for found in scene.diagnostics]
+        assert ("C019.model" in keys) == (name == "smplx")
+    assert abs(thigh("smplh", "FEMALE", shape[:10]) - thigh("smplh", "FEMALE")) > 1e-3
+
+
+def test_files_state_their_model_by_key_or_number_of_joints(models, tmp_path):
+    for kind in ("smpl", "smplx"):
+        add_model(models, kind, "FEMALE")
+    parts = {"root_orient": np.zeros((3, 3)), "pose_body": np.zeros((3, 63)), "poses": None}
+    cases = {
+        "SMPL_FEMALE": motion(tmp_path, "a", 24),
+        "SMPLX_FEMALE": motion(tmp_path, "b", 55),
+        "SMPLH_FEMALE": motion(tmp_path, "c", **parts, surface_model_type="smplh"),
+        "body": motion(tmp_path, "d", **parts),
+    }
+    for name, path in cases.items():
+        assert viewer.load(path).actors[0].figure.name == name
+
+
+def test_gender_is_shown_and_kept_on_writing(models, tmp_path, capsys):
+    path, again = motion(tmp_path, gender=b"female"), tmp_path / "again.npz"
+    assert run(["info", str(path), "--json"]) == 0
+    clip = json.loads(capsys.readouterr().out)["actors"][0]["clip"]
+    assert (clip["model"], clip["gender"]) == ("SMPL+H", "female")
+    assert run(["info", str(path)]) == 0
+    assert "body: female SMPL+H" in capsys.readouterr().out
+    assert run(["lint", str(path), "--gender", "male"]) == 0
+    assert "C019: made for a female SMPL+H body, but SMPLH_MALE is male SMPL+H" in (
+        capsys.readouterr().out
+    )
+    # Another model does not make the coefficients those of another gender, but the user may.
+    for options, gender in (
+        ([], "female"),
+        (["--model", "smplh:male"], "female"),
+        (["--gender", "male"], "male"),
+    ):
+        assert run(["convert", str(path), *options, "-o", str(again), "--force"]) == 0
+        with np.load(again) as arrays:
+            assert str(arrays["gender"]) == gender
+    assert run(["convert", str(path), "-o", str(tmp_path / "out") + "/"]) == 0
+    assert "open the folder with --gender female" in capsys.readouterr().out
+
+
+def test_each_item_of_a_batch_has_its_own_model(models, tmp_path):
+    names = ("female", "male")
+    paths = [str(motion(tmp_path, name, gender=name)) for name in names]
+    out = tmp_path / "out"
+    options = ["--model", "smplh", "--to", "bvh", "-o", f"{out}/", "--workers", "1"]
+    assert run(["batch", "convert", *paths, *options]) == 0
+    for name in names:
+        text = (out / f"{name}.bvh").read_text()
+        offset = text[text.index("JOINT left_knee") :].partition("OFFSET")[2].split()[:3]
+        centimetres = np.linalg.norm(np.array(offset, dtype=float))
+        assert_allclose(centimetres, 100 * thigh("smplh", name.upper()), rtol=1e-5)
+
+
+@pytest.mark.parametrize("name", ["body", "fox"])
+def test_bundled_figures_are_models_by_name(tmp_path, capsys, name):
+    path = tmp_path / "walk.bvh"
+    path.write_text(
+        "HIERARCHY\nROOT Hips\n{\nOFFSET 0 90 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        "End Site\n{\nOFFSET 0 10 0\n}\n}\nMOTION\nFrames: 1\nFrame Time: 0.1\n0 0 0\n"
+    )
+    assert run(["info", str(path), "--model", name]) == 2
+    said = capsys.readouterr().err
+    assert f"does not match {name}" in said  # the figure was found, but the file has too few joints
+
+
+def test_option_without_a_body_is_reported(tmp_path, capsys):
+    assert run(["info", "fox", "--gender", "male"]) == 0
+    assert "--gender male has no effect" in capsys.readouterr().err

@@ -1,0 +1,203 @@
+"""Choice of the figure that shows a captured body: by name, among the files, or in the folder."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import field, replace
+from pathlib import Path
+from typing import Literal
+
+from viewer.data_classes import dataclass
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError
+from viewer.formats import Source, read
+from viewer.loading.body_driving import has_joints
+from viewer.loading.cast import Cast
+from viewer.loading.contents import read_files
+from viewer.loading.pairing import joined_figures
+from viewer.loading.settings import MotionSettings
+from viewer.models import family_model, models_of_kind, named_files
+from viewer.models.bundled import bundled_body
+from viewer.rig.figure import Figure
+from viewer.rig.smpl_family import ShapeSpace
+
+__all__ = ["BodyModels", "Choice", "is_body"]
+
+_ROOTS = ("pelvis", "wrist", "global")  # root joint names of the SMPL family
+_HIP = "left_hip"
+
+
+def is_body(figure: Figure) -> bool:
+    """Return whether a figure can show captured bodies: it has the family's root and a mesh.
+
+    A VRM character cannot, even with the same joint names: its rest pose and origin differ. The
+    root of Unreal's characters and of animals has the family's name, too, but their legs do not.
+    """
+    skeleton = figure.skeleton
+    if skeleton is None or figure.mesh is None or skeleton.humanoid is not None:
+        return False
+    root = skeleton.names[0]
+    return root in _ROOTS and (root != _ROOTS[0] or _HIP in skeleton.names)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """The figure for a body, and where it comes from."""
+
+    figure: Figure
+    origin: Literal["named", "file", "folder", "bundled"]
+    target: Figure | None = None
+    """The figure of ``--model`` if it has different joints: the body moves it."""
+    notes: tuple[Diagnostic, ...] = ()
+
+    @property
+    def is_bundled(self) -> bool:
+        """Whether it is the bundled body, to which shape coefficients of files do not apply."""
+        # Only the bundled body has shapes named after their effects.
+        shapes = self.figure.blend_shapes
+        return shapes is not None and "stature" in shapes.names
+
+    @property
+    def drives(self) -> bool:
+        """Whether the body moves an open character instead: nobody has asked to see it."""
+        return self.origin in ("folder", "bundled") or (self.origin == "file" and self.is_bundled)
+
+
+@dataclass(slots=True, eq=False)
+class BodyModels:
+    """Chooses figures for bodies, each of which is read once.
+
+    A body is shown by the model of ``--model``, else by a body model among the files, which is then
+    not a separate actor, else by the model of the model folder that has the joints and gender of
+    the body, else by the bundled body.
+    """
+
+    cast: Cast
+    settings: MotionSettings
+    _read: dict[tuple[Path, ...], Figure] = field(default_factory=dict)
+    _taken: list[Figure] = field(default_factory=list)
+
+    def wanted(self, space: ShapeSpace) -> ShapeSpace:
+        """Return a shape space with the gender that the user asked for."""
+        if space.model:
+            self.cast.used_options.add("gender")
+        return replace(space, gender=self.settings.gender or space.gender)
+
+    def choose(self, path: Path, space: ShapeSpace, joint_names: Sequence[str] = ()) -> Choice:
+        """Return the figure for a body.
+
+        Parameters
+        ----------
+        path : Path
+            File of its motion, for messages.
+        space : ShapeSpace
+            Its model and gender.
+        joint_names : sequence of str
+            Joints of its motion, the root first, if they are known.
+
+        Raises
+        ------
+        FormatError
+            If the file of ``--model`` cannot be read, or is no figure.
+        """
+        space, has_parameters = self.wanted(space), space.model == "MHR"
+        named = self.named(space.gender)
+        if named is not None:
+            own = bool(joint_names) and has_joints(named, joint_names)
+            is_family = is_body(named) or (own and named.require_skeleton().humanoid is None)
+            if is_family or (named.parameters is not None and has_parameters):
+                return Choice(named, "named")
+            # Bodies given by parameters drive another figure via the model of the parameters.
+            carrier: Figure | None = None
+            notes: tuple[Diagnostic, ...] = ()
+            if has_parameters:
+                carrier, notes = self._of_folder(path, space, "carrier")
+            if carrier is not None:
+                return Choice(carrier, "folder", named, notes)
+            return Choice(self._bundled(), "bundled", named, notes)
+        among = self._among_files(space)
+        if among is not None:
+            return Choice(among, "file")
+        found, notes = self._of_folder(path, space, "model")
+        if found is not None:
+            return Choice(found, "folder", notes=notes)
+        return Choice(self._bundled(), "bundled", notes=notes)
+
+    def named(self, gender: str) -> Figure | None:
+        """Return the figure given by ``--model``, if any; its kind alone leaves the gender open."""
+        settings = self.settings
+        if settings.model is None:
+            return None
+        paths = named_files(settings.model, settings.gender or gender)
+        if paths not in self._read:
+            self._read[paths] = self._figure_of(paths)
+        return self._read[paths]
+
+    def _figure_of(self, paths: tuple[Path, ...]) -> Figure:
+        options = MotionSettings(rig=self.settings.rig, lod=self.settings.lod)
+        contents = read_files(paths, settings=options)
+        joined = [figure for _, figure in joined_figures(contents.figures)]
+        figure = next((each for each in joined if each.is_attached), next(iter(joined), None))
+        if figure is None or figure.skeleton is None or figure.mesh is None:
+            raise FormatError(Diagnostic("F002.no-body-model", paths[0]))
+        self.cast.diagnostics += contents.diagnostics
+        self.cast.used_options |= {"model", *(contents.used_options or ())}
+        self.cast.files += contents.files
+        return figure
+
+    def _among_files(self, space: ShapeSpace) -> Figure | None:
+        """Return the body model among the files that suits a body best; it is no actor any more."""
+        actors = self.cast.actors
+        free = [actor for actor in actors if actor.clip is None and is_body(actor.figure)]
+        figures = [*self._taken, *(actor.figure for actor in free)]
+        if not figures:
+            return None
+
+        def misfit(figure: Figure) -> tuple[bool, bool]:
+            own = figure.shape_space
+            return not own.shares_coefficients(space), own.gender != space.gender
+
+        best = min(figures, key=misfit)
+        index = next((row for row, actor in enumerate(actors) if actor.figure is best), None)
+        if best not in self._taken and index is not None:
+            self._taken.append(self.cast.take(index).figure)
+        return best
+
+    def _of_folder(
+        self, path: Path, space: ShapeSpace, use: str
+    ) -> tuple[Figure | None, tuple[Diagnostic, ...]]:
+        """Return the model in the model folder, if it has a readable one, and messages.
+
+        ``use``: ``"model"`` if it is shown, ``"carrier"`` if it moves the figure of ``--model``.
+        """
+
+        def note(key: str, **values: object) -> tuple[Diagnostic, ...]:
+            return (Diagnostic(f"F007.own-{key}", path, values=values),)
+
+        found = family_model(space.model, space.gender)
+        if found is None:
+            others = models_of_kind(space.model)
+            wanted = space.title
+            return None, note("model-missing", wanted=wanted, names=others) if others else ()
+        if (found,) not in self._read:
+            try:
+                model = read(Source.open(found))
+            except FormatError as problem:  # the user has not named this file
+                return None, note("model-unreadable", problem=problem.diagnostic)
+            if not isinstance(model, Figure) or not (is_body(model) or space.model == "MHR"):
+                return None, ()
+            self._read[(found,)] = model
+            self.cast.files.append(found)
+        figure = self._read[(found,)]
+        gender = figure.shape_space.gender
+        if space.gender and gender and gender != space.gender:
+            return figure, note("model-of-other-gender", model=found.name, wanted=space.title)
+        return figure, note(use, model=found.name)
+
+    def _bundled(self) -> Figure:
+        paths = (bundled_body(),)
+        if paths not in self._read:
+            body = read(Source.open(paths[0]))
+            assert isinstance(body, Figure)  # the bundled body is a figure
+            self._read[paths] = body
+        return self._read[paths]

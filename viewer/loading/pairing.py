@@ -1,0 +1,79 @@
+"""Pairing of skeletons with skins from separate files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from viewer.diagnostics import Diagnostic
+from viewer.errors import FormatError, RigError
+from viewer.rig.figure import Figure
+
+__all__ = ["joined_figures"]
+
+
+def joined_figures(
+    figures: Sequence[tuple[Path, Figure]],
+) -> list[tuple[tuple[int, ...], Figure]]:
+    """Attach skins to their skeletons; return each figure with the indices of its parts.
+
+    Parameters
+    ----------
+    figures : sequence of (Path, Figure)
+        Figures and parts of figures, with their files.
+
+    Raises
+    ------
+    FormatError, RigError
+        If a skin does not fit its skeleton.
+    """
+    pairs = _pairs([figure for _, figure in figures])
+    return [(pair, _join([figures[index] for index in pair])) for pair in pairs]
+
+
+def _pairs(figures: Sequence[Figure]) -> list[tuple[int, ...]]:
+    """Pair skeletons with skins: by joint count and name, then by joint count, then in order."""
+    complete = [(index,) for index, figure in enumerate(figures) if _is_complete(figure)]
+    parts = [(index, figure) for index, figure in enumerate(figures) if not _is_complete(figure)]
+    skeletons = [index for index, figure in parts if figure.skeleton is not None]
+    skins = [index for index, figure in parts if figure.skeleton is None]
+    pairs: list[tuple[int, ...]] = [*complete]
+    for fits in (_fits_by_name, _fits, lambda skeleton, skin: True):
+        for index in [*skeletons]:
+            partner = next((skin for skin in skins if fits(figures[index], figures[skin])), None)
+            if partner is not None:
+                skeletons.remove(index)
+                skins.remove(partner)
+                pairs.append((index, partner))
+    pairs += [(index,) for index in skeletons + skins]
+    return sorted(pairs, key=min)
+
+
+def _is_complete(figure: Figure) -> bool:
+    return figure.skeleton is not None and figure.mesh is not None
+
+
+def _fits(skeleton: Figure, skin: Figure) -> bool:
+    bound, joints = skin.skin, skeleton.skeleton
+    return bound is not None and joints is not None and bound.n_joints == joints.n_joints
+
+
+def _fits_by_name(skeleton: Figure, skin: Figure) -> bool:
+    return skeleton.name == skin.name and _fits(skeleton, skin)
+
+
+def _join(parts: list[tuple[Path, Figure]]) -> Figure:
+    """Attach a skin to its skeleton, or return an unmatched figure as it is."""
+    if len(parts) == 1:
+        return parts[0][1]
+    paths, figures = [path for path, _ in parts], [figure for _, figure in parts]
+    skeleton, skin = figures[0].skeleton, figures[1].skin
+    assert skeleton is not None  # the first figure of a pair is the skeleton
+    if skin is None:
+        values = {"n": skeleton.n_joints, "skeleton": paths[0]}
+        raise FormatError(Diagnostic("F004.skin", paths[1], values=values))
+    if skin.n_joints != skeleton.n_joints:
+        values = {"n": skin.n_joints, "skeleton": paths[0], "joints": skeleton.n_joints}
+        raise RigError(Diagnostic("B001.joints", paths[1], values=values))
+    facts = (*figures[0].facts, *figures[1].facts)
+    return Figure(paths[1].stem, figures[1].mesh, skeleton, skin, facts=facts)
