@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 
 __all__ = ["TABLES"]
@@ -750,6 +751,34 @@ Hips = pelvis
 """
 
 
+OPENSIM = """
+pelvis = pelvis
+ femur_r = right_hip
+  tibia_r = right_knee
+   talus_r = right_ankle
+    calcn_r = -
+     toes_r = right_foot
+ femur_l = left_hip
+ torso = spine1
+  humerus_r = right_shoulder
+   ulna_r = right_elbow
+    radius_r = -
+     hand_r = right_wrist
+"""
+UPPER_LAST = """
+Hips = pelvis
+ Leg_Upper_L = left_hip
+  Leg_Lower_L = left_knee
+   Foot_L = left_ankle
+ Leg_Upper_R = right_hip
+ Spine = spine1
+  Shoulder_L = left_collar
+   Arm_Upper_L = left_shoulder
+    Arm_Lower_L = left_elbow
+     Hand_L = left_wrist
+"""
+
+
 def changed(table: str, change: Callable[[str], str]) -> str:
     """Return a table with other names for the same joints."""
     lines = []
@@ -830,6 +859,10 @@ TABLES = {
     "valve": VALVE,
     "rokoko gloves": ROKOKO_GLOVES,
     "hip helpers": HIP_HELPERS,
+    "opensim": OPENSIM,
+    "upper last": UPPER_LAST,
+    "unreal with joints": changed(UNREAL, lambda name: re.sub("_([lr])$", r"_JNT_\1", name)),
+    "quick rig": changed(MIXAMO, lambda name: f"QuickRigCharacter1_{name.split(':')[1]}"),
     "wrist and hand": WRIST_AND_HAND,
     "mixamo in one word": changed(MIXAMO, lambda name: name.replace(":", "")),
     "mixamo behind a path": changed(MIXAMO, lambda name: f"Armature|{name}"),

@@ -55,6 +55,8 @@ _FAMILIES = {
     "OptiTrack": ("shoulder uarm farm hand -", "thigh shin foot toe"),
     "XNALara": (
         "armshoulder1 armshoulder2 armelbow armwrist -", "legthigh legknee legankle legtoes"),
+    "OpenSim": ("- humerus ulna hand -", "femur tibia talus toes"),
+    "arm upper, leg upper": ("shoulder armupper armlower hand -", "legupper leglower foot toe"),
     "upper arm and arm": ("shoulder upperarm arm hand -", "thigh/upperleg leg foot toe"),
     "MMD in English": ("shoulder arm elbow wrist -", "leg knee ankle toe"),
     "MMD in Latin letters": ("kata ude hiji tekubi -", "ashi hiza ashikubi tsumasaki"),
@@ -100,6 +102,7 @@ _SIDES = {
 }
 # Prefixes that are removed before the side or word is identified.
 _PREFIXES = {"bip", "j", "def", "org", "mixamorig", "character"}
+_FILLERS = {"jnt", "jt", "bn"}  # words for "joint", removed wherever they are
 _HELPERS = ("__", "ORG-")  # prefixes of joints that repeat another one's name
 _TOKEN = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|\d+|[左右](?=\w)|[^\W\d_A-Za-z]+")
 _NUMBERED = re.compile(r"(.+)_(\d{1,6})")
@@ -403,6 +406,7 @@ def _tokens(name: str) -> list[str]:
     """Split a name, without its namespace, at capitals, digits and symbols; lower case."""
     bare = re.split(r"[:|/]", unicodedata.normalize("NFKC", _decoded(name)))[-1]
     tokens = [token.lower() for token in _TOKEN.findall(bare)]
+    tokens = [token for token in tokens if token not in _FILLERS] or tokens
     while len(tokens) > 1 and tokens[0] in _PREFIXES:
         behind = 2 if tokens[1].isdigit() and len(tokens) > 2 else 1  # Bip01
         tokens = tokens[behind:]
