@@ -38,7 +38,7 @@ def rounded(value: float, digits: int = 3) -> str:
     """Format a number with some digits, or all integer digits of numbers below a million.
 
     >>> rounded(0.012345), rounded(1284.0), rounded(12345.6, 5), rounded(3.2e30)
-    ('0.0123', '1,284', '12,346', '3.2e+30')
+    ('0.0123', '1,284', '12346', '3.2e+30')
     """
     is_long = 10.0**digits - 0.5 <= abs(value) < 1e6
     return format(value, ",.0f" if is_long else f".{digits}g")
