@@ -12,9 +12,6 @@ in vec4 in_model_z;
 in vec3 in_actor_color;     // per instance: linear
 in vec3 in_rest_shift;      // per instance: rest centre minus posed centre
 in vec3 in_center;          // per instance: posed centre, figure space
-#ifdef AFFINE_PALETTE
-in float in_is_rigid;       // per instance: 1 if no joint scales or shears, else 0
-#endif
 
 uniform mat4 u_projection;
 uniform bool u_has_colors;  // use in_color instead of in_actor_color
@@ -39,9 +36,6 @@ out vec4 v_tint;
 void main() {
     rest_shift = in_rest_shift;
     center = in_center;
-#ifdef AFFINE_PALETTE
-    is_rigid = in_is_rigid > 0.5;
-#endif
     vec3 position, normal;
     pose_vertex(true, position, normal);
     vec4 point = vec4(position, 1.0);

@@ -16,8 +16,5 @@ out vec3 v_normal;       // figure space, unit length
 void main() {
     rest_shift = u_rest_shift;
     center = u_center;
-#ifdef AFFINE_PALETTE
-    is_rigid = false;
-#endif
     pose_vertex(u_attached, v_position, v_normal);
 }

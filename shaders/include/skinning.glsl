@@ -19,7 +19,7 @@ uniform sampler2D u_offsets;    // pose correctives, row by row
 vec3 rest_shift;     // rest centre minus posed centre
 vec3 center;         // posed centre, figure space
 #ifdef AFFINE_PALETTE  // at least one joint of an instance scales or shears
-bool is_rigid;       // true if no joint of this instance scales or shears
+bool is_rigid;       // true if no joint of this vertex scales or shears, set by LBS
 mat3 linear;         // linear part of the blended transform, set by skin()
 #endif
 
@@ -41,6 +41,21 @@ vec4 palette_row(int joint, int row) {
     int index = gl_InstanceID * u_n_joints + joint;
     return texelFetch(u_palette, ivec2(3 * (index & 255) + row, index >> 8), 0);
 }
+
+#ifdef AFFINE_PALETTE
+const float RIGID = 1e-5;  // relative tolerance of A^T A = s^2 I, as in viewer/rig/kinematics.py
+
+// Square of a joint's scale if it is uniform, and 0 for all others; rows of its matrix.
+float rigid_size(vec3 x, vec3 y, vec3 z) {
+    mat3 matrix = mat3(x, y, z);  // transposed, so the gram matrix is matrix * transpose(matrix)
+    mat3 gram = matrix * transpose(matrix);
+    float size = gram[0][0];
+    vec3 sides = abs(vec3(gram[0][1], gram[0][2], gram[1][2]));
+    vec2 others = abs(vec2(gram[1][1], gram[2][2]) - size);
+    float error = max(max(max(sides.x, sides.y), sides.z), max(others.x, others.y));
+    return error <= RIGID * size && dot(x, cross(y, z)) > 0.0 ? size : 0.0;
+}
+#endif
 
 vec3 unit(vec3 v) {
     float size = length(v);
@@ -91,6 +106,9 @@ void skin(inout vec3 position, inout vec3 normal);  // defined by the skinning m
 void pose_vertex(bool attached, out vec3 position, out vec3 normal) {
     position = in_position + corrective(int(in_bindings.z));
     normal = in_normal;
+#ifdef AFFINE_PALETTE
+    is_rigid = false;
+#endif
     if (attached && in_bindings.y > 0u) {
         skin(position, normal);
     } else {

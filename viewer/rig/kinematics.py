@@ -14,10 +14,12 @@ from viewer.rig.posed_skeleton import PosedSkeleton
 from viewer.rig.skeleton import Skeleton
 
 __all__ = [
+    "are_alike",
     "forward_kinematics",
     "is_posed",
     "is_rigid",
     "posed_skeleton",
+    "rigid_sizes",
     "skinning_matrices",
     "world_matrices",
 ]
@@ -153,6 +155,35 @@ def skinning_matrices(world: Floats, inverse_bind: Floats) -> Floats:
     return world @ inverse_bind
 
 
+def rigid_sizes(palette: Floats) -> Floats:
+    """Return the square s^2 of each joint's scale if it is uniform, and 0 for all other joints.
+
+    Parameters
+    ----------
+    palette : (..., J, 4, 4)
+        Skinning matrices.
+
+    Returns
+    -------
+    (..., J)
+        s^2 if the 3 x 3 part A satisfies A^T A = s^2 I, and det A > 0.
+    """
+    linear = palette[..., :3, :3]
+    gram = np.swapaxes(linear, -1, -2) @ linear
+    squares = gram[..., 0, 0]
+    errors = np.abs(gram - squares[..., None, None] * np.eye(3)).max(axis=(-2, -1))
+    # A reflection also has orthogonal columns, but a negative determinant.
+    # Its sign is found without the product, which may overflow.
+    is_uniform = (errors <= _RIGID * squares) & (np.linalg.slogdet(linear).sign > 0.0)
+    return np.where(is_uniform, squares, 0.0)
+
+
+def are_alike(lowest: Floats, highest: Floats) -> Bools:
+    """Return whether joints with a range of ``rigid_sizes`` only rotate, with one common scale."""
+    alike: Bools = (lowest > 0.0) & (highest - lowest <= _RIGID * highest)
+    return alike
+
+
 def is_rigid(palette: Floats) -> Bools:
     """Return whether all joints only rotate and translate, up to one common uniform scale.
 
@@ -170,11 +201,5 @@ def is_rigid(palette: Floats) -> Bools:
     >>> bool(is_rigid(palette)), bool(is_rigid(palette * np.array([2.0, 1.0, 1.0, 1.0])))
     (True, False)
     """
-    linear = palette[..., :3, :3]
-    gram = np.swapaxes(linear, -1, -2) @ linear
-    squares = gram[..., 0, 0].max(axis=-1, initial=0.0)
-    errors = np.abs(gram - squares[..., None, None, None] * np.eye(3))
-    is_uniform = errors.max(axis=(-3, -2, -1), initial=0.0) <= _RIGID * squares
-    # A reflection also has orthogonal columns, but a negative determinant.
-    # Its sign is found without the product, which may overflow.
-    return is_uniform & (np.linalg.slogdet(linear).sign > 0.0).all(axis=-1)
+    sizes = rigid_sizes(palette)
+    return are_alike(sizes.min(axis=-1, initial=np.inf), sizes.max(axis=-1, initial=0.0))

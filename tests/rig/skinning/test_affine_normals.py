@@ -165,3 +165,24 @@ def test_blended_normals_match_the_blended_surface(blend_factor):
     skin = skin_from_lists([pairs] * len(DIRECTIONS), EYES)
     found = mix.deform(DIRECTIONS, DIRECTIONS, skin, palette, blend_factor)[1]
     assert_allclose(found, unit(DIRECTIONS @ np.linalg.inv(linear)), atol=1e-13)
+
+
+@pytest.mark.parametrize("size", [1.0, 1.001, 7.0])
+def test_scaled_joint_leaves_normals_of_other_vertices_alone(size):
+    """Vertex 0 follows a still joint and one rotated by 60 degrees about z: half of each scales the
+    plane by cos 30 and rotates it by 30 degrees. A third joint scales vertex 1, and vertex 2 lists
+    it without weight.
+    """
+    turned, sized = np.eye(4), np.diag([size, 1.0, 1.0, 1.0])
+    c, s = np.cos(np.pi / 3), np.sin(np.pi / 3)
+    turned[:2, :2] = [[c, -s], [s, c]]
+    palette = np.stack([np.eye(4), turned, sized])
+    half = [(0, 0.5), (1, 0.5)]
+    skin = skin_from_lists([half, [(2, 1.0)], [*half, (2, 0.0)]], np.tile(np.eye(4), (3, 1, 1)))
+    normals = np.tile(np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0), (3, 1))
+    found = lbs.deform(np.zeros((3, 3)), normals, skin, palette)[1]
+    c30, s30 = np.sqrt(0.75), 0.5
+    blended = np.array([c30 * c30, c30 * s30, 1.0])
+    assert_allclose(found[[0, 2]], np.tile(blended / np.linalg.norm(blended), (2, 1)), atol=1e-15)
+    sized_normal = np.array([1.0 / size, 0.0, 1.0])
+    assert_allclose(found[1], sized_normal / np.linalg.norm(sized_normal), atol=1e-15)

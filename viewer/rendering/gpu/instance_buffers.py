@@ -55,7 +55,6 @@ _PER_INSTANCE = (
     ("in_actor_color", 3),
     ("in_rest_shift", 3),
     ("in_center", 3),
-    ("in_is_rigid", 1),
 )
 _FLOATS = sum(count for _, count in _PER_INSTANCE)
 
@@ -186,8 +185,7 @@ class InstanceBuffers:
         centers = self._centers[: self.count]
         model[:, :3, 3] += np.einsum("aij,aj->ai", model[:, :3, :3], centers)
         colors = np.array([actor.color or SKIN_COLOR for actor in actors])
-        rigid = self._is_rigid[: self.count, None]
-        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers, rigid]
+        rows = [model[:, :3].reshape(-1, 12), colors, self.mesh.center - centers, centers]
         self._instances.write(float32(np.concatenate(rows, axis=1)))
 
     def use(self, program: moderngl.Program, view: View) -> None:

@@ -1,13 +1,37 @@
-"""Normals transformed by blended matrices that scale or shear."""
+"""Normals of vertices, by blended matrices or by their inverse transposes."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from viewer.rig.arrays import Floats
+from viewer.rig.arrays import Bools, Floats
+from viewer.rig.kinematics import are_alike, rigid_sizes
+from viewer.rig.skin import Skin
 
 # Smaller determinants, of matrices scaled to entries up to 1, have an unreliable sign.
 _FLAT = 1e-5
+
+
+def rigid_vertices(skin: Skin, palette: Floats) -> Bools:
+    """Return which vertices have only joints that rotate, up to one common scale: (V,).
+
+    Their normals follow the blended matrix. Those of all others, whose joints scale or shear,
+    follow its inverse transpose. A joint has no effect on normals of vertices that it does not
+    influence.
+    """
+    sizes = rigid_sizes(palette)
+    rigid = np.ones(skin.n_vertices, dtype=np.bool_)
+    if len(sizes) == 0 or are_alike(sizes.min(), sizes.max()):
+        return rigid
+    moving = np.flatnonzero(np.diff(skin.starts) > 0)
+    if len(moving):
+        own, is_used = sizes[skin.joints], skin.weights != 0.0
+        edges = skin.starts[moving]
+        lowest = np.minimum.reduceat(np.where(is_used, own, np.inf), edges)
+        highest = np.maximum.reduceat(np.where(is_used, own, -np.inf), edges)
+        with np.errstate(invalid="ignore"):
+            rigid[moving] = are_alike(lowest, highest) | (lowest > highest)
+    return rigid
 
 
 def inverse_transposed(matrices: Floats, normals: Floats) -> Floats:

@@ -8,10 +8,9 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import is_rigid
 from viewer.rig.skin import Skin
 from viewer.rig.skinning._blocks import Block, blocks_of
-from viewer.rig.skinning._normals import inverse_transposed
+from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
 
 __all__ = ["blended_matrices", "deform", "move"]
 
@@ -25,8 +24,8 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Transform by blended matrices: v' = B [v 1], n' = unit(B [n 0]), with B = sum_i w_i M_i.
 
-    If all joints are rigid, normals use the blended matrix itself (CSE169 course notes). If any
-    joint scales or shears, normals use its inverse transpose, n' = unit(B^-T n).
+    If all joints of a vertex are rigid, its normal uses the blended matrix itself (CSE169 course
+    notes). If one of them scales or shears, it uses the inverse transpose, n' = unit(B^-T n).
 
     Parameters
     ----------
@@ -79,15 +78,18 @@ def move(
     """
     moved = np.empty(positions.shape)
     rotated = None if normals is None else np.empty(positions.shape)
-    rigid = normals is not None and is_rigid(palette)
+    others = np.zeros(0, dtype=np.intp)
+    if normals is not None:
+        others = np.flatnonzero(~rigid_vertices(skin, palette))
     for rows, matrices in _blended(skin, palette):
         moved[rows] = (_product(matrices, positions[rows]) + matrices[:, 3]).T
         if normals is not None and rotated is not None:
-            rotated[rows] = (
-                _product(matrices, normals[rows]).T
-                if rigid
-                else inverse_transposed(matrices[:, :3], normals[rows])
-            )
+            rotated[rows] = _product(matrices, normals[rows]).T
+            first, last = np.searchsorted(others, [rows.start, rows.stop])
+            affine = others[first:last]
+            if len(affine):
+                linear = matrices[:, :3, affine - rows.start]
+                rotated[affine] = inverse_transposed(linear, normals[affine])
     return moved, rotated
 
 

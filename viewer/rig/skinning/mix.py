@@ -6,10 +6,9 @@ import numpy as np
 
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.kinematics import is_rigid
-from viewer.rig.skin import Skin
+from viewer.rig.skin import Skin, skin_rows
 from viewer.rig.skinning import dqs, lbs
-from viewer.rig.skinning._normals import inverse_transposed
+from viewer.rig.skinning._normals import inverse_transposed, rigid_vertices
 
 __all__ = ["deform"]
 
@@ -19,7 +18,7 @@ def deform(
 ) -> tuple[Floats, Floats]:
     """Interpolate each vertex: (1 - blend_factor) LBS + blend_factor DQS.
 
-    If joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
+    Where joints scale or shear, normals use the inverse transpose of the interpolated linear maps.
 
     Parameters
     ----------
@@ -44,9 +43,11 @@ def deform(
     moved, rotated = (
         (1.0 - blend_factor) * a + blend_factor * b for a, b in zip(linear, dual, strict=True)
     )
-    if not is_rigid(palette):
+    affine = np.flatnonzero(~rigid_vertices(skin, palette)).astype(np.int32)
+    if len(affine):
         # Interpolated normals would not be perpendicular to the interpolated surface.
-        maps = (1.0 - blend_factor) * lbs.blended_matrices(skin, palette)[:, :, :3]
-        maps += blend_factor * dqs.linear_maps(skin, palette)
-        rotated = inverse_transposed(np.moveaxis(maps, 0, -1), normals)
+        own = skin_rows(skin, affine)
+        maps = (1.0 - blend_factor) * lbs.blended_matrices(own, palette)[:, :, :3]
+        maps += blend_factor * dqs.linear_maps(own, palette)
+        rotated[affine] = inverse_transposed(np.moveaxis(maps, 0, -1), normals[affine])
     return moved, unit(rotated)
