@@ -1,10 +1,14 @@
 """Temporary files, which are removed when the process is terminated."""
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from viewer.formats import save_bytes
 from viewer.media.saving import Replacement, save_parts
-from viewer.media.unfinished import remove_leftovers, remove_unfinished
+from viewer.media.unfinished import new_prefix, remove_leftovers, remove_unfinished
 
 
 def test_finished_files_stay_and_unfinished_files_are_removed(tmp_path):
@@ -68,3 +72,41 @@ def test_leftovers_of_other_files_and_hidden_files_stay(tmp_path):
     save_parts(one, parts())
     assert one.read_bytes() == b"whole file"
     assert len(list(tmp_path.iterdir())) == 4
+
+
+WRITER = """
+import os, sys
+from pathlib import Path
+from viewer.media.saving import Replacement, save_parts
+
+def parts():
+    yield b"half"
+    Path(sys.argv[1], "begun").touch()
+    os.kill(os.getpid(), 9)
+
+Replacement(Path(sys.argv[1], "a.mp4")).begin()
+save_parts(Path(sys.argv[1], "b.txt"), parts())
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="asks for processes")
+def test_next_run_removes_what_a_killed_one_left_and_nothing_else(tmp_path):
+    subprocess.run([sys.executable, "-c", WRITER, str(tmp_path)], check=False)
+    left = [path.name for path in tmp_path.iterdir() if path.name != "begun"]
+    assert len(left) == 2
+    dead = next(name for name in left if name.startswith(".b.txt"))
+    elsewhere = f"{dead[:10]}{'0' * 8}{dead[18:]}"  # a process of another machine
+    alive = dead.replace(dead.split("-")[1], str(os.getpid()))
+    assert dead.startswith(".b.txt.tmp") and elsewhere != dead != alive
+    folder = tmp_path / dead.replace(".b.txt", ".smpl")
+    (folder / "new").mkdir(parents=True)
+    for name in (elsewhere, alive, ".b.txt.tmpabcd0123", dead[1:], ".notes.tmp"):
+        (tmp_path / name).touch()
+    save_bytes(tmp_path / "c.txt", b"whole")
+    names = {path.name for path in tmp_path.iterdir()}
+    kept = {elsewhere, alive, ".b.txt.tmpabcd0123", dead[1:], ".notes.tmp"}
+    assert names == {"begun", "c.txt", *kept}
+    # A folder is searched once: writing thousands of files takes no longer.
+    (tmp_path / dead).touch()
+    save_bytes(tmp_path / "d.txt", b"whole")
+    assert (tmp_path / dead).exists() and new_prefix(tmp_path, "d.txt").startswith(".d.txt.tmp")

@@ -41,6 +41,7 @@ from viewer.export._options import MotionOptions
 from viewer.formats._text.decimals import fixed
 from viewer.formats._text.number_text import row_texts
 from viewer.interrupts import hold, poll
+from viewer.media.unfinished import new_prefix
 from viewer.phrases import printable
 from viewer.progress import report
 from viewer.rig.arrays import Floats
@@ -256,7 +257,7 @@ def _new_folder(path: Path) -> Iterator[Path]:
         is_new = not path.exists()
         _refuse_others(path, target)
         path.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(dir=path, prefix=f".{_FOLDER}."))
+        made = Path(tempfile.mkdtemp(dir=path, prefix=new_prefix(path, _FOLDER)))
         fresh, old = made / "new", made / "old"
         fresh.mkdir()
         yield fresh

@@ -14,7 +14,7 @@ from viewer.diagnostics.record import note_output
 from viewer.errors import OutputError
 from viewer.interrupts import hold, poll, raising
 from viewer.media.file_names import file_stem
-from viewer.media.unfinished import note_unfinished, temporary_prefix
+from viewer.media.unfinished import new_prefix, note_unfinished
 from viewer.phrases import printable
 from viewer.progress import report, report_bytes
 from viewer.streams import is_stdout, write_stdout
@@ -197,7 +197,9 @@ class Replacement:
         target = self._target
         try:
             handle, name = tempfile.mkstemp(
-                dir=target.parent, prefix=temporary_prefix(target.stem), suffix=target.suffix
+                dir=target.parent,
+                prefix=new_prefix(target.parent, target.stem),
+                suffix=target.suffix,
             )
         except OSError as problem:
             raise self.error(problem) from None
@@ -297,7 +299,9 @@ def _copy(target: Path) -> Path:
     import shutil
     import tempfile
 
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=temporary_prefix(target.name))
+    handle, name = tempfile.mkstemp(
+        dir=target.parent, prefix=new_prefix(target.parent, target.name)
+    )
     os.close(handle)
     try:
         shutil.copy2(target, name)
@@ -329,7 +333,9 @@ def _replace(target: Path, parts: Iterable[bytes], permissions: int) -> None:
     import tempfile
 
     _require_folder(target)
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=temporary_prefix(target.name))
+    handle, name = tempfile.mkstemp(
+        dir=target.parent, prefix=new_prefix(target.parent, target.name)
+    )
     note_unfinished(Path(name))
     try:
         with os.fdopen(handle, "wb") as stream:

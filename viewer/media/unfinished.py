@@ -1,15 +1,25 @@
-"""Temporary files that would be left behind if the process had to end immediately."""
+"""Temporary files that would be left behind if the process had to end immediately.
+
+Their names contain the machine and the process that owns them::
+
+    .walk.bvh.tmp0a1b2c3d-4711-k3j2h1g0      8 hexadecimal digits of the machine, process, random
+
+so that a later run can remove those of a process that was killed, and no others.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import os
 import re
+import zlib
 from collections import defaultdict, deque
 from collections.abc import Iterable
 from pathlib import Path
 
 __all__ = [
+    "new_prefix",
     "note_unfinished",
     "remove_leftovers",
     "remove_unfinished",
@@ -56,8 +66,68 @@ def remove_unfinished() -> None:
             path.unlink(missing_ok=True)
 
 
+def new_prefix(folder: str | Path, name: str) -> str:
+    """Return the prefix of a new temporary file or folder, and remove those of dead processes.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder in which it is created. It is searched once per process.
+    name : str
+        Name of the file that is written, or of the purpose.
+    """
+    folder = os.path.abspath(folder)  # noqa: PTH100
+    process = os.getpid()
+    if (folder, process) not in _searched:
+        _searched.add((folder, process))
+        _remove_abandoned(folder)
+    return f"{temporary_prefix(name)}{_machine()}-{process}-"
+
+
+_searched: set[tuple[str, int]] = set()
+
+
+@functools.cache
+def _machine() -> str:
+    """Return a key of this machine and, in a container, of its process numbers."""
+    key = os.uname().nodename if hasattr(os, "uname") else ""
+    with contextlib.suppress(OSError):
+        key += os.readlink("/proc/self/ns/pid")  # noqa: PTH115
+    return f"{zlib.crc32(key.encode('utf-8', 'replace')):08x}"
+
+
+def _remove_abandoned(folder: str) -> None:
+    """Remove temporary files and folders in a folder if their process on this machine has died."""
+    if os.name != "posix":  # elsewhere, asking for a process would end it
+        return
+    import shutil
+
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            found = _LEFTOVER.fullmatch(entry.name)
+            if not found or found[2] != _machine() or _is_alive(int(found[3])):
+                continue
+            with contextlib.suppress(OSError):
+                if entry.stat(follow_symlinks=False).st_uid != os.getuid():
+                    continue
+                if entry.is_dir(follow_symlinks=False):
+                    shutil.rmtree(entry.path, ignore_errors=True)
+                else:
+                    os.unlink(entry.path)  # noqa: PTH108
+
+
+def _is_alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (OSError, OverflowError):  # of another user, or no number of a process
+        return True
+    return True
+
+
 # The module tempfile appends a random part of eight characters.
-_LEFTOVER = re.compile(r"(\..+)[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
+_LEFTOVER = re.compile(r"(\..+\.tmp)(?:([0-9a-f]{8})-([0-9]+)-)?[a-z0-9_]{8}(\.\w+)?", re.DOTALL)
 
 
 def remove_leftovers(targets: Iterable[str]) -> None:
@@ -79,6 +149,6 @@ def remove_leftovers(targets: Iterable[str]) -> None:
         with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
             for entry in entries:
                 found = _LEFTOVER.fullmatch(entry.name)
-                if found and f"{found[1]}\n{found[2] or ''}" in names:
+                if found and f"{found[1]}\n{found[4] or ''}" in names:
                     with contextlib.suppress(OSError):
                         os.unlink(entry.path)  # noqa: PTH108

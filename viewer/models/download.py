@@ -10,6 +10,7 @@ from pathlib import Path
 
 from viewer.errors import OutputError, ViewerError
 from viewer.formats import Source, detect
+from viewer.media.unfinished import new_prefix
 from viewer.models import data_folder
 from viewer.phrases import printable
 from viewer.progress import report
@@ -47,7 +48,7 @@ def add_model(name: str) -> Path:
     folder = data_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=folder) as place:
+        with tempfile.TemporaryDirectory(dir=folder, prefix=new_prefix(folder, name)) as place:
             wheel = _downloaded(name, Path(place))
             if detect(Source.open(wheel)) != name:
                 raise ViewerError(f"models: {wheel.name} is not the model {name}")

@@ -14,6 +14,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import FormatError
 from viewer.formats import SUFFIXES
+from viewer.media.unfinished import new_prefix
 
 __all__ = ["Submission", "opened"]
 
@@ -78,7 +79,9 @@ def opened(
     elif path.exists() and suffix_of(path.name) != ".zip":
         values = {"suffix": path.suffix or "different"}
         raise FormatError(Diagnostic("F002.submission-kind", path, values=values))
-    with tempfile.TemporaryDirectory(prefix="viewer-submission-", dir=_existing(temporary)) as name:
+    place = _existing(temporary) or Path(tempfile.gettempdir())
+    prefix = new_prefix(place, "viewer-submission")
+    with tempfile.TemporaryDirectory(prefix=prefix, dir=place) as name:
         folder = Path(name)
         chosen, base = _unpack(path, folder, expected, alike)
         yield Submission(tuple(base / one for one in chosen), base)

@@ -21,6 +21,7 @@ from viewer.batching.submissions.choosing import patterns_of
 from viewer.batching.tables import comparisons
 from viewer.commands._diff.inputs import input_files
 from viewer.data_classes import dataclass
+from viewer.media.unfinished import new_prefix
 from viewer.phrases import printable
 
 __all__ = ["SubmissionJob", "submission_job"]
@@ -92,7 +93,7 @@ def submission_job(job: Job, reference: str, expected: list[str]) -> SubmissionJ
 @cache
 def _temporary_folder() -> str:
     """Return a folder that is removed when this process ends."""
-    folder = tempfile.mkdtemp(prefix="viewer-batch-")
+    folder = tempfile.mkdtemp(prefix=new_prefix(tempfile.gettempdir(), "viewer-batch"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 

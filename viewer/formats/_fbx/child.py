@@ -15,6 +15,7 @@ import viewer
 from viewer.diagnostics import Phrase
 from viewer.formats._fbx.message import Arrays, unpacked
 from viewer.formats._source import Source
+from viewer.media.unfinished import new_prefix
 
 __all__ = ["run_worker"]
 
@@ -38,7 +39,8 @@ def run_worker(source: Source, *arguments: str) -> tuple[Arrays, dict[str, Any]]
         raise source.fault("F001.fbx-extra")
     if source.is_piped:
         # The library reads files, in any order.
-        with tempfile.TemporaryDirectory(prefix="viewer-") as folder:
+        prefix = new_prefix(tempfile.gettempdir(), "viewer-fbx")
+        with tempfile.TemporaryDirectory(prefix=prefix) as folder:
             path = Path(folder, "piped.fbx")
             path.write_bytes(source.data)
             return _run(source, path, arguments)
