@@ -14,7 +14,7 @@ from viewer.commands._batch.requests import request_of
 from viewer.commands._batch.results import add_result_arguments, save_results
 from viewer.commands._scene import print_warnings
 from viewer.commands._usage import Parser
-from viewer.errors import ViewerError
+from viewer.errors import OutputError, ViewerError
 from viewer.near_names import did_you_mean
 from viewer.phrases import printable
 from viewer.streams import summary_stream
@@ -72,7 +72,7 @@ def parser_of(words: Sequence[str]) -> Parser | None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Run the batch; return 1 if an item failed, or has findings or differences."""
+    """Run the batch; return 1 if an item failed, or has findings, 5 if one could not be written."""
     from viewer.batching.running import run_batch
 
     if arguments.job is None:
@@ -89,4 +89,6 @@ def run(arguments: argparse.Namespace) -> int:
         print(line, file=stream)
     if report.signal:
         return 128 + report.signal
+    if any(result.exit_code == OutputError.exit_code for result in report.failures):
+        return OutputError.exit_code
     return 0 if report.is_complete else _FAILED

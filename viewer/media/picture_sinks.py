@@ -39,18 +39,25 @@ class PictureSink:
         Number of images that may be written at the same time.
     n_bytes : int
         Total size of the files written so far.
+    n_written : int
+        Number of images written so far, by several threads.
     """
 
     n_samples = 0
 
     def __init__(self, paths: Sequence[Path]) -> None:
-        self.paths = paths
+        self.paths, self._written = paths, list[int]()
         self.workers = min(max((os.cpu_count() or 2) - 1, 1), _MOST_WORKERS)
 
     @property
     def n_bytes(self) -> int:
         """Total size of the files written so far."""
         return sum(path.stat().st_size for path in self.paths if path.is_file())
+
+    @property
+    def n_written(self) -> int:
+        """Number of images written so far."""
+        return len(self._written)
 
     def look(self, pixels: Bytes) -> None:
         """Do nothing: images are independent of each other."""
@@ -64,6 +71,7 @@ class PictureSink:
             If it cannot be written.
         """
         save_image(self.paths[frame], pixels)
+        self._written.append(frame)
 
     def close(self) -> None:
         """Do nothing: every image is complete."""

@@ -12,6 +12,7 @@ import pytest
 from viewer.batching.items import Item, Result
 from viewer.batching.overview import check_overview, save_overview, sheet
 from viewer.errors import UnsupportedFormatError, ViewerError
+from viewer.interrupts import Interrupted
 from viewer.media.image import decode_picture, save_image
 
 EVIL = "<script>alert(1)</script>\" onload='x'"
@@ -155,3 +156,24 @@ def test_unsupported_suffixes_and_batches_without_pictures_are_refused(tmp_path)
         check_overview("o.pdf")
     with pytest.raises(ViewerError, match=r"no picture was written; name a page such as o\.html"):
         save_overview(tmp_path / "o.png", "lint", [linted(0, "a")])
+
+
+def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> None:
+    """As when Ctrl-C arrives after the first sheet."""
+    results = [
+        Result(Item(index, (), "", f"{index}.glb"), "failed", 2, message="broken")
+        for index in range(5)
+    ]
+    monkeypatch.setattr(sheet, "PER_SHEET", 2)
+    path, drawn = tmp_path / "o.png", sheet.captioned_sheet
+    path.write_bytes(b"old")
+
+    def stop(cells):
+        if path.read_bytes() != b"old":
+            raise Interrupted(2)
+        return drawn(cells)
+
+    monkeypatch.setattr(sheet, "captioned_sheet", stop)
+    with pytest.raises(Interrupted):
+        save_overview(path, "render", results)
+    assert [one.name for one in tmp_path.iterdir()] == ["o.png"] and path.read_bytes() == b"old"

@@ -14,6 +14,7 @@ from formats.synthetic_smpl import model
 import viewer
 from viewer.cli import run
 from viewer.commands._sequence.shots import Turntable, parse_turntable
+from viewer.errors import OutputError
 from viewer.rig.motion.evaluation import pose_actor
 
 pytestmark = pytest.mark.slow
@@ -44,6 +45,26 @@ def test_numbered_images_match_the_frames(draw, walk, tmp_path):
     first, last = picture(tmp_path / "f_000.png"), picture(tmp_path / "f_030.png")
     assert (first != last).any()
     np.testing.assert_allclose(first[40:], last[40:], atol=60)
+
+
+def test_pictures_before_a_failed_one_are_kept_and_counted(walk, tmp_path, capsys, monkeypatch):
+    from viewer.media import picture_sinks
+
+    save = picture_sinks.save_image
+
+    def fill(path, pixels):
+        if path.name == "f_004.png":
+            raise OutputError(f"{path}: No space left on device")
+        return save(path, pixels)
+
+    monkeypatch.setattr(picture_sinks, "save_image", fill)
+    monkeypatch.setattr(picture_sinks, "_MOST_WORKERS", 1)
+    files = [*map(str, walk), "-o", str(tmp_path / "f_{frame:03}.png")]
+    assert run(["render", *files, "--frames", "0:9", "--size", "32x32", "--quality", "draft"]) == 5
+    err = capsys.readouterr().err.splitlines()
+    count = len(names(tmp_path, ".png"))
+    assert 4 <= count < 9 and f"{count} of 9 pictures were written, and are kept" in err[-2]
+    assert err[-1] == f"viewer: {tmp_path / 'f_004.png'}: No space left on device"
 
 
 def test_sequence_equals_single_frames(draw, walk, tmp_path):

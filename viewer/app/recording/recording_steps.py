@@ -12,7 +12,7 @@ from viewer.app.recording.recorded_frames import recorded_times
 from viewer.app.recording.recorded_marks import RecordedMarks
 from viewer.app.recording.recorded_options import recorded_follow, recorded_options
 from viewer.app.recording.state import RecordSettings
-from viewer.errors import OutputError
+from viewer.errors import OutputError, ViewerError
 from viewer.formats import check_targets
 from viewer.phrases import printable
 from viewer.rendering.gpu.program import Programs
@@ -80,6 +80,11 @@ def recording_steps(
         with contextlib.closing(record(recording, renderer, sink)) as steps:
             for progress in steps:
                 yield progress.done, progress.total
+    except (ViewerError, GeneratorExit):
+        kept = getattr(sink, "n_written", 0)
+        if kept:
+            state.say(f"{kept} of {len(files)} pictures were written, and are kept")
+        raise
     finally:
         renderer.release()
     name = printable(files[0], 200) + (f" to {printable(files[-1].name)}" if files[1:] else "")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from viewer.batching.items import Result
 from viewer.errors import UnsupportedFormatError
+from viewer.media.saving import all_or_none
 from viewer.phrases import printable
 
 __all__ = ["PAGES", "check_overview", "overview_files", "save_overview"]
@@ -78,4 +79,5 @@ def save_overview(path: str | Path, job: str, results: Sequence[Result]) -> list
         return save_page(path, job, results)
     from viewer.batching.overview.sheet import save_sheets
 
-    return save_sheets(path, results)
+    with all_or_none(map(Path, overview_files(str(path), len(results)))):
+        return save_sheets(path, results)

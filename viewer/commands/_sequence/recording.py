@@ -231,11 +231,17 @@ def draw_sequence(
             check_size(offscreen.context, frame_size, cells)
         steps = record(recording, offscreen.renderer, sink)
         # The drawing is closed while the context still exists, even after an error.
-        with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
-            for progress in steps:
-                line.show(progress.done)
-                if progress.done < progress.total:
-                    poll()  # after the last frame, the file may be complete at any moment
+        try:
+            with Progress(title, recording.n_frames) as line, contextlib.closing(steps):
+                for progress in steps:
+                    line.show(progress.done)
+                    if progress.done < progress.total:
+                        poll()  # after the last frame, the file may be complete at any moment
+        except BaseException:  # also Ctrl-C
+            kept = getattr(sink, "n_written", 0)
+            if kept:
+                print_warnings([f"{kept} of {len(outputs)} pictures were written, and are kept"])
+            raise
         print_warnings(offscreen.renderer.notes)
     return _summary(request, shots, outputs, frame_size, sink)
 
