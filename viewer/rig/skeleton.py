@@ -10,6 +10,7 @@ import numpy as np
 from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Bools, Floats, Ints, frozen
+from viewer.rig.memo import Memo
 
 if TYPE_CHECKING:
     from viewer.rig.bodies.joint_posing import JointPosing
@@ -215,6 +216,9 @@ def clamp_dofs(skeleton: Skeleton, dofs: Floats) -> Floats:
     return np.clip(dofs, skeleton.dof_limits[:, 0], skeleton.dof_limits[:, 1])
 
 
+_labels: Memo[Skeleton, tuple[str, ...]] = Memo()
+
+
 def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
     """Return a unique label for every joint.
 
@@ -229,6 +233,10 @@ def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
         ``"knee"``, ``"knee#5"`` if several joints have that name, ``"#5"`` if unnamed.
         Auxiliary joints have the label of the joint that is shown in their place.
     """
+    return _labels.get(skeleton, (), lambda: _made_labels(skeleton))
+
+
+def _made_labels(skeleton: Skeleton) -> tuple[str, ...]:
     counts = Counter(skeleton.names)
     labels = tuple(
         name if name and counts[name] == 1 else f"{name}#{joint}"
@@ -241,12 +249,7 @@ def joint_labels(skeleton: Skeleton) -> tuple[str, ...]:
 
 def joint_label(skeleton: Skeleton, joint: int) -> str:
     """Return the label of one joint, as in ``joint_labels``."""
-    if skeleton.auxiliary is not None:
-        joint = int(shown_joint_of(skeleton)[joint])
-    name = skeleton.names[joint]
-    if name and skeleton.names.count(name) == 1:
-        return name
-    return f"{name}#{joint}"
+    return joint_labels(skeleton)[joint]
 
 
 def shown_joints(skeleton: Skeleton) -> Ints:

@@ -9,7 +9,9 @@ from formats.gltf.validator_faults import FAULTS
 
 from viewer.lint import lint_again, lint_files
 from viewer.loading import MotionSettings, load
+from viewer.rig import skeleton
 from viewer.rig.motion.animation_choice import play_animation
+from viewer.rig.skeleton import Skeleton
 
 
 @pytest.mark.parametrize("code", PLANTED)
@@ -167,3 +169,19 @@ def test_findings_in_animations_of_an_open_scene_have_the_pointers_of_the_file(
     play_animation(scene.actors[0], 1)
     (found,) = [one for one in lint_again(scene, [path]).findings if one.code == "C003"]
     assert found.place() == f"{path}#/animations/1"
+
+
+def test_labels_of_many_joints_are_made_once(tmp_path: Path, monkeypatch) -> None:
+    """A chain of 20,000 joints took minutes, as each joint without influence made all labels."""
+    made: list[Skeleton] = []
+    labels = skeleton._made_labels
+    monkeypatch.setattr(skeleton, "_made_labels", lambda one: made.append(one) or labels(one))
+    file, count = skinned(), 500
+    chain = [{"name": f"j{n}", "children": [n + 2]} for n in range(count - 1)]
+    file.root["nodes"] = [{"mesh": 0, "skin": 0}, *chain, {"name": "end"}]
+    file.root["skins"] = [{"joints": [*range(1, count + 1)]}]
+    path = tmp_path / "a.gltf"
+    path.write_bytes(file.json())
+    (idle,) = [one for one in lint_files([path])[1] if one.code == "W006"]
+    assert idle.message.startswith("498 joints")
+    assert len(made) == 1
