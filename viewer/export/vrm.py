@@ -7,6 +7,7 @@ metres, facing +z. Specification: ``github.com/vrm-c/vrm-specification``.
 
 from __future__ import annotations
 
+import copy
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,7 +20,7 @@ import numpy as np
 from viewer.diagnostics import Diagnostic, Phrase
 from viewer.export import gltf
 from viewer.export._gltf.body import Body, Built
-from viewer.export._gltf.document import Document
+from viewer.export._gltf.document import Document, text_of
 from viewer.export._options import VrmMeta
 from viewer.export._vrm.constraints import constraint_items
 from viewer.export._vrm.humanoid import human_bones
@@ -30,9 +31,13 @@ from viewer.export._vrm.maps import Maps
 from viewer.export._vrm.meta import LICENCE, changed_meta, checked_meta
 from viewer.export._vrm.standing import in_t_pose, standing
 from viewer.export._vrm.upgraded import upgraded
+from viewer.formats._vrm.bones import given_bones
+from viewer.formats._vrm.conformance import MOST_WEIGHT, is_weight, weighted_binds
 from viewer.formats._vrm.json_parts import part
+from viewer.formats._vrm.numbers import value_of
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
+from viewer.rig.humanoid import REQUIRED_BONES
 from viewer.rig.pose import pose_key
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.skinning import Skinning
@@ -81,6 +86,12 @@ def export(
     record = None if figure.record is None else figure.record.vrm
     notes = _left_out(actor)
     still = replace(actor, pose=figure_pose(figure), clip=None, hidden_parts=frozenset())
+    if record is not None:
+        record, names = _repaired(record, bones)
+        if names:
+            notes.append(Diagnostic("X005.vrm-repaired", values={"names": names, "n": len(names)}))
+        if record.version == 1 or not given.upgrades:
+            _require_meta(record, given, figure.name)
     if record is not None and record.version == 0 and given.upgrades:
         figure, record, lost = upgraded(figure, record, bones)
         still = replace(still, figure=figure, pose=figure_pose(figure))
@@ -105,6 +116,75 @@ def export(
 def require(figure: Figure) -> None:
     """Raise RigError for a figure that lacks a required human bone."""
     human_bones(figure)
+
+
+def _repaired(record: VrmRecord, bones: Mapping[str, int]) -> tuple[VrmRecord, list[str]]:
+    """Return a record without invalid values, and the names of what was corrected.
+
+    ``record``: record of the figure's file.
+    ``bones``: joint of each human bone that may be written.
+    """
+    key = "VRM" if record.version == 0 else "VRMC_vrm"
+    told, names = copy.deepcopy(record.extensions[key]), list[str]()
+    if record.version == 1 and told.get("specVersion") != "1.0":
+        told["specVersion"] = "1.0"
+        names.append("specVersion")
+    if record.version == 1 and "VRM" in record.extensions:
+        names.append("VRM 0.x besides 1.0")
+    names += [f"human bone {bone}" for bone in _remove_bones(told, record.version, bones)]
+    limited = dict.fromkeys(_limit_weights(told, record.version))
+    names += [f"weights of {name}" for name in limited]
+    return replace(record, extensions={**record.extensions, key: told}), names
+
+
+def _remove_bones(told: Any, version: int, bones: Mapping[str, int]) -> list[str]:
+    """Remove the bones that are unknown, misplaced, or have the name or node of an earlier one."""
+    removed: dict[str, str] = {}
+    seen: set[str] = set()
+    nodes: list[Any] = []
+    # Required bones come first, so that they keep a node that an optional bone also uses.
+    rows = sorted(given_bones(told, version), key=lambda row: row[1] not in REQUIRED_BONES)
+    for place, bone, node in rows:
+        if bone not in bones or bone in seen or node in nodes:
+            removed[place] = bone
+        else:
+            seen.add(bone)
+            nodes.append(node)
+    if removed and version == 0:
+        stated = enumerate(told["humanoid"]["humanBones"])
+        left = [each for place, each in stated if str(place) not in removed]
+        told["humanoid"]["humanBones"] = left
+    for place in removed if version == 1 else ():
+        del told["humanoid"]["humanBones"][place]
+    return [*removed.values()]
+
+
+def _limit_weights(told: Any, version: int) -> list[str]:
+    """Limit the weights of expressions; return the names of those that were changed."""
+    changed = []
+    for bind, _, name in weighted_binds(told, version):
+        if not is_weight(bind["weight"], version):
+            weight = value_of(bind["weight"], 0.0)
+            if weight is None:
+                bind.clear()  # a bind without indices is not written, and counted as lost
+                continue
+            bind["weight"] = min(max(weight, 0.0), MOST_WEIGHT[version])
+            changed.append(name)
+    return changed
+
+
+def _require_meta(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
+    """Raise RigError if neither the file nor the options have the meta data that VRM needs."""
+    told = record.extensions["VRM" if record.version == 0 else "VRMC_vrm"].get("meta")
+    is_known = isinstance(told, dict)
+    if record.version == 1:
+        is_known = bool(part(told, "authors") and part(told, "licenseUrl"))
+    if not is_known:
+        authors = meta.authors or tuple(part(told, "authors") or ())
+        checked_meta(
+            replace(meta, authors=authors, licence=meta.licence or part(told, "licenseUrl") or ""),
+            figure,
+        )
 
 
 def _require_author(record: VrmRecord, meta: VrmMeta, figure: str) -> None:
@@ -149,6 +229,8 @@ def _add_kept(
     _keep_shading(record, document, maps)
     data = extensions["VRM" if record.version == 0 else "VRMC_vrm"]
     data["meta"] = changed_meta(data["meta"], meta, record.version)
+    if record.version == 1 and not data["meta"].get("name"):
+        data["meta"]["name"] = text_of(body.figure.name)
     _add(document, body, built, extensions)
     return [_written(data, extensions, record.version), *_lost(maps.lost)]
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from viewer.data_classes import dataclass
 
-__all__ = ["HUMAN_BONES", "SPINE_BONES", "Humanoid"]
+__all__ = ["HUMAN_BONES", "REQUIRED_BONES", "SPINE_BONES", "Humanoid"]
 
 SPINE_BONES = ("spine", "chest", "upperChest")
 """Bones of the spine, from the hips upwards; all but the first may be missing."""
@@ -42,6 +42,14 @@ def _human_bones() -> dict[str, str]:
 
 HUMAN_BONES: dict[str, str] = _human_bones()
 """SMPL name of every bone of VRM 1.0, except for spine bones."""
+
+
+_LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
+REQUIRED_BONES = (
+    *("hips", "spine", "head"),
+    *(f"{side}{limb}" for side in ("left", "right") for limb in _LIMBS),
+)
+"""Bones that every VRM character must have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

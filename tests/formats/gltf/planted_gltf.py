@@ -52,6 +52,12 @@ def unknown_bone() -> File:
     return file
 
 
+def no_hips() -> File:
+    file = skinned()
+    file.root["extensions"] = {"VRMC_vrm": {"specVersion": "1.0", "humanoid": {"humanBones": {}}}}
+    return file
+
+
 def skinned_child() -> File:
     file = skinned()
     file.add("nodes", {"children": [0]})
@@ -72,6 +78,7 @@ PLANTED = {
     "G004": (joint_twice, "/skins/0/joints"),
     "G005": (keys_at_one_time, "/animations/0/samplers"),
     "G006": (unknown_bone, "/extensions/VRMC_vrm/humanoid/humanBones"),
+    "G008": (no_hips, "/extensions/VRMC_vrm/humanoid/humanBones"),
     "F008": (only_lines, ""),
     "G007": (skinned_child, "/nodes/0"),
 }

@@ -20,7 +20,7 @@ def test_planted_error_is_found(tmp_path: Path, code: str) -> None:
     path = tmp_path / "a.gltf"
     path.write_bytes(made().json())
     found = [finding for finding in lint_files([path])[1] if finding.code == code]
-    severity = {"G007": "note", "F008": "error"}.get(code, "warning")
+    severity = {"G007": "note", "F008": "error", "G008": "error"}.get(code, "warning")
     assert (severity, path, pointer) in {(one.severity, one.file, one.pointer) for one in found}
 
 

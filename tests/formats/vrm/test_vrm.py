@@ -137,7 +137,7 @@ def test_first_person_parts_start_hidden(tmp_path: Path, version: int) -> None:
     assert (mesh.parts, mesh.part_views) == (("face",), ("first-person",))
     assert scene.actors[0].hidden_parts == {0}
     assert dict(figure.facts)["first person only"] == "face"
-    (found,) = scene.diagnostics
+    (found,) = [each for each in scene.diagnostics if each.code != "G008"]
     place = f"/extensions/{('VRM', 'VRMC_vrm')[version]}/firstPerson/meshAnnotations/1"
     assert (found.key, found.pointer) == ("G006.first-person", place)
 

@@ -173,6 +173,8 @@ MESSAGES = {
     "{n:?is|are} shifted to begin at 0: {names:list8}",
     "X005.t-pose": "the rest pose is a T-pose, as VRM requires: joints are rotated by up to "
     "{degrees:.3g} degrees",
+    "X005.vrm-repaired": "corrected, because the VRM file had it against the specification: "
+    "{names:list}",
     "X005.vrm-licence": "programs may refuse a VRM 1.0 file with a licence other than {licence}",
     "X005.morph-targets": "{n:#blend shape|is a morph target|are morph targets}",
     "X005.morph-normals": "morph targets change positions only: glTF does not recompute normals",

@@ -9,11 +9,23 @@ CODES = {
     "G004": Code("warning", "inconsistent glTF skin", "bind the mesh again or export again"),
     "G005": Code("warning", "invalid glTF animation", "export the animation again"),
     "G006": Code("warning", "invalid VRM data", "export the character again"),
+    "G008": Code("error", "invalid VRM character", "export the character again"),
     "G007": Code("note", "transform without effect", "none if intentional"),
 }
 
 MESSAGES = {
     # VRM
+    "G008.versions": "expected one version of VRM, found 0.x besides 1.0: only 1.0 is read",
+    "G008.no-version": 'expected specVersion "1.0", found none',
+    "G008.version": 'expected specVersion "1.0", found {found:quoted}: read as 1.0',
+    "G008.no-meta": "expected meta data with authors and licence, found none",
+    "G008.meta": "expected {names:list} in the meta data, found none",
+    "G008.bones": "{n:#required human bone} missing: {names:list}",
+    "G008.bone-twice": "human bone {bone:quoted} occurs more than once",
+    "G008.one-node": "human bones {other:quoted} and {bone:quoted}: expected different nodes, "
+    "found node {node} for both",
+    "G008.weight": "expression {name:quoted}: expected a weight of 0 to {most:g}, found "
+    "{found:text}",
     "G006.bone": "unknown human bone {bone:quoted}: ignored",
     "G006.bone-node": "human bone {bone:quoted}: expected the index of a node, found {found}: "
     "ignored",

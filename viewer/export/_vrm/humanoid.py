@@ -7,17 +7,12 @@ from collections.abc import Mapping
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.figure import Figure
-from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
+from viewer.rig.humanoid import HUMAN_BONES, REQUIRED_BONES, SPINE_BONES
 from viewer.rig.retargeting.joint_names import joint_meanings
 from viewer.rig.skeleton import Skeleton
 
 __all__ = ["bone_above", "human_bones", "is_humanoid"]
 
-_LIMBS = ("UpperLeg", "LowerLeg", "Foot", "UpperArm", "LowerArm", "Hand")
-_REQUIRED = (
-    *("hips", "spine", "head"),
-    *(f"{side}{limb}" for side in ("left", "right") for limb in _LIMBS),
-)
 _ABOVE = {
     **{"spine": "hips", "chest": "spine", "upperChest": "chest", "neck": "spine", "head": "spine"},
     **{"UpperLeg": "hips", "LowerLeg": "UpperLeg", "Foot": "LowerLeg", "Toes": "Foot"},
@@ -46,7 +41,7 @@ def human_bones(figure: Figure) -> dict[str, int]:
     while misplaced := [bone for bone in found if not _is_allowed(skeleton, found, bone)]:
         for bone in misplaced:
             del found[bone]
-    missing = [bone for bone in _REQUIRED if bone not in found]
+    missing = [bone for bone in REQUIRED_BONES if bone not in found]
     if missing:
         values = {"figure": figure.name, "names": missing, "n": len(missing)}
         raise RigError(Diagnostic("F004.vrm-bones", values=values))
@@ -84,7 +79,7 @@ def bone_above(bone: str) -> str:
 def _is_allowed(skeleton: Skeleton, bones: Mapping[str, int], bone: str) -> bool:
     """Return whether a bone is below its required ancestor."""
     above = bone_above(bone)
-    is_known = above in bones or above in _REQUIRED
+    is_known = above in bones or above in REQUIRED_BONES
     return not above or (is_known and _is_below(skeleton, bones[bone], bones.get(above, -1)))
 
 

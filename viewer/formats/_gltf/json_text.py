@@ -93,7 +93,7 @@ def parsed(source: Source, data: bytes, has_lines: bool) -> dict[str, Any]:
     if overflows:
         source.warn("G001.overflow", n=len(overflows), found=overflows[0])
     if repeated:
-        source.warn("G001.repeated", n=len(repeated), found=repeated[0])
+        source.warn("G001.repeated", n=len(repeated), found=repeated[0], names=repeated)
     if "null" in text and (n_nulls := _remove_nulls(root)):
         source.warn("G001.nulls", n=n_nulls)
     return root

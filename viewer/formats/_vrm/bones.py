@@ -10,7 +10,7 @@ from viewer.formats._source import Source
 from viewer.formats._vrm.json_parts import is_index, part
 from viewer.rig.humanoid import HUMAN_BONES, SPINE_BONES
 
-__all__ = ["modern_bone", "read_humanoid"]
+__all__ = ["given_bones", "modern_bone", "read_humanoid"]
 
 _OLD_THUMB = {"ThumbProximal": "ThumbMetacarpal", "ThumbIntermediate": "ThumbProximal"}
 
@@ -33,22 +33,25 @@ def read_humanoid(
     pointer : str
         JSON pointer to the extension.
     """
-    bones = part(told, "humanoid", "humanBones")
-    given: list[tuple[Any, Any]] = []
-    if version == 0 and isinstance(bones, list):
-        given = [(part(each, "bone"), part(each, "node")) for each in bones]
-        given = [(modern_bone(bone), node) for bone, node in given if isinstance(bone, str)]
-    elif isinstance(bones, dict):
-        given = [(bone, part(each, "node")) for bone, each in bones.items()]
     found: dict[str, int] = {}
-    for bone, node in given:
+    for _, bone, node in given_bones(told, version):
         if not is_index(node, file.tree.n_nodes):
             source.warn("G006.bone-node", f"{pointer}/humanoid/humanBones", bone=bone, found=node)
         elif bone in HUMAN_BONES or bone in SPINE_BONES:
-            found[bone] = node
+            found.setdefault(bone, node)
         else:
             source.warn("G006.bone", f"{pointer}/humanoid/humanBones", bone=bone)
     return found
+
+
+def given_bones(told: Mapping[str, Any], version: int) -> list[tuple[str, str, Any]]:
+    """Return the place of each stated human bone in its list, its name in VRM 1.0, and its node."""
+    bones = part(told, "humanoid", "humanBones")
+    if version == 0 and isinstance(bones, list):
+        rows = [(str(place), part(each, "bone"), each) for place, each in enumerate(bones)]
+        return [(at, modern_bone(b), part(each, "node")) for at, b, each in rows if type(b) is str]
+    named = bones.items() if version == 1 and isinstance(bones, dict) else ()
+    return [(bone, bone, part(each, "node")) for bone, each in named]
 
 
 def modern_bone(bone: str) -> str:

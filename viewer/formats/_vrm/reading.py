@@ -15,6 +15,7 @@ from viewer.formats._nodes.content import NodeExpression, NodeFile
 from viewer.formats._nodes.surfaces import part_name
 from viewer.formats._source import Source
 from viewer.formats._vrm.bones import read_humanoid
+from viewer.formats._vrm.conformance import check_character
 from viewer.formats._vrm.constraints import read_constraints
 from viewer.formats._vrm.first_person import read_part_views
 from viewer.formats._vrm.json_parts import is_index, listed, part
@@ -79,6 +80,7 @@ def with_vrm(file: NodeFile, source: Source) -> NodeFile:
         told = file.extensions.get(key)
         if isinstance(told, dict):
             pointer = f"/extensions/{key}"
+            check_character(source, file.extensions, version)
             file = replace(
                 file,
                 humanoid=read_humanoid(source, file, told, version, pointer),
