@@ -119,7 +119,7 @@ def test_names_are_written_as_they_are(tmp_path: Path) -> None:
     # Colons and full stops are read by all programs.
     assert notes[1] == (
         "some programs cannot read 5 joint names, because of spaces or characters outside ASCII, "
-        "or because they are empty or repeated: left leg, , é:x, センター, a  b; --safe-names "
+        'or because they are empty or repeated: left leg, "", é:x, センター, a  b; --safe-names '
         "changes them"
     )
     # Repeated names do not confuse the comparison with the motion, which finds no error.

@@ -313,13 +313,18 @@ def _names_notes(names: Sequence[str], written: Sequence[str]) -> list[Diagnosti
     """Return notes about names that were changed, and about those that few programs read."""
     notes = []
     pairs = [
-        Phrase("renamed", old=old, new=new)
+        Phrase("renamed", old=_visible(old), new=_visible(new))
         for old, new in zip(names, written, strict=True)
         if old != new
     ]
     if pairs:
         notes.append(Diagnostic("X005.joints-renamed", values={"n": len(pairs), "pairs": pairs}))
-    odd = odd_names(written)
+    odd = [_visible(name) for name in odd_names(written)]
     if odd:
         notes.append(Diagnostic("X005.odd-names", values={"n": len(odd), "names": odd}))
     return notes
+
+
+def _visible(name: str) -> str:
+    """Return a name for messages, in quotes if it would not be seen."""
+    return name if name.strip() else f'"{name}"'
