@@ -751,6 +751,59 @@ Hips = pelvis
 """
 
 
+KAYKIT = """
+root = -
+ hips = pelvis
+  spine = spine1
+   chest = spine3
+    head = head
+    upperarm.l = left_shoulder
+     lowerarm.l = left_elbow
+      wrist.l = left_wrist
+       hand.l = left_hand
+        handslot.l = -
+  upperleg.r = right_hip
+   lowerleg.r = right_knee
+    foot.r = right_ankle
+     toes.r = right_foot
+ kneeIK.l = -
+"""
+DAZ_9 = """
+hip = pelvis
+ pelvis = -
+  l_thigh = left_hip
+   l_thightwist1 = -
+   l_shin = left_knee
+    l_foot = left_ankle
+     l_toes = left_foot
+  r_thigh = right_hip
+ spine1 = spine1
+  spine2 = spine2
+   spine3 = -
+    spine4 = spine3
+     neck1 = neck
+      neck2 = -
+       head = head
+     r_shoulder = right_collar
+      r_upperarm = right_shoulder
+       r_forearm = right_elbow
+        r_hand = right_wrist
+         r_thumb1 = right_thumb1
+         r_metacarpal_index = -
+          r_index1 = right_index1
+"""
+ARM_AND_LEG_LAST = """
+Hips = pelvis
+ Thigh.L = left_hip
+  Leg.L = left_knee
+   Foot.L = left_ankle
+ Thigh.R = right_hip
+ Spine = spine1
+  Shoulder.L = left_collar
+   UpperArm.L = left_shoulder
+    Arm.L = left_elbow
+     Hand.L = left_wrist
+"""
 OPENSIM = """
 pelvis = pelvis
  femur_r = right_hip
@@ -860,6 +913,9 @@ TABLES = {
     "rokoko gloves": ROKOKO_GLOVES,
     "hip helpers": HIP_HELPERS,
     "opensim": OPENSIM,
+    "kaykit": KAYKIT,
+    "daz 9": DAZ_9,
+    "upper arm and arm": ARM_AND_LEG_LAST,
     "upper last": UPPER_LAST,
     "unreal with joints": changed(UNREAL, lambda name: re.sub("_([lr])$", r"_JNT_\1", name)),
     "quick rig": changed(MIXAMO, lambda name: f"QuickRigCharacter1_{name.split(':')[1]}"),
