@@ -18,6 +18,8 @@ from viewer.rig.geometry.transform import translation_matrix
 
 __all__ = ["View", "in_front", "key_direction", "set_lights", "set_model", "view_of"]
 
+_LARGEST = 1e30  # entries of normal matrices, well within the range of float32
+
 
 @dataclass(frozen=True, slots=True)
 class View:
@@ -71,7 +73,10 @@ def normal_matrix(linear: Floats) -> Floats:
         Transforms positions.
     """
     if np.linalg.det(linear) != 0.0:
-        return np.linalg.inv(linear).T.astype(np.float64, copy=False)
+        found: Floats = np.linalg.inv(linear).T.astype(np.float64, copy=False)
+        largest = float(np.abs(found).max())
+        # Meshes that are almost flat, or as small as a point, exceed the range of float32.
+        return found if largest < _LARGEST else found / largest
     x, y, z = linear
     return np.stack([np.cross(y, z), np.cross(z, x), np.cross(x, y)])
 
