@@ -58,6 +58,27 @@ def test_common_folder_does_not_depend_on_the_matches_of_a_pattern(data):
     assert find_inputs(["data/b/walk9.npz", "data/a.bvh"]).base == str(data)
 
 
+def test_files_of_amass_without_a_motion_are_skipped_and_counted(tmp_path, monkeypatch):
+    names = ("a/walk_poses.npz", "a/shape.npz", "b/run_stageii.npz", "b/neutral_stagei.npz")
+    for name in (*names, "b/shape.npz"):
+        (tmp_path / "amass" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "amass" / name).touch()
+    monkeypatch.chdir(tmp_path)
+    for words in (["amass"], ["amass/**/*.npz"]):
+        found = find_inputs(words)
+        assert found.paths == ("amass/a/walk_poses.npz", "amass/b/run_stageii.npz")
+        text = "3 files of AMASS without a motion skipped: neutral_stagei.npz, shape.npz"
+        assert found.notes == (text,)
+    assert find_inputs(["amass/a/shape.npz"]).paths == ("amass/a/shape.npz",)
+
+
+def test_folder_of_models_is_searched_although_it_has_a_folder_smpl(data):
+    (data / "models" / "smpl").mkdir(parents=True)
+    (data / "models" / "smpl" / "SMPL_FEMALE.npz").touch()
+    found = find_inputs(["data/models"])
+    assert found.paths == ("data/models/smpl/SMPL_FEMALE.npz",)
+
+
 def test_lists_are_read_from_files_and_standard_input(data, monkeypatch):
     (data / "list").write_bytes(b"data/a.bvh\r\n\ndata/b/walk9.npz\n")
     zeros = io.TextIOWrapper(io.BytesIO(b"data/b/walk10.npz\0data/a.bvh\0"))

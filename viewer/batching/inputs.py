@@ -12,12 +12,15 @@ from pathlib import Path
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.formats import FORMATS, SUFFIXES
-from viewer.phrases import counted, printable
+from viewer.formats._smpl.published import published_names
+from viewer.phrases import counted, listed, printable
 
 __all__ = ["Inputs", "find_inputs", "is_recording", "natural_key"]
 
 _AMBIGUOUS = (".txt", ".json")  # usually notes and settings, not poses
 _WILD = re.compile(r"[*?[]")
+# Files next to the motions of AMASS, in its first and second release.
+_SHAPE_FILES = re.compile(r"shape\.npz|.*_stagei\.npz")
 _DIGITS = re.compile(r"[0-9]+")
 
 
@@ -114,8 +117,10 @@ def is_recording(folder: str | Path) -> bool:
         names = os.listdir(folder)
     except OSError:
         return False
-    if any(not {*kind.files}.isdisjoint(names) for kind in FORMATS.values()):
-        return True
+    kinds = [key for key, kind in FORMATS.items() if not {*kind.files}.isdisjoint(names)]
+    if kinds:
+        # Folders of body models often have a subfolder "smpl", as recordings do.
+        return kinds != ["easymocap"] or not published_names(Path(folder))
     frames = [name for name in names if not name.startswith(".")]
     return bool(frames) and all(re.fullmatch(r"\d+\.json", name) for name in frames)
 
@@ -131,6 +136,7 @@ class _Search:
         self._folders: set[str] = set()
         self._n_repeated = 0
         self._n_skipped = self._n_outputs = 0
+        self._without_motion: dict[str, int] = {}  # number of files by name
 
     def add_named(self, path: str) -> None:
         """Add a file, or a folder and its contents."""
@@ -144,7 +150,7 @@ class _Search:
         self.roots.append(os.path.abspath(path))
         before = self._n_seen
         for each, is_folder in self._inside(path):
-            if not self._is_output(each):
+            if not self._is_output(each) and not self._is_shape(each):
                 self._add(each, is_folder)
         if self._n_seen == before:
             raise ViewerError(
@@ -164,7 +170,8 @@ class _Search:
         before = self._n_seen
         for path in glob.iglob(pattern, recursive=True):
             is_folder = os.path.isdir(path)
-            if (not is_folder or self._is_input(path)) and not self._is_output(path):
+            is_input = self._is_input(path) if is_folder else not self._is_shape(path)
+            if is_input and not self._is_output(path):
                 self._add(path, is_folder)
         if self._n_seen == before:
             raise ViewerError(f"{printable(pattern, 300)}: no file matches this pattern")
@@ -177,6 +184,10 @@ class _Search:
         if self._n_skipped:
             text = counted(self._n_skipped, "file")
             notes.append(f"{text} in folders skipped: unknown suffix")
+        if self._without_motion:
+            text = counted(sum(self._without_motion.values()), "file")
+            names = listed([printable(name, 60) for name in sorted(self._without_motion)])
+            notes.append(f"{text} of AMASS without a motion skipped: {names}")
         if self._n_outputs:
             notes.append(f"{counted(self._n_outputs, 'file')} in the folder of the outputs omitted")
         paths = sorted(self._found.values(), key=natural_key)
@@ -192,6 +203,14 @@ class _Search:
             return False
         found = f"{os.path.abspath(path)}{os.sep}".startswith(f"{self.output}{os.sep}")
         self._n_outputs += found
+        return found
+
+    def _is_shape(self, path: str) -> bool:
+        """Return whether a file of AMASS has the shape of a subject, but no motion; count it."""
+        name = os.path.basename(path)
+        found = _SHAPE_FILES.fullmatch(name.lower()) is not None
+        if found:
+            self._without_motion[name] = self._without_motion.get(name, 0) + 1
         return found
 
     def _is_input(self, folder: str) -> bool:
