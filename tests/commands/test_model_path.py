@@ -55,8 +55,9 @@ def told(capsys, *arguments):
 def refused(capsys, *arguments, code=2):
     assert run([*arguments]) == code
     captured = capsys.readouterr()
-    assert captured.out == "" and captured.err.count("\n") == 1
-    return captured.err.removesuffix("\n")
+    lines = [line for line in captured.err.splitlines() if "the defaults are used" not in line]
+    assert captured.out == "" and len(lines) == 1
+    return lines[0]
 
 
 def test_folder_is_remembered(folder, settings, capsys):
@@ -164,10 +165,30 @@ def test_invalid_folder_name_is_refused(settings, capsys, name, shown):
     assert not settings.exists()
 
 
-def test_unwritable_settings_end_with_exit_code_5(folder, tmp_path, capsys):
+@pytest.mark.parametrize("command", ["info", "lint"])
+def test_folder_that_cannot_be_remembered_is_used(folder, tmp_path, capsys, command, monkeypatch):
+    monkeypatch.setattr(models, "_in_use", None)  # restored after the test
     (tmp_path / "settings").write_text("in the way")
-    line = refused(capsys, "info", "smplx", "--model-path", str(folder), code=5)
+    assert run([command, "smplx", "--model-path", str(folder)]) == 0
+    captured = capsys.readouterr()
+    text = f"warning: the model folder is used, but not remembered: {tmp_path / 'settings'}"
+    assert captured.err.startswith(text)
+    assert "SMPLX_NEUTRAL" in captured.out or command == "lint"
+
+
+def test_command_that_only_remembers_a_folder_fails(folder, tmp_path, capsys):
+    (tmp_path / "settings").write_text("in the way")
+    line = refused(capsys, "models", "--model-path", str(folder), code=5)
     assert line.startswith(f"viewer: {tmp_path / 'settings'}")
+
+
+def test_folder_of_models_is_not_a_recording(folder, capsys):
+    line = refused(capsys, "info", str(folder))
+    assert "found a folder of body models: name it with --model-path" in line
+    assert "smpl:female" in line and "smplx:neutral" in line
+    assert "smpl:neutral" in refused(capsys, "info", str(folder / "smpl"))
+    assert run(["batch", "info", str(folder), "--workers", "1"]) == 0
+    assert f"{len(FILES)} items" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -65,7 +65,8 @@ def test_fingers_and_face_keep_their_joints(tmp_path: Path) -> None:
 def test_other_poses_need_a_figure(tmp_path: Path, values: dict[str, Any]) -> None:
     with pytest.raises(RigError) as refused:
         opened(tmp_path, **values)
-    assert refused.value.diagnostic.key == "F004.pose-alone"
+    expected = "F004.shape-alone" if set(values) == {"betas"} else "F004.pose-alone"
+    assert refused.value.diagnostic.key == expected
 
 
 def test_poses_with_a_figure_are_applied_to_it(tmp_path: Path) -> None:

@@ -317,12 +317,17 @@ def finish(builder: Builder, scene: Scene) -> None:
     print_warnings(notes)
 
 
+def use_models(arguments: argparse.Namespace) -> None:
+    """Use the folder of body models of ``--model-path``, before any name is looked up in it."""
+    if arguments.model_path is not None:
+        from viewer.models import use_model_folder
+
+        print_warnings(filter(None, [use_model_folder(arguments.model_path)]))
+
+
 def begin_scene(arguments: argparse.Namespace) -> tuple[Scene, list[Builder]]:
     """Load enough for a first image, without posing the scene, and print warnings."""
-    if arguments.model_path is not None:
-        from viewer.models import save_model_folder
-
-        save_model_folder(arguments.model_path)
+    use_models(arguments)
     files = scene_files(arguments)
     settings = motion_settings(arguments)
     try:

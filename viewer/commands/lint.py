@@ -17,6 +17,7 @@ from viewer.commands._scene import (
     motion_settings,
     scene_files,
     size_limit,
+    use_models,
 )
 from viewer.commands._sequence.frame_numbers import rate
 from viewer.commands._usage import require_files
@@ -121,6 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
         frame_rate=arguments.fps,
         ground=arguments.ground,
     )
+    use_models(arguments)
     files = scene_files(arguments)
     with Progress("checking", 1) as progress:
 

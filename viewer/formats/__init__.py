@@ -287,6 +287,11 @@ def _detect_folder(source: Source) -> str:
     is_frames = any(name.lower().endswith(".json") for name in names)
     if is_frames or source.path.name in FORMATS["easymocap"].files:
         return "easymocap"
+    from viewer.formats._smpl.published import published_names
+
+    models = published_names(source.path)
+    if models:
+        raise source.fault("F002.model-folder", names=models)
     raise source.fault("F002.unknown-folder")
 
 

@@ -234,7 +234,9 @@ def _assign_pose(path: Path, record: PoseRecord, actors: list[Actor]) -> list[Di
                 return apply_pose(path, record, actor)
             except FormatError as found:
                 problem = problem or found
-    raise problem or RigError(Diagnostic("F004.pose-alone", path))
+    is_pose = record.dofs or record.parts or record.vector is not None
+    key = "F004.pose-alone" if is_pose or record.shape is None else "F004.shape-alone"
+    raise problem or RigError(Diagnostic(key, path))
 
 
 def _assign_picture(path: Path, pixels: Bytes, actors: list[Actor]) -> None:

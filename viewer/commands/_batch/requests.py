@@ -17,7 +17,7 @@ from viewer.commands._diff.inputs import input_files
 from viewer.commands._scene import parse_bytes
 from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
-from viewer.models import named_files, save_model_folder
+from viewer.models import named_files, use_model_folder
 from viewer.phrases import listed, printable
 from viewer.version import VERSION
 
@@ -40,12 +40,18 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         raise ViewerError(
             f"expected -o OUT, a folder or a template, found none ({name} writes files)"
         )
-    fixed = _fixed(arguments)
     command = _command_arguments(arguments)
+    remark = ""
+    if getattr(command, "model_path", None) is not None:
+        remark = use_model_folder(command.model_path)
+        if not remark:  # remembered: items need not name it again
+            command.model_path = None
+    fixed = _fixed(arguments)
     if arguments.resume and hasattr(command, "force"):
         # Outputs of items that the report does not list were written by a killed run.
         command.force = True
     paths, notes = _inputs(arguments)
+    notes += [remark] if remark else []
     request = Request(
         paths=paths,
         lists=arguments.from_list,
@@ -116,11 +122,7 @@ def _command_arguments(arguments: argparse.Namespace) -> argparse.Namespace:
     add_job_arguments(parser, arguments.job)
     names = {action.dest for action in parser._actions if action.dest != "help"}
     names |= parser._defaults.keys()
-    command = argparse.Namespace(**{name: getattr(arguments, name) for name in names})
-    if getattr(command, "model_path", None) is not None:
-        save_model_folder(command.model_path)  # saved once, not for each item
-        command.model_path = None
-    return command
+    return argparse.Namespace(**{name: getattr(arguments, name) for name in names})
 
 
 def _identity(job: str, command: argparse.Namespace, expected: Sequence[str]) -> str:

@@ -8,6 +8,8 @@ MESSAGES = {
     "F001.camera-images": "expected a folder of images for a camera ({names:list}), found none",
     "F001.camera-images-cameras": "images need calibrated cameras: intri.yml and extri.yml next to "
     "the recording, found none",
+    "F002.model-folder": "expected a recording, found a folder of body models: name it with "
+    "--model-path, and open one of {names:list12}",
     "F002.capture-frames": "expected frame files (smpl_full, smplfull, smpl, keypoints3d: "
     "000000.json …), found none",
     "F002.capture-people": "expected people, found none in {n:#frame}",

@@ -41,6 +41,7 @@ MESSAGES = {
     "F004.picture": "cannot apply the texture image: no texture coordinates in {figures:all}",
     "F004.picture-alone": "an image without a figure: open it together with a figure",
     "F004.pose": "cannot apply the pose: {figure:text} has no skeleton",
+    "F004.shape-alone": "the shape of a body without a motion: open it together with a body model",
     "F004.pose-alone": "a pose without a figure: open it together with a figure",
     "F004.skin": "expected weights and bindings for the {n} joints of {skeleton:text}, found none",
     # Notes

@@ -10,6 +10,7 @@ from dataclasses import field
 from pathlib import Path
 
 from viewer.data_classes import dataclass
+from viewer.formats._smpl.published import published_names
 from viewer.formats._source import Source
 from viewer.phrases import printable
 
@@ -93,6 +94,9 @@ def find_frames(source: Source) -> FrameFiles:
             names = _first_camera(source, folder, inside)
         found.append(names)
     if not any(found):
+        models = published_names(source.path)
+        if models:
+            raise source.fault("F002.model-folder", names=models)
         raise source.fault("F002.capture-frames")
     first = ((folder.path, names[0]) for folder, names in zip(folders, found, strict=True) if names)
     source.also_read += [(path / name).parent for path, name in first]

