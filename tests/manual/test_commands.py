@@ -33,7 +33,7 @@ NOT_RUN = {
 """Beginnings of lines that are not run, each with the reason; ``test_pages`` parses them."""
 
 OWN = {
-    "batches.md": {"walk.anim": None},
+    "batches.md": {"walk.anim": None, "scan.obj": None},
     "bodies.md": {"scan.obj": "anny"},
     "characters.md": {"scan.obj": "hero.glb"},
     "weights.md": {"submissions/eve.zip": None},
@@ -121,6 +121,25 @@ def test_command_runs(
     assert "no effect" not in printed.err
     new = {path.suffix for path in folder.rglob("*") if path not in before}
     assert {Path(output).suffix for output in outputs} <= new
+
+
+@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
+def test_python_examples_run_as_printed(
+    path: Path, files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    examples = blocks(path, "python")
+    if not examples:
+        return
+    folder = tmp_path / "work"
+    shutil.copytree(files, folder, copy_function=os.link)
+    monkeypatch.chdir(folder)
+    for name, source in OWN.get(path.name, {}).items():
+        if source is None:
+            (folder / name).unlink()
+    monkeypatch.setattr("viewer.app.window.show", lambda scene: None)  # no display is needed
+    names: dict[str, object] = {}
+    for example in examples:
+        exec(compile(example, path.name, "exec"), names)
 
 
 def words_of(line: str) -> list[str]:

@@ -66,17 +66,6 @@ def test_options_used_on_pages_exist(page: str, line: str) -> None:
     parser.parse_intermixed_args(words)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("path", PATHS, ids=lambda path: path.stem)
-def test_python_examples_run_as_printed(
-    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, object] = {}
-    for block in blocks(path, "python"):
-        exec(compile(block, path.name, "exec"), names)
-
-
 @pytest.mark.parametrize("topic", PAGES)
 def test_page_begins_with_its_title_and_fits_a_terminal(topic: str) -> None:
     text = page_text(topic)
