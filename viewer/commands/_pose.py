@@ -21,7 +21,7 @@ from viewer.rig.geometry.rotation import rotation_vector_to_matrix
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skeleton import clamp_dofs, dof_label, find_dof, joint_labels
-from viewer.rig.skinning import METHODS, Skinning
+from viewer.rig.skinning import METHODS, Skinning, file_method
 
 if TYPE_CHECKING:
     from viewer.rig.posing.pose_record import PoseRecord
@@ -65,16 +65,15 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--method",
         choices=METHODS,
-        default="lbs",
         help="; ".join(f"{key}: {method.title}" for key, method in METHODS.items())
-        + " (default: lbs)",
+        + " (default: as an FBX file states, else lbs)",
     )
     group.add_argument(
         "--blend-factor",
         type=number,
-        default=0.5,
         metavar="F",
-        help="blend factor of dual quaternions with --method mix, 0 to 1 (default: 0.5)",
+        help="blend factor of dual quaternions with --method mix, 0 to 1 (default: that of each "
+        "vertex if an FBX file states them, else 0.5)",
     )
     group.add_argument(
         "--influences",
@@ -90,18 +89,28 @@ def add_skinning_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def skinning_of(arguments: argparse.Namespace) -> Skinning:
-    """Return the requested skinning."""
-    if not 0.0 <= arguments.blend_factor <= 1.0:
-        raise ViewerError(f"--blend-factor: expected 0 to 1, found {arguments.blend_factor:g}")
+    """Return the requested skinning; see also ``use_file_method``."""
+    factor = 0.5 if arguments.blend_factor is None else arguments.blend_factor
+    if not 0.0 <= factor <= 1.0:
+        raise ViewerError(f"--blend-factor: expected 0 to 1, found {factor:g}")
     if arguments.influences < 0:
         raise ViewerError(f"--influences: expected 0 or more, found {arguments.influences}")
     return Skinning(
-        method=arguments.method,
-        blend_factor=arguments.blend_factor,
+        method=arguments.method or "lbs",
+        blend_factor=factor,
         max_influences=arguments.influences,
         normalize=arguments.normalize,
         correctives=not arguments.no_correctives,
     )
+
+
+def use_file_method(arguments: argparse.Namespace, scene: Scene, skinning: Skinning) -> None:
+    """Set the method that the files of a scene ask for, unless options state another."""
+    method, factor = file_method(actor.figure for actor in scene.actors)
+    if arguments.method is None:
+        skinning.method = method
+    if arguments.blend_factor is None and skinning.method == method:
+        skinning.blend_factor = factor
 
 
 def apply_pose(scene: Scene, arguments: argparse.Namespace) -> list[str | Diagnostic]:

@@ -14,6 +14,7 @@ from viewer.commands._pose import (
     add_pose_arguments,
     add_skinning_arguments,
     skinning_of,
+    use_file_method,
 )
 from viewer.commands._progress import shown_progress
 from viewer.commands._scene import (
@@ -113,6 +114,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _converted(arguments: argparse.Namespace, output: Path, skinning: Skinning) -> list[Diagnostic]:
     """Open all files, and write what is requested; return the notes."""
     scene = open_scene(arguments)
+    use_file_method(arguments, scene, skinning)
     baked = bake_springs(arguments, scene, output)
     write = _write_motions if is_motion(arguments, output, scene) else _write_poses
     if writes_keys(arguments, output, scene):

@@ -10,7 +10,7 @@ import numpy as np
 
 from viewer.commands._info.body_models import describe_model, model_lines
 from viewer.commands._info.materials import describe_surface, surface_words
-from viewer.commands._pose import add_skinning_arguments, skinning_of
+from viewer.commands._pose import add_skinning_arguments, skinning_of, use_file_method
 from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
@@ -54,6 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     require_files(arguments, "info")
     skinning = skinning_of(arguments)
     scene = open_scene(arguments)
+    use_file_method(arguments, scene, skinning)
     found = describe(scene, skinning)
     note_values(found)
     if arguments.json:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from viewer.commands._cleanup import add_cleanup_arguments
 from viewer.commands._output import PICTURES, inputs_of
-from viewer.commands._pose import add_pose_arguments, add_skinning_arguments
+from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, use_file_method
 from viewer.commands._scalar import choose_subject, scalar_text
 from viewer.commands._scene import (
     add_capture_arguments,
@@ -100,6 +100,7 @@ def run(arguments: argparse.Namespace) -> int:
     if options.background == "transparent" and output.suffix.lower() in _OPAQUE:
         print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(arguments)
+    use_file_method(arguments, scene, options.skinning)
     hide_parts(arguments, scene, options)
     set_opacity(arguments, scene)
     print_warnings(choose_subject(scene, options))

@@ -9,7 +9,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from viewer.commands._cleanup import add_cleanup_arguments, clean_up_of
 from viewer.commands._numbers import number
-from viewer.commands._pose import add_pose_arguments, add_skinning_arguments, apply_pose
+from viewer.commands._pose import (
+    add_pose_arguments,
+    add_skinning_arguments,
+    apply_pose,
+    use_file_method,
+)
 from viewer.commands._scene import (
     add_capture_arguments,
     add_file_arguments,
@@ -143,6 +148,7 @@ def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
             finish(builder, scene)  # determines who is present at that time
     clean(scene, changes)
     print_warnings(apply_pose(scene, arguments))
+    use_file_method(arguments, scene, options.skinning)
     hide_parts(arguments, scene, options)
     set_opacity(arguments, scene)
     print_warnings(warn_of_missing(scene, options) + follow_notes(arguments, scene))

@@ -51,12 +51,16 @@ class Skin:
         Weights as stored: not sorted, not normalised, possibly 0.
     inverse_bind : (J, 4, 4)
         Bind-space-to-joint matrices.
+    dqs_fractions : (V,) or None
+        The fraction of dual quaternion skinning that the file asks for at each vertex, the rest is
+        linear; None for linear blend skinning.
     """
 
     starts: Ints
     joints: Ints
     weights: Floats
     inverse_bind: Floats
+    dqs_fractions: Floats | None = None
 
     def __post_init__(self) -> None:
         def put(name: str, shape: tuple[int | None, ...], dtype: type = np.float64) -> None:
@@ -66,6 +70,8 @@ class Skin:
         put("joints", (None,), np.int32)
         put("weights", (len(self.joints),))
         put("inverse_bind", (None, 4, 4))
+        if self.dqs_fractions is not None:
+            put("dqs_fractions", (len(self.starts) - 1,))
         counts = np.diff(self.starts)
         if len(self.starts) == 0 or self.starts[0] != 0 or (counts < 0).any():
             raise RigError("starts: expected indices that begin at 0 and never decrease")
@@ -200,7 +206,9 @@ def skin_rows(skin: Skin, vertices: Ints) -> Skin:
     counts = np.diff(skin.starts)[vertices]
     starts = np.concatenate([[0], np.cumsum(counts)])
     index = np.repeat(skin.starts[vertices] - starts[:-1], counts) + np.arange(starts[-1])
-    return Skin(starts.astype(np.int32), skin.joints[index], skin.weights[index], skin.inverse_bind)
+    fractions = None if skin.dqs_fractions is None else skin.dqs_fractions[vertices]
+    chosen = skin.joints[index], skin.weights[index], skin.inverse_bind, fractions
+    return Skin(starts.astype(np.int32), *chosen)
 
 
 def row_norms(n_vertices: int, vertices: Ints, joints: Ints, weights: Floats) -> Floats:
@@ -262,6 +270,7 @@ def limit_influences(skin: Skin, count: int) -> Skin:
         joints=ordered.joints[kept],
         weights=ordered.weights[kept],
         inverse_bind=skin.inverse_bind,
+        dqs_fractions=skin.dqs_fractions,
     )
     return normalized(pruned)
 
@@ -281,9 +290,10 @@ def merged(skin: Skin) -> Skin:
         return skin
     weights = np.bincount(inverse, skin.weights).astype(np.float64, copy=False)
     joints = (unique % skin.n_joints).astype(np.int32)
-    return skin_from_entries(
+    found = skin_from_entries(
         skin.n_vertices, unique // skin.n_joints, joints, weights, skin.inverse_bind
     )
+    return replace(found, dqs_fractions=skin.dqs_fractions)
 
 
 def owners(skin: Skin) -> Ints:

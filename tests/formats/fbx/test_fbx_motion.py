@@ -16,6 +16,7 @@ from viewer.formats._fbx.contents import target_weights
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Actor
+from viewer.rig.skinning import Skinning, file_method
 
 pytestmark = pytest.mark.skipif(find_spec("ufbx") is None, reason="ufbx is not installed")
 
@@ -205,3 +206,30 @@ def test_cameras_look_along_x_of_their_node(tmp_path: Path) -> None:
     point = view.rotation @ [-2.0, 2.0, 2.0] + view.translation
     assert_allclose(point, [2.0, -1.0, 3.0], atol=1e-12)
     assert scene.actors[0].figure.require_skeleton().names == ("RootNode", "low", "high", "Shot")
+
+
+def skinned_by(kind: str, more: str = "") -> dict[str, str]:
+    old = 'Deformer: 40, "Deformer::Skin", "Skin" { Version: 101 }'
+    return {old: old.replace("101 }", f'101\n        SkinningType: "{kind}"\n{more} }}')}
+
+
+def test_skins_are_deformed_by_the_method_of_the_file(tmp_path: Path) -> None:
+    (actor,) = viewer.load(write_strip(tmp_path, edits=skinned_by("DualQuaternion"))).actors
+    assert file_method([actor.figure]) == ("dqs", 0.5)
+    (actor,) = viewer.load(write_strip(tmp_path)).actors
+    assert file_method([actor.figure]) == ("lbs", 0.5)
+
+
+def test_methods_are_blended_by_the_fraction_of_each_vertex(tmp_path: Path) -> None:
+    # Vertices 2 and 3, (1, 1) and (0, 1), are halfway between both joints.
+    stated = "Indexes: *2 { a: 2,3 }\nBlendWeights: *2 { a: 0.25,1 }"
+    (actor,) = viewer.load(write_strip(tmp_path, edits=skinned_by("Blend", stated))).actors
+    assert file_method([actor.figure]) == ("mix", None)
+    posed(actor, 1.0)
+    found = viewer.deform(actor.figure, actor.pose, Skinning("mix", blend_factor=None))[0]
+    rest = actor.figure.require_mesh().positions
+    knee = found[(rest == [1.0, 1.0, 0.0]).all(axis=1)][0] - [0.0, 1.0, 0.0]
+    # The blend shape is full: (1.5, 0) from the joint, which rotates by 90 degrees. LBS averages
+    # with (0, 1.5); DQS rotates by 45 degrees.
+    linear, dual = np.array([0.75, 0.75, 0.0]), np.array([1.5, 1.5, 0.0]) / np.sqrt(2.0)
+    assert_allclose(knee, 0.75 * linear + 0.25 * dual, atol=1e-6)

@@ -23,6 +23,7 @@ from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import rest_pose
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skin import has_influence, skin_from_lists
+from viewer.rig.skinning import Skinning
 from viewer.rig.skinning.lbs import blended_matrices
 
 POSITION_TOLERANCE = 1e-5  # relative to the figure's size
@@ -384,3 +385,17 @@ def test_removed_actors_are_freed(ctx, monkeypatch):
     drawing.draw()
     assert released == [gone]
     drawing.release()
+
+
+def test_methods_blended_per_vertex_match_the_reference(ctx) -> None:
+    rng = np.random.default_rng(5)
+    figure = random_figure(rng, 12)
+    fractions = rng.uniform(size=figure.skin.n_vertices)
+    figure = replace(figure, skin=replace(figure.skin, dqs_fractions=fractions))
+    mesh, how = posed_mesh(ctx, figure), Skinning("mix", blend_factor=None)
+    pose = random_pose(figure.skeleton, rng)
+    mesh.update(pose, how)
+    size = box_size(bounding_box(figure.mesh.positions))
+    wanted, _ = viewer.deform(figure, pose, how)
+    assert np.abs(mesh.read()[0] - wanted).max() <= POSITION_TOLERANCE * size
+    release(mesh)

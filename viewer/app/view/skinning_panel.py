@@ -34,6 +34,7 @@ def draw(state: AppState) -> None:
         )
         return
     _draw_method(state, skinning)
+    _draw_stated(state, figure, skinning)
     imgui.separator()
     _draw_influences(state, figure, skinning)
     if figure.correctives is not None:
@@ -54,11 +55,22 @@ def _draw_method(state: AppState, skinning: Skinning) -> None:
             _draw_blend_factor(state, skinning, key, method.ends)
 
 
+def _draw_stated(state: AppState, figure: Figure, skinning: Skinning) -> None:
+    """Draw a checkbox for the fraction of DQS that the file states at each vertex."""
+    if figure.require_skin().dqs_fractions is None:
+        return
+    is_stated = skinning.method == "mix" and skinning.blend_factor is None
+    if checkbox(state, "Fractions of the file", is_stated) != is_stated:
+        skinning.method, skinning.blend_factor = "mix", 0.5 if is_stated else None
+
+
 def _draw_blend_factor(
     state: AppState, skinning: Skinning, key: str, ends: tuple[str, ...]
 ) -> None:
     """Draw the blend factor of a method between two others; moving it selects the method."""
-    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(skinning.method, skinning.blend_factor)
+    shown = dict(zip(ends, (0.0, 1.0), strict=True)).get(
+        skinning.method, 0.5 if skinning.blend_factor is None else skinning.blend_factor
+    )
     factor = slider(state, f"{METHODS[ends[1]].short} fraction", shown, 0.0, 1.0, flags=_CLAMP)
     if factor != shown:
         skinning.method, skinning.blend_factor = key, factor

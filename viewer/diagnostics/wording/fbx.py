@@ -18,8 +18,6 @@ MESSAGES = {
     "keys {n:?is|are} held after 20000 frames",
     "F007.fbx-skins": "mesh {mesh:quoted}: only the first of {n} skin deformers is used",
     "F007.fbx-no-bone": "mesh {mesh:quoted}: {n:#skin cluster} without a joint ignored",
-    "F007.fbx-mixed": "mesh {mesh:quoted} blends both skinning methods per vertex: shown with a "
-    "single blend factor of {mean:.2f} everywhere (file: {low:.2f} to {high:.2f})",
     "F007.fbx-color-sets": "mesh {mesh:quoted}: only the first of {n} colour sets is used",
     "F007.fbx-opacity": "material {material:quoted}: the opacity texture {texture:quoted} is not "
     "used, only the alpha of the colour texture",

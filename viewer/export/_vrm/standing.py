@@ -23,7 +23,6 @@ from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.pose import Pose, joint_rotations, local_matrices, rest_pose
 from viewer.rig.shape import shaped
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.skin import Skin
 from viewer.rig.units import METRES
 
 __all__ = ["facing_front", "in_t_pose", "standing", "unit_rotation", "vrm_axes"]
@@ -163,7 +162,7 @@ def _moved_mesh(figure: Figure, matrix: Floats, scale: float) -> Figure:
     if skin is None:
         return replace(figure, mesh=turned)
     bound = np.diag([scale, scale, scale, 1.0]) @ skin.inverse_bind @ np.linalg.inv(matrix)
-    return replace(figure, mesh=turned, skin=Skin(skin.starts, skin.joints, skin.weights, bound))
+    return replace(figure, mesh=turned, skin=replace(skin, inverse_bind=bound))
 
 
 def in_t_pose(figure: Figure, bones: Mapping[str, int]) -> tuple[Figure, float]:

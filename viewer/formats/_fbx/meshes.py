@@ -155,6 +155,7 @@ def _primitive(
         colors=values.get("colors"),
         joints=None if influences is None else influences[0][vertices],
         weights=None if influences is None else influences[1][vertices],
+        dqs_fractions=_fractions(arrays, placed, vertices),
         material=material,
         targets=_targets([offsets @ linear.T for offsets, _ in targets]),
         normal_targets=_normal_targets([rows[vertices] for _, rows in targets], linear),
@@ -219,6 +220,18 @@ def _influences(arrays: Arrays, placed: Placed) -> tuple[Ints, Floats] | None:
     return joints, table
 
 
+def _fractions(arrays: Arrays, placed: Placed, chosen: Ints) -> Floats | None:
+    """Return the fraction of DQS of some vertices, if the skin blends both methods."""
+    skin = placed.told["skin"]
+    if skin is None or skin["method"] != "mix":
+        return None
+    get = _getter(arrays, f"{placed.prefix}.skin.blend")
+    fractions = np.zeros(len(arrays[f"{placed.prefix}.vertices"]))
+    fractions[get("vertices")] = np.clip(arrays[f"{placed.prefix}.skin.blend"], 0.0, 1.0)
+    found: Floats = fractions[chosen]
+    return found
+
+
 def _without_weights(arrays: Arrays, prefix: str) -> Ints:
     """Return the vertices that no joint moves: (M,)."""
     get = _getter(arrays, f"{prefix}.skin")
@@ -266,14 +279,6 @@ def skin_of(source: Source, arrays: Arrays, prefix: str, told: dict[str, Any]) -
     alone = len(_without_weights(arrays, prefix))
     if alone:
         source.warn("W004.mesh-node", mesh=told["name"], n=alone)
-    method, blend = told["skin"]["method"], get("blend")
-    if method == "mix":
-        values = blend if len(blend) else np.zeros(1)
-        source.warn(
-            "F007.fbx-mixed",
-            mesh=told["name"],
-            mean=float(values.mean()),
-            low=float(values.min()),
-            high=float(values.max()),
-        )
-    return NodeSkin(told["skin"]["name"], get("bones")[kept], get("matrices")[kept], method)
+    return NodeSkin(
+        told["skin"]["name"], get("bones")[kept], get("matrices")[kept], told["skin"]["method"]
+    )

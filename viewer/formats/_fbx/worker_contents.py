@@ -191,6 +191,7 @@ def _skin(kept: KeptScene, skin: Any, put: Any) -> dict[str, Any]:
     put("skin.vertices", np.concatenate([*vertices, np.zeros(0, np.int32)]))
     put("skin.weights", np.concatenate([*weights, np.zeros(0)]))
     put("skin.blend", _numbers(kept.get(skin, "dq_weights"), 1)[:, 0])
+    put("skin.blend.vertices", integers(kept.get(skin, "dq_vertices")))
     return {
         "name": str(kept.get(skin, "name")),
         "method": _METHODS[int(kept.get(skin, "skinning_method"))],

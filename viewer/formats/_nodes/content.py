@@ -105,6 +105,8 @@ class Primitive:
     joints, weights : (V, K) int32, (V, K) or None
         Influences of all sets in one table: indices into the skin's joints. Weights are as
         stored, unused slots are 0.
+    dqs_fractions : (V,) or None
+        Fraction of dual quaternion skinning of each vertex, for skins with the method ``"mix"``.
     material : int
         Index into ``NodeFile.materials``, -1 for none.
     targets : MorphTargets or None
@@ -125,6 +127,7 @@ class Primitive:
     colors: Floats | None = None
     joints: Ints | None = None
     weights: Floats | None = None
+    dqs_fractions: Floats | None = None
     material: int = -1
     targets: MorphTargets | None = None
     normal_targets: MorphTargets | None = None

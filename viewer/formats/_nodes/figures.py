@@ -96,7 +96,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Sou
         name=members.name or file.name,
         mesh=mesh_of(file, members.meshes, pieces) if pieces else None,
         skeleton=skeleton_of(joints, file.humanoid, file.constraints, file.springs),
-        skin=skin_of(pieces, matrices) if pieces else None,
+        skin=skin_of(file, pieces, matrices) if pieces else None,
         up=file.up,
         unit=file.unit,
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
@@ -174,14 +174,14 @@ def _note_others(file: NodeFile, shown: set[int], source: Source) -> None:
 
 
 def _note_methods(file: NodeFile, groups: list[Members], source: Source) -> None:
-    """Report skins that the file deforms by a method other than LBS, which the user selects."""
+    """Report skins that the file deforms by a method other than LBS."""
     used = (file.skins[skin] for members in groups for skin in members.skins)
     others: dict[str, list[str]] = {}
     for skin in used:
         if skin.method != "lbs":
             others.setdefault(skin.method, []).append(skin.name)
     for method, names in others.items():
-        source.warn("F007.skinning-method", names=names, method=method)
+        source.warn("F007.skinning-method", names=names, n=len(names), method=method)
 
 
 def _note_weights(pieces: list[Piece], source: Source) -> None:

@@ -253,12 +253,23 @@ def _filled(
     return np.concatenate(rows)
 
 
-def skin_of(pieces: list[Piece], inverse_bind: Floats) -> Skin:
+def skin_of(file: NodeFile, pieces: list[Piece], inverse_bind: Floats) -> Skin:
     """Return the skin of a figure."""
+    fractions = np.concatenate([_dqs_fractions(file, piece) for piece in pieces])
     counts = np.concatenate([piece.influences.counts for piece in pieces])
     return Skin(
         starts=np.concatenate([[0], np.cumsum(counts)]).astype(np.int32),
         joints=np.concatenate([piece.influences.joints for piece in pieces]),
         weights=np.concatenate([piece.influences.weights for piece in pieces]),
         inverse_bind=inverse_bind,
+        dqs_fractions=fractions if fractions.any() else None,
     )
+
+
+def _dqs_fractions(file: NodeFile, piece: Piece) -> Floats:
+    """Return the fraction of DQS at each vertex of a piece: (V,)."""
+    number = int(file.tree.skins[piece.node])
+    skin = file.skins[number] if number >= 0 and piece.primitive.joints is not None else None
+    if skin is not None and skin.method == "mix" and piece.primitive.dqs_fractions is not None:
+        return piece.primitive.dqs_fractions[piece.sources]
+    return np.full(piece.n_vertices, float(skin is not None and skin.method == "dqs"))

@@ -194,7 +194,7 @@ class InstanceBuffers:
         values = {
             "u_projection": as_uniform(view.projection),
             "u_orthographic": view.camera.is_parallel,
-            "u_blend_factor": self._how.blend_factor,
+            "u_blend_factor": -1.0 if self._how.blend_factor is None else self._how.blend_factor,
             "u_n_joints": self._n_joints,
             "u_n_offsets": self._offsets.n_listed,
             "u_n_sources": len(self.mesh.copies),

@@ -133,6 +133,7 @@ class RestBuffers:
             (rest.positions, "3f4", "in_position"),
             (rest.normals, "3f4", "in_normal"),
             (skin.bindings, "4u4", "in_bindings"),
+            (skin.fractions, "1f4", "in_dqs_fraction"),
         ]
         return [row for row in found if row[2] in program]
 

@@ -29,6 +29,8 @@ class SkinBuffers:
     ----------
     bindings : moderngl.Buffer
         One row per split vertex, see ``include/skinning.glsl``.
+    fractions : moderngl.Buffer
+        The skin's fraction of DQS at each split vertex.
     joint_fractions : (J,)
         Each joint's fraction of the sum of all weights, for the mean motion of the figure.
     """
@@ -58,6 +60,9 @@ class SkinBuffers:
         bindings[:, :2], bindings[:, 2] = ranges, sources
         bindings[:, 3] = excess.astype("f4").view("u4")
         self.bindings = keep(buffer(context, bindings, "u4"))
+        stated = None if skin is None else skin.dqs_fractions
+        fractions = np.zeros(len(sources)) if stated is None else stated[sources]
+        self.fractions = keep(buffer(context, fractions, "f4"))
 
     def release(self) -> None:
         """Free everything."""

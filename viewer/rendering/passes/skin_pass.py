@@ -139,7 +139,7 @@ class PosedMesh:
             "u_attached": attached,
             "u_rest_shift": tuple(self.mesh.center - self.center),
             "u_center": tuple(self.center),
-            "u_blend_factor": how.blend_factor,
+            "u_blend_factor": -1.0 if how.blend_factor is None else how.blend_factor,
             "u_n_offsets": self._rest.n_offsets if attached else 0,
             "u_n_sources": len(self.mesh.copies),
             "u_palette": _PALETTE_UNIT,

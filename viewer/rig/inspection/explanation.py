@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from viewer.data_classes import dataclass
@@ -152,6 +154,10 @@ def explain(figure: Figure, pose: Pose, skinning: Skinning, vertex: int) -> Expl
         raise RigError(f"figure {figure.name} has no skin attached to a skeleton")
     chosen = np.array([vertex], dtype=np.int32)
     check_vertices(figure, chosen)
+    if skinning.blend_factor is None:
+        stated = figure.require_skin().dqs_fractions
+        factor = 0.0 if stated is None else float(stated[vertex])
+        skinning = replace(skinning, blend_factor=factor)
     stored, figure = figure.require_mesh().positions[vertex], shaped(figure, pose.shape_weights)
     mesh, skeleton, skin = figure.attached()
     rest = rest_vertices(figure, pose, chosen, skinning.correctives)[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -30,6 +30,7 @@ __all__ = [
     "Skinning",
     "deform",
     "deform_frames",
+    "file_method",
     "joint_matrices",
     "skin_used",
     "skinned",
@@ -91,8 +92,9 @@ class Skinning:
     ----------
     method : str
         A key of ``METHODS``.
-    blend_factor : float
-        Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS.
+    blend_factor : float or None
+        Blend factor of methods between two others, 0 to 1; for ``"mix"``, the fraction of DQS. None
+        for the fractions that the file states for each vertex; see ``Skin.dqs_fractions``.
     max_influences : int
         Use only this many of the strongest influences, scaled to a sum of 1; 0 uses all as stored.
     normalize : bool
@@ -102,7 +104,7 @@ class Skinning:
     """
 
     method: str = "lbs"
-    blend_factor: float = 0.5
+    blend_factor: float | None = 0.5
     max_influences: int = 0
     normalize: bool = False
     correctives: bool = True
@@ -264,6 +266,21 @@ def joint_matrices(figure: Figure, pose: Pose) -> Floats:
     """
     skeleton = shaped_skeleton(figure, pose.shape_weights)
     return placement_matrix(pose) @ posed_skeleton(skeleton, pose).world
+
+
+def file_method(figures: Iterable[Figure]) -> tuple[str, float | None]:
+    """Return the method and blend factor of ``Skinning`` that the files of some figures ask for.
+
+    >>> file_method([])
+    ('lbs', 0.5)
+    """
+    skins = [each.skin for each in figures if each.skin is not None]
+    wanted = [np.zeros(1) if s.dqs_fractions is None else s.dqs_fractions for s in skins]
+    if not any(fractions.any() for fractions in wanted):
+        return "lbs", 0.5
+    if all((fractions == 1.0).all() for fractions in wanted):
+        return "dqs", 0.5
+    return "mix", None
 
 
 _varied: Memo[Skin, Skin] = Memo(kept=4)

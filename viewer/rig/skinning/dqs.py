@@ -29,7 +29,11 @@ _TINY = 1e-12  # minimum length of a blended quaternion that defines a rotation
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
+    positions: Floats,
+    normals: Floats,
+    skin: Skin,
+    palette: Floats,
+    blend_factor: float | None = 1.0,
 ) -> tuple[Floats, Floats]:
     """Stretch linearly, then move by the normalised weighted sum of unit dual quaternions.
 

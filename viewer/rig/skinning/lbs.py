@@ -20,7 +20,11 @@ _IDENTITY = np.eye(3, 4).reshape(12)
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 1.0
+    positions: Floats,
+    normals: Floats,
+    skin: Skin,
+    palette: Floats,
+    blend_factor: float | None = 1.0,
 ) -> tuple[Floats, Floats]:
     """Transform by blended matrices: v' = B [v 1], n' = unit(B [n 0]), with B = sum_i w_i M_i.
 

@@ -14,7 +14,11 @@ __all__ = ["deform"]
 
 
 def deform(
-    positions: Floats, normals: Floats, skin: Skin, palette: Floats, blend_factor: float = 0.5
+    positions: Floats,
+    normals: Floats,
+    skin: Skin,
+    palette: Floats,
+    blend_factor: float | None = 0.5,
 ) -> tuple[Floats, Floats]:
     """Interpolate each vertex: (1 - blend_factor) LBS + blend_factor DQS.
 
@@ -28,8 +32,8 @@ def deform(
         Influences of V vertices.
     palette : (J, 4, 4)
         Skinning matrices, bind to posed.
-    blend_factor : float
-        0 for LBS alone, 1 for DQS alone.
+    blend_factor : float or None
+        0 for LBS alone, 1 for DQS alone; None for the fractions of the skin at each vertex.
 
     Returns
     -------
@@ -38,16 +42,22 @@ def deform(
     normals : (V, 3)
         Unit length.
     """
+    factor: Floats | float
+    if blend_factor is not None:
+        factor = float(blend_factor)
+    elif skin.dqs_fractions is None:
+        factor = 0.0
+    else:
+        factor = skin.dqs_fractions[:, None]
     linear = lbs.deform(positions, normals, skin, palette)
     dual = dqs.deform(positions, normals, skin, palette)
-    moved, rotated = (
-        (1.0 - blend_factor) * a + blend_factor * b for a, b in zip(linear, dual, strict=True)
-    )
+    moved, rotated = ((1.0 - factor) * a + factor * b for a, b in zip(linear, dual, strict=True))
     affine = np.flatnonzero(~rigid_vertices(skin, palette)).astype(np.int32)
     if len(affine):
         # Interpolated normals would not be perpendicular to the interpolated surface.
         own = skin_rows(skin, affine)
-        maps = (1.0 - blend_factor) * lbs.blended_matrices(own, palette)[:, :, :3]
-        maps += blend_factor * dqs.linear_maps(own, palette)
+        of_maps = factor if isinstance(factor, float) else factor[affine, :, None]
+        maps = (1.0 - of_maps) * lbs.blended_matrices(own, palette)[:, :, :3]
+        maps += of_maps * dqs.linear_maps(own, palette)
         rotated[affine] = inverse_transposed(np.moveaxis(maps, 0, -1), normals[affine])
     return moved, unit(rotated)
