@@ -152,6 +152,19 @@ def test_interrupted_import_prints_one_line(end, module):
     assert end(moment, INT, *command, **places, imports=True) == (*ENDINGS[INT], OLD)
 
 
+@pytest.mark.parametrize(
+    ("number", "ending"),
+    [(TERM, ENDINGS[TERM]), (signal.SIGHUP, (129, b"viewer: hung up\n"))],
+    ids=["term", "hup"],
+)
+@pytest.mark.parametrize("module", ["viewer.interrupts", "enum"])
+def test_signal_before_the_first_import_is_not_lost(end, number, ending, module):
+    """``enum`` is imported by the module ``signal``, which installs handlers."""
+    command, places = PNG
+    moment = f"sys.modules.pop({module!r}, None)\nsys.meta_path.insert(0, At({module!r}))"
+    assert end(moment, number, *command, **places, imports=True) == (*ending, OLD)
+
+
 @BOTH
 @pytest.mark.parametrize("helper", ["make_attribute", "make_uniform", "make_varying"])
 @pytest.mark.parametrize("kind", [PNG, MP4], ids=["png", "mp4"])

@@ -11,16 +11,42 @@ _SPIN = ("OPENBLAS_THREAD_TIMEOUT", "20")
 
 def main() -> int:
     """Run the command line and return its exit code."""
+    try:
+        received = _record_signals()
+        return _run(received)
+    except KeyboardInterrupt:  # before the first statement above had its effect
+        sys.stderr.write("viewer: interrupted\n")
+        return 130
+
+
+def _record_signals() -> list[int]:
+    """Record signals from now on, in the list that is returned.
+
+    Until then a signal ends Python itself: without a word, or with a traceback of its imports. So
+    nothing may be imported here: the module ``signal`` takes longer than all of Python's start.
+    """
+    import _signal  # type: ignore[import-not-found]
+
+    received = list[int]()
+
+    def record(number: int, _: object) -> None:
+        received.append(number)
+
+    for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+        number = getattr(_signal, name, None)
+        # As in ``viewer.interrupts``: nohup and shells ignore signals for background jobs.
+        if number is not None and _signal.getsignal(number) not in (_signal.SIG_IGN, None):
+            _signal.signal(number, record)
+    return received
+
+
+def _run(received: list[int]) -> int:
     # Garbage collection during imports would find nothing; ``run`` resumes it.
     gc.disable()
     os.environ.setdefault(*_SPIN)
-    try:
-        from viewer.interrupts import watch_program
+    from viewer.interrupts import watch_program
 
-        watch_program()
-    except KeyboardInterrupt:  # the handlers are not installed yet
-        sys.stderr.write("viewer: interrupted\n")
-        return 130
+    watch_program(received)
     from viewer.cli import run
 
     return run(sys.argv[1:])

@@ -34,7 +34,7 @@ from contextlib import contextmanager
 # As in ``viewer/__init__.py``: every import here delays the installation of signal handlers.
 TYPE_CHECKING = False
 if TYPE_CHECKING:
-    from collections.abc import Iterator
+    from collections.abc import Iterator, Sequence
     from sys import UnraisableHookArgs
     from types import FrameType
     from typing import Any
@@ -198,14 +198,22 @@ def watched() -> Iterator[None]:
         _current = None
 
 
-def watch_program() -> None:
-    """Record signals until the process ends; they raise where they are ``watched``."""
+def watch_program(received: Sequence[int] = ()) -> None:
+    """Record signals until the process ends; they raise where they are ``watched``.
+
+    Parameters
+    ----------
+    received : sequence of int
+        Signals recorded before; others may be appended until the handlers are installed.
+    """
     global _current
     watch = _current = _Watch(is_held=True, owns_process=True)
     # Registered first, so it runs last: Python resets handlers soon after, which would let a signal
     # kill a process whose work is done.
     atexit.register(watch.ignore)
     watch.start()
+    if received and not watch.number:
+        watch.number, watch._since = received[0], time.monotonic()
 
 
 @contextmanager
