@@ -232,3 +232,31 @@ def test_bundled_figures_are_models_by_name(tmp_path, capsys, name):
 def test_option_without_a_body_is_reported(tmp_path, capsys):
     assert run(["info", "fox", "--gender", "male"]) == 0
     assert "--gender male has no effect" in capsys.readouterr().err
+
+
+def test_single_poses_have_their_model_too(models, tmp_path):
+    add_model(models, "smpl", "MALE")
+    pose, shape = tmp_path / "pose.json", np.array([1.5, -1.0])
+    values = {"poses": [0.0] * 72, "betas": shape.tolist(), "gender": "m"}
+    pose.write_text(json.dumps(values))
+    (actor,) = viewer.load(pose).actors
+    assert actor.figure.name == "SMPL_MALE"
+    assert shown_thigh(actor) == pytest.approx(thigh("smpl", "MALE", shape), abs=1e-6)
+    female = add_model(tmp_path, "smpl", "FEMALE")
+    keys = [found.key for found in viewer.load(pose, female).diagnostics]
+    assert "C019.gender" in keys
+    other = add_model(tmp_path, "smplx", "MALE")
+    pose.write_text(json.dumps({"betas": [1.0], "model": "smplh"}))
+    scene = viewer.load(other, pose)
+    assert "C019.model" in [found.key for found in scene.diagnostics]
+    assert not scene.actors[0].pose.shape_weights.any()
+
+
+def test_recordings_without_a_model_of_their_own_use_the_model_folder(models, tmp_path):
+    add_model(models, "smpl", "MALE")
+    person = {"id": 0, "Rh": [[0.0] * 3], "Th": [[0.0] * 3], "poses": [[0.0] * 72]}
+    folder = tmp_path / "take" / "smpl"
+    folder.mkdir(parents=True)
+    (folder / "000000.json").write_text(json.dumps([person | {"shapes": [[0.0] * 10]}]))
+    (actor,) = viewer.load(tmp_path / "take", motion=MotionSettings(gender="male")).actors
+    assert actor.figure.name == "SMPL_MALE" and actor.shape_space.gender == "male"

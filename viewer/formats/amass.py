@@ -28,7 +28,14 @@ from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
-from viewer.rig.smpl_family import FAMILY, ShapeSpace, gender_of, members_by_numbers, model_title
+from viewer.rig.smpl_family import (
+    FAMILY,
+    ShapeSpace,
+    gender_of,
+    members_by_numbers,
+    model_of_joints,
+    model_title,
+)
 
 __all__ = ["has_frames", "read"]
 
@@ -40,7 +47,6 @@ _EXPRESSIONS = ("expressions", "expression")
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 _BODY = members_by_numbers()[66]
 _SMPL, _SMPLX = FAMILY[24].names, FAMILY[55].names
-_FACE = _SMPLX[22:25]
 _MODELS = ("surface_model_type", "model_type", "model")
 # Keys of parts and, by number of columns, the joints that they rotate.
 _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
@@ -386,8 +392,4 @@ def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> Sh
         title = model_title(archive.plain_text(key))
         if title:
             return ShapeSpace(title, gender)
-    own = set(names)
-    fitting = [member.title for member in FAMILY.values() if set(member.names) == own]
-    if not fitting and own & set(_FACE):
-        fitting = ["SMPL-X"]
-    return ShapeSpace(fitting[0] if fitting else "", gender)
+    return ShapeSpace(model_of_joints(names), gender)

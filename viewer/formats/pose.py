@@ -49,6 +49,7 @@ from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
+from viewer.rig.smpl_family import ShapeSpace, gender_of, model_title
 
 __all__ = ["pose_error", "pose_text", "read", "write"]
 
@@ -68,6 +69,7 @@ _BESIDES = (
     "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
+_MODELS = ("surface_model_type", "model_type", "model")
 _NOT_NEEDED = _BESIDES.split()  # keys in pose and motion files that are not needed for a pose
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
@@ -112,6 +114,9 @@ def _archive_values(source: Source) -> NamedValues:
     for key in set(wanted).intersection(archive.keys):
         value = archive.get(key)
         values[key] = value.values() if isinstance(value, Deferred) else value
+    for key in ("gender", *_MODELS):
+        if key in values:
+            values[key] = archive.plain_text(key)
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
         both = NamedValues(source, {"dof_names": names, "dofs": dofs})
@@ -152,6 +157,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
         joint_rotations=read_rotations(named),
+        shape_space=_shape_space(named.values),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -160,6 +166,12 @@ def _from_values(named: NamedValues) -> PoseRecord:
         )
     _check_keys(named, record)
     return record
+
+
+def _shape_space(values: Mapping[str, Any]) -> ShapeSpace:
+    texts = {key: text for key, text in values.items() if isinstance(text, str)}
+    titles = (model_title(texts.get(key, "")) for key in _MODELS)
+    return ShapeSpace(next(filter(None, titles), ""), gender_of(texts.get("gender", "")))
 
 
 def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:

@@ -10,6 +10,7 @@ from viewer.errors import RigError
 from viewer.formats.pose import pose_error
 from viewer.loading.contents import Contents
 from viewer.loading.texturing import with_texture
+from viewer.rig.coefficients import space_misfit
 from viewer.rig.pose import Pose
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
@@ -68,7 +69,13 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]
     """
     assert actor.pose is not None  # checked by the callers
     try:
+        misfit = space_misfit(record.shape_space, actor.figure)
+        if misfit is not None and misfit.key == "C019.model":
+            has_shape = record.shape is not None and record.shape.any()
+            misfit = misfit if has_shape else None
+            record = replace(record, shape=None, expression=None)
         notes = apply_record(record, actor.figure, actor.pose, drop_excess=True)
+        notes += [] if misfit is None else [misfit]
         return [replace(note, path=path) for note in notes]
     except RigError as problem:
         raise pose_error(path, record, problem) from None

@@ -216,6 +216,8 @@ class Builder:
         if not self.keeps_shape:
             motion = replace(motion, shape=None, expression=None)
         space = motion.shape_space
+        space = replace(space, model=space.model or self.capture.model)
+        motion = replace(motion, shape_space=space)
         model, said = (self.model, ()) if self.model_of is None else self.model_of(space)
         clip, notes = body_clip(motion, model)
         notes = [*said, *notes, *self._add_driven(person, model, clip, new)]

@@ -15,7 +15,7 @@ from viewer.rig.arrays import Floats
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import Timing
 from viewer.rig.posing.pose_record import PARTS, PoseRecord
-from viewer.rig.smpl_family import FAMILY, members_by_numbers
+from viewer.rig.smpl_family import FAMILY, members_by_numbers, model_of_joints
 
 __all__ = ["with_bodies"]
 
@@ -56,6 +56,7 @@ def _motion(path: Path, record: PoseRecord) -> BodyMotion | None:
     if joints is None or record.scale not in (None, 1.0):
         return None
     names, vectors = joints
+    space = record.shape_space
     hands: dict[str, Floats] = {}
     for part, side in _HANDS.items():
         numbers = record.parts.get(part)
@@ -78,6 +79,7 @@ def _motion(path: Path, record: PoseRecord) -> BodyMotion | None:
         expression=None if record.expression is None else record.expression[None],
         hands=hands,
         flat_hands=bool(record.flat_hands),
+        shape_space=replace(space, model=space.model or model_of_joints(names)),
     )
 
 

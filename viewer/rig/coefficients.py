@@ -9,8 +9,9 @@ from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.pose import Pose
+from viewer.rig.smpl_family import ShapeSpace
 
-__all__ = ["apply_coefficients", "unused_coefficients"]
+__all__ = ["apply_coefficients", "space_misfit", "unused_coefficients"]
 
 _MOST_SIGMA = 1e6  # largest plausible coefficient, standard deviations
 
@@ -42,6 +43,21 @@ def unused_coefficients(group: str, values: Floats, used: int, name: str) -> lis
     }
     key = "F007.coefficients-left-out" if count > used + 1 else "F007.coefficient-left-out"
     return [Diagnostic(key, values=values_shown)]
+
+
+def space_misfit(space: ShapeSpace, figure: Figure) -> Diagnostic | None:
+    """Return a warning about a body of another model or gender than a figure; None if it fits.
+
+    ``C019.model``: the coefficients must not be applied, because they are weights of other
+    directions. ``C019.gender``: they may be, because the only model at hand may be the neutral one.
+    """
+    own = figure.shape_space
+    values = {"figure": figure.name, "own": own.title, "other": space.title}
+    if not space.shares_coefficients(own):
+        return Diagnostic("C019.model", values=values)
+    if own.gender and space.gender and own.gender != space.gender:
+        return Diagnostic("C019.gender", values=values)
+    return None
 
 
 def apply_coefficients(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from viewer.data_classes import dataclass
 
 __all__ = [
@@ -12,6 +14,7 @@ __all__ = [
     "gender_of",
     "member_of",
     "members_by_numbers",
+    "model_of_joints",
     "model_title",
 ]
 
@@ -90,6 +93,16 @@ def model_title(text: str) -> str:
     """
     word = text.strip().lower().replace("-", "").replace("+", "").partition("_")[0]
     return {"smpl": "SMPL", "smplh": "SMPL+H", "smplx": "SMPL-X"}.get(word, "")
+
+
+def model_of_joints(names: Iterable[str]) -> str:
+    """Return the title of the member with these joints, in any order; empty if it is unclear.
+
+    Poses of SMPL-X may lack fingers, but no other body has a face.
+    """
+    own = set(names)
+    titles = [member.title for member in FAMILY.values() if set(member.names) == own]
+    return titles[0] if titles else "SMPL-X" if own & set(_FACE) and "pelvis" in own else ""
 
 
 def _hand(side: str) -> list[str]:

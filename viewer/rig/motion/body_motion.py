@@ -10,7 +10,7 @@ from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, freeze, frozen
-from viewer.rig.coefficients import unused_coefficients
+from viewer.rig.coefficients import space_misfit, unused_coefficients
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import multiply, rotation_vector_to_quaternion
 from viewer.rig.geometry.rotation import quaternion_to_matrix
@@ -166,21 +166,13 @@ def body_clip(motion: BodyMotion, figure: Figure) -> tuple[SampledClip, list[Dia
 
 
 def _in_space_of(motion: BodyMotion, figure: Figure) -> tuple[BodyMotion, list[Diagnostic]]:
-    """Return a motion without coefficients that mean nothing to a figure, and a message.
-
-    Those of another model are dropped: they are weights of other directions. Those of another
-    gender are kept, because the only model at hand may be the neutral one.
-    """
-    own, space = figure.shape_space, motion.shape_space
-    values = {"figure": figure.name, "own": own.title, "other": space.title}
-    if not space.shares_coefficients(own):
-        parts = (motion.shape, motion.expression)
-        is_lost = any(part is not None and part.any() for part in parts)
-        notes = [Diagnostic("C019.model", values=values)] if is_lost else []
-        return replace(motion, shape=None, expression=None), notes
-    if own.gender and space.gender and own.gender != space.gender:
-        return motion, [Diagnostic("C019.gender", values=values)]
-    return motion, []
+    """Return a motion without coefficients that mean nothing to a figure, and a message."""
+    misfit = space_misfit(motion.shape_space, figure)
+    if misfit is None or misfit.key == "C019.gender":
+        return motion, [misfit] if misfit else []
+    parts = (motion.shape, motion.expression)
+    is_lost = any(part is not None and part.any() for part in parts)
+    return replace(motion, shape=None, expression=None), [misfit] if is_lost else []
 
 
 def root_positions(figure: Figure, weights: Floats) -> Floats:

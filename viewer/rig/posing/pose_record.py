@@ -26,7 +26,7 @@ from viewer.rig.retargeting.pose_transfer import (
     rotate_joints,
 )
 from viewer.rig.skeleton import DOF_KINDS, Skeleton, clamp_dofs, dof_labels, find_dof
-from viewer.rig.smpl_family import members_by_numbers
+from viewer.rig.smpl_family import ShapeSpace, members_by_numbers
 
 __all__ = ["PARTS", "PosePartError", "PoseRecord", "apply_record", "record_of"]
 
@@ -73,6 +73,8 @@ class PoseRecord:
         Used by figures with different DOFs instead of the DOF values: joints with the same names
         get the same rotations; placement, size and shape are unchanged. Figures with the same DOFs
         use all other parts, except coefficients of blend shapes that they lack.
+    shape_space : ShapeSpace
+        Model and gender to which the shape coefficients belong, as stated by the file.
     line_of : callable or None
         Returns the line in the source file, given a part and the name of a DOF in it, as in
         ``PosePartError``.
@@ -88,6 +90,7 @@ class PoseRecord:
     flat_hands: bool | None = None
     hand_coefficients: bool | None = None
     joint_rotations: JointRotations | None = None
+    shape_space: ShapeSpace = ShapeSpace()
     line_of: Callable[[str, str], int | None] | None = None
 
 
