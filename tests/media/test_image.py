@@ -79,3 +79,23 @@ def test_images_share_a_limit_of_pixels(monkeypatch):
 def test_grey_images_with_16_bits_are_scaled(grey, byte):
     pixels = decode_picture(Path("a.png"), png(np.array([[grey]], np.uint16)))
     assert pixels.tolist() == [[[byte, byte, byte, 255]]]
+
+
+def test_large_images_need_large_files(monkeypatch):
+    """A file of one colour holds thousands of pixels per byte; decoding it took gigabytes."""
+    monkeypatch.setattr(image, "_FREE_PIXELS", 100)
+    flat = png(np.zeros((64, 64), np.uint8))
+    noisy = png(np.random.default_rng(0).integers(0, 256, (64, 64), np.uint8))
+    assert 16 * len(flat) + 100 < 64 * 64 < 16 * len(noisy) + 100
+    found = decode_pictures([(Path("a.png"), flat)])[0]
+    assert str(found).endswith(f"64 x 64 pixels are too many for {len(flat)} bytes")
+    assert decode_picture(Path("a.png"), noisy).shape == (64, 64, 4)
+
+
+@pytest.mark.parametrize("mode", ["RGBA", "RGB", "L", "LA", "P"])
+def test_every_mode_becomes_red_green_blue_and_opacity(mode):
+    stream = io.BytesIO()
+    Image.new("RGBA", (3, 2), (90, 90, 90, 255)).convert(mode).save(stream, "PNG")
+    pixels = decode_picture(Path("a.png"), stream.getvalue())
+    assert pixels.shape == (2, 3, 4) and not pixels.flags.writeable
+    assert np.abs(pixels.astype(int) - (90, 90, 90, 255)).max() <= (0 if mode != "P" else 30)
