@@ -104,6 +104,8 @@ class FileRecord:
         zeros for vertices without any; None if no vertex has one.
     unkept : callable
         Returns the members of the file that are not stored, such as ``images.extras``.
+    lost_nodes : tuple of str
+        Names of the nodes of the file that are neither joints, meshes nor cameras.
     vrm : VrmRecord or None
         Properties of a VRM character.
     has_skin : bool
@@ -121,5 +123,6 @@ class FileRecord:
     scene: Mapping[str, Any] = field(default_factory=dict)
     tangents: Callable[[], Floats | None] = lambda: None
     unkept: Callable[[], tuple[str, ...]] = tuple
+    lost_nodes: tuple[str, ...] = ()
     vrm: VrmRecord | None = None
     has_skin: bool = True

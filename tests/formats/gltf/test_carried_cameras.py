@@ -1,4 +1,4 @@
-"""Cameras of glTF files: projection, movement with their joints, and their place when written."""
+"""Cameras and helper nodes of glTF files: projection, movement, and what is written."""
 
 from __future__ import annotations
 
@@ -108,3 +108,20 @@ def test_camera_is_written_below_its_joint(tmp_path: Path, options: tuple[str, .
     scene = viewer.load(path)
     pose_actor(scene.actors[0], 1.0)
     assert_allclose(center(view_in(scene.views[0], scene)), [-2, 4, 0], atol=1e-6)
+
+
+def test_helper_nodes_that_are_not_written_are_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = skinned()
+    file.root["nodes"] += [
+        {"name": "Armature", "children": [0, 1], "extras": {"kind": 1}},
+        {"name": "Empty", "translation": [7, 7, 7]},
+    ]
+    file.root["scenes"], file.root["scene"] = [{"nodes": [3, 4]}], 0
+    source = saved(file, tmp_path)
+    assert run(["convert", str(source), "-o", str(tmp_path / "b.glb")]) == 0
+    assert (
+        "2 nodes of the original file without a joint, mesh or camera are not copied: "
+        "Armature (with extras), Empty"
+    ) in capsys.readouterr().out

@@ -100,6 +100,8 @@ MESSAGES = {
     "omitted, or 0 in lists: JSON cannot store {n:?it|them}",
     "X003.texture-shear": "material {material:name}: the shear of its textures is omitted",
     "X003.file-members": "{n:#member} of the original file {n:?is|are} not copied: {names:list}",
+    "X003.file-nodes": "{n:#node} of the original file without a joint, mesh or camera "
+    "{n:?is|are} not copied: {names:list12}",
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
     "only the keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "

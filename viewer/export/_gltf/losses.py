@@ -220,7 +220,10 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     members = () if figure.record is None else figure.record.unkept()
     values = {"names": members, "n": len(members)}
     notes = not_held_note("glTF", lost)
-    return notes + ([Diagnostic("X003.file-members", values=values)] if members else [])
+    notes += [Diagnostic("X003.file-members", values=values)] if members else []
+    nodes = () if figure.record is None else figure.record.lost_nodes
+    values = {"names": nodes, "n": len(nodes)}
+    return notes + ([Diagnostic("X003.file-nodes", values=values)] if nodes else [])
 
 
 def _lost_looks(figure: Figure) -> list[Phrase]:

@@ -324,6 +324,8 @@ class NodeFile:
         Name and application data of the scene that is shown, as parsed from JSON.
     unkept : callable
         Returns the members of the file that are not read, such as ``images.extras``.
+    lost_nodes : tuple of str
+        Names of the nodes that are neither joints, meshes nor cameras.
     contents : callable
         Returns what the file holds, as parts of a message; empty if unknown.
     humanoid : dict of int
@@ -363,6 +365,7 @@ class NodeFile:
     asset: Mapping[str, Any] = field(default_factory=dict)
     scene: Mapping[str, Any] = field(default_factory=dict)
     unkept: Callable[[], tuple[str, ...]] = tuple
+    lost_nodes: tuple[str, ...] = ()
     contents: Callable[[], tuple[Phrase, ...]] = tuple
     humanoid: Mapping[str, int] = field(default_factory=dict)
     expressions: tuple[NodeExpression, ...] = ()

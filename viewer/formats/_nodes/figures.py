@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +58,7 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
         raise source.fault("F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
+    file = replace(file, lost_nodes=_lost_nodes(file, groups))
     found = [_figure(file, members, readers, source) for members in groups]
     _note_normals([piece for each in found for piece in each.pieces], source)
     _note_weights([piece for each in found for piece in each.pieces], source)
@@ -68,6 +70,18 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
+
+
+def _lost_nodes(file: NodeFile, groups: list[Members]) -> tuple[str, ...]:
+    """Return the names of the nodes that are neither joints, meshes nor cameras."""
+    kept = {node for members in groups for node in (*members.nodes, *members.meshes)}
+    lost = [n for n in scene_order(file) if n not in kept and file.tree.cameras[n] < 0]
+    extras = file.tree.extras
+    return tuple(
+        (file.tree.names[n] or f"node {n}") + (" (with extras)" if n in extras else "")
+        for n in lost
+        if file.has_pointers
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -60,6 +60,7 @@ def record_of(
         scene=file.scene,
         tangents=partial(tangents_of, pieces),
         unkept=file.unkept,
+        lost_nodes=file.lost_nodes,
         vrm=_vrm_record(file, joints, nodes, pieces),
         has_skin=any(
             is_skinned(mesh, int(file.tree.skins[node]))
