@@ -74,7 +74,7 @@ def test_camera_with_the_name_of_the_video_gets_it(video):
 
 def test_people_in_camera_space_get_a_camera_with_the_size_of_the_video(video):
     settings = MotionSettings(video=video)
-    views, images, notes = filmed(capture(space="camera"), [], settings, 25.0)
+    views, images, notes = filmed(capture(is_in_camera=True), [], settings, 25.0)
     assert views[0].size == SIZE and images.cameras == (views[0].name,)
     # By 3-4-5, the diagonal of 64 x 48 is 80; the principal point is the centre.
     np.testing.assert_allclose(views[0].intrinsic, [[80, 0, 32], [0, 80, 24], [0, 0, 1]])
@@ -140,7 +140,7 @@ def test_images_of_people_in_camera_space_need_no_calibration(tmp_path):
     (tmp_path / "flat").mkdir()
     Image.new("RGB", (30, 40)).save(tmp_path / "flat" / "000000.png")
     settings = MotionSettings(images=tmp_path / "flat")
-    views, images, _ = filmed(capture(space="camera"), [], settings, 25.0)
+    views, images, _ = filmed(capture(is_in_camera=True), [], settings, 25.0)
     assert views[0].size == (30, 40) and images.at("video", 0.0) is not None
     assert views[0].intrinsic[0, 0] == 50.0
 

@@ -30,11 +30,13 @@ from formats.video_mocap.tool_files import (
     wham_file,
 )
 from formats.vrm.swinging import swinging
+from media.small_videos import counting, write
 from PIL import Image
 
 from viewer.cli import run
 from viewer.formats._anny.targets import ACTIONS
 from viewer.loading import bundled_body
+from viewer.media.video import VideoSink
 from viewer.resources import resource
 
 HOME = "home"
@@ -197,6 +199,9 @@ def _video_results(folder: Path) -> None:
     wham_file(folder)
     (folder / "demo_NAME.pkl").write_bytes(joblib_file(phalp()))
     (folder / "results.pkl").write_bytes(joblib_file(prompthmr()))
+    write(
+        VideoSink(folder / "video.mp4", (64, 36), 30.0), [counting(n, (64, 36)) for n in range(4)]
+    )
     tram = folder / "results" / "NAME"
     (tram / "hps").mkdir(parents=True)
     (tram / "hps" / "hps_track_0.npy").write_bytes(object_npy(tram_track([0, 1, 2, 3], 0.0)))

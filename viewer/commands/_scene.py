@@ -181,8 +181,9 @@ def _add_video_arguments(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--video",
         metavar="FILE",
-        help="video of a capture's camera, drawn behind the scene with --view; also sets the frame "
-        "rate of captures that have none (needs PyAV)",
+        help="video of a capture's camera, drawn behind the scene when it is seen through that "
+        "camera, as it is by default; also sets the frame rate of captures that have none (needs "
+        "PyAV)",
     )
     group.add_argument(
         "--space",
@@ -228,6 +229,7 @@ def motion_settings(arguments: argparse.Namespace) -> MotionSettings:
         lod=arguments.lod or "",
         frame_rate=arguments.fps,
         space=arguments.space or "",
+        is_overlay=getattr(arguments, "overlay", None) is not None,
         average_shape=arguments.average_shape,
         source_rest=arguments.source_rest,
         feet=arguments.feet == "on",

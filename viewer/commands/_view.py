@@ -12,7 +12,7 @@ from viewer.commands._numbers import number
 from viewer.commands._pose import skinning_of
 from viewer.commands._scalar import add_scalar_arguments, scalar_notes, set_scalar
 from viewer.errors import ViewerError
-from viewer.phrases import printable
+from viewer.phrases import listed, printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
 from viewer.rendering.options import (
@@ -47,6 +47,10 @@ _SWITCHES = (
     ("joint-axes", "draw the axes of joints: x red, y green, z blue"),
     ("cameras", "draw the frusta of a capture's calibrated cameras, with their images"),
 )
+
+_DIMMED = 0.6  # brightness of a camera's image
+# Options that ask for a view of their own.
+VIEWS = ("azimuth", "inclination", "distance", "orthographic", "look_at", "follow")
 
 
 def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
@@ -83,10 +87,9 @@ def add_camera_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--image-brightness",
         type=number,
-        default=0.6,
         metavar="0..1",
         help="brightness of the camera's image behind the scene, with --view; 0 hides it (default: "
-        "0.6)",
+        "0.6; 1 with --overlay)",
     )
 
 
@@ -261,7 +264,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         raise ViewerError(f"--samples: expected at least 1, found {arguments.samples}")
     for name in ("metallic", "roughness", "image-brightness", "opacity"):
         value = getattr(arguments, name.replace("-", "_"))
-        if not 0.0 <= value <= 1.0:
+        if value is not None and not 0.0 <= value <= 1.0:
             raise ViewerError(f"--{name}: expected 0 to 1, found {value:g}")
     options = DisplayOptions(
         show=arguments.show,
@@ -287,10 +290,33 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
         cameras=arguments.cameras,
-        image_brightness=arguments.image_brightness,
+        image_brightness=_brightness(arguments),
     )
     set_scalar(arguments, options)
     return options
+
+
+def _brightness(arguments: argparse.Namespace) -> float:
+    if arguments.image_brightness is not None:
+        return float(arguments.image_brightness)
+    return 1.0 if getattr(arguments, "overlay", None) is not None else _DIMMED
+
+
+def look_through_video(arguments: argparse.Namespace, scene: Scene) -> list[str]:
+    """Look through the camera of a given video, unless another view is requested; return notes."""
+    option = "--video" if arguments.video is not None else "--images"
+    is_given = arguments.video is not None or arguments.images is not None
+    if not is_given or arguments.view is not None or scene.images is None:
+        return []
+    asked = [name for name in VIEWS if getattr(arguments, name, None) not in (None, False)]
+    if asked:
+        other = asked[0].replace("_", "-")
+        return [f"{option}: not drawn, because --{other} asks for another view"]
+    names = scene.images.cameras
+    if len(names) > 1:
+        return [f"{option}: not drawn; choose a camera with --view: {listed(names)}"]
+    arguments.view = names[0]
+    return []
 
 
 def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> list[str]:

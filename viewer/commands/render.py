@@ -19,6 +19,7 @@ from viewer.commands._scene import (
 from viewer.commands._sequence.frame_numbers import add_frame_arguments
 from viewer.commands._sequence.recording import add_sequence_arguments, draw_sequence, request_of
 from viewer.commands._view import (
+    VIEWS,
     add_camera_arguments,
     add_display_arguments,
     camera_notes,
@@ -26,6 +27,7 @@ from viewer.commands._view import (
     display_of,
     follow_notes,
     hide_parts,
+    look_through_video,
     parse_size,
     set_opacity,
     warn_of_missing,
@@ -48,6 +50,7 @@ if TYPE_CHECKING:
 
 __all__ = ["add_arguments", "run"]
 
+_SIZE = "1280x720"
 _OPAQUE = (".jpg", ".jpeg", ".bmp", ".ppm")
 
 
@@ -78,7 +81,15 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument("--force", action="store_true", help="replace existing files")
     group.add_argument(
-        "--size", default="1280x720", metavar="WxH", help="in pixels (default: 1280x720)"
+        "--size",
+        metavar="WxH",
+        help="in pixels (default: 1280x720; with --overlay, the size of the video)",
+    )
+    group.add_argument(
+        "--overlay",
+        metavar="VIDEO",
+        help="draw the people over the video they were captured from: in camera space, seen "
+        "through its camera (needs PyAV)",
     )
     group.add_argument("--panels", action="store_true", help="draw the window's panels too")
     group.add_argument("--gpu", type=int, metavar="N", help="use EGL device N (see doctor)")
@@ -86,7 +97,8 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Render the images, write them, and print their names."""
-    size = parse_size(arguments.size)
+    _check_overlay(arguments)
+    size = parse_size(arguments.size or _SIZE)
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     request = request_of(arguments, output)
@@ -101,6 +113,9 @@ def run(arguments: argparse.Namespace) -> int:
         print_warnings([f"{printable(output)}: this format has no transparency"])
     scene = open_scene(arguments)
     use_file_method(arguments, scene, options.skinning)
+    print_warnings(look_through_video(arguments, scene))
+    if arguments.overlay is not None:
+        size = _overlay_size(arguments, scene) or size
     hide_parts(arguments, scene, options)
     set_opacity(arguments, scene)
     print_warnings(choose_subject(scene, options))
@@ -113,6 +128,30 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         _draw_still(arguments, scene, options, size)
     return 0
+
+
+def _check_overlay(arguments: argparse.Namespace) -> None:
+    """Let an overlay be a video that is seen through its camera.
+
+    Raises ViewerError if other options contradict that.
+    """
+    if arguments.overlay is None:
+        return
+    for name in ("video", "images", "view", *VIEWS):
+        if getattr(arguments, name) not in (None, False):
+            other = name.replace("_", "-")
+            raise ViewerError(f"--overlay and --{other}: expected one of them, found both")
+    arguments.video, arguments.no_grid = arguments.overlay, True
+
+
+def _overlay_size(arguments: argparse.Namespace, scene: Scene) -> tuple[int, int] | None:
+    """Return the size of the video, unless another one is requested.
+
+    Raises ViewerError if no file is a capture.
+    """
+    if scene.images is None:
+        raise ViewerError("--overlay: expected a capture with a camera, found none")
+    return None if arguments.size else scene.images.size_of(scene.images.cameras[0])
 
 
 def _check_device(device: int | None) -> None:

@@ -33,6 +33,7 @@ from viewer.commands._view import (
     display_of,
     follow_notes,
     hide_parts,
+    look_through_video,
     set_opacity,
     warn_of_missing,
 )
@@ -149,6 +150,7 @@ def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
     clean(scene, changes)
     print_warnings(apply_pose(scene, arguments))
     use_file_method(arguments, scene, options.skinning)
+    print_warnings(look_through_video(arguments, scene))
     hide_parts(arguments, scene, options)
     set_opacity(arguments, scene)
     print_warnings(warn_of_missing(scene, options) + follow_notes(arguments, scene))

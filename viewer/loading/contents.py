@@ -208,7 +208,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
         return open_results(
             source,
             settings.frame_rate,
-            settings.space,
+            settings.space or ("camera" if settings.is_overlay else ""),
             settings.up,
             settings.average_shape,
             _video_rate(settings),

@@ -58,7 +58,7 @@ def filmed(
         first = capture.first_frame / rate
         video = VideoImages(settings.video, first, first + capture.n_frames / rate)
         notes = _rate_notes(settings.video, video.rate, rate)
-        if not found and capture.space == "camera":
+        if not found and capture.is_in_camera:
             found, said = _assumed(video.size, settings.video)
             notes += said
         index = _camera_of(found, settings.video)
@@ -69,7 +69,7 @@ def filmed(
     if settings.images is None or capture.images is not None:
         return found, capture.images, []
     frames, notes = range(capture.first_frame, capture.first_frame + capture.n_frames), []
-    if not found and capture.space == "camera":
+    if not found and capture.is_in_camera:
         size = ImageFolders({_NAME: settings.images}, rate, frames).size_of(_NAME)
         if size is not None:
             found, notes = _assumed(size, settings.images)

@@ -60,6 +60,8 @@ class MotionSettings:
         Whether spring joints, such as those of hair, are simulated while a motion plays.
     space : "world", "camera" or ""
         The space of results of video motion capture; empty for the world, if they have it.
+    is_overlay : bool
+        Whether results of video motion capture are in camera space, if ``space`` is empty.
     average_shape : bool
         Whether people of video motion capture keep one shape, the average over time.
     source_rest : int, "zero" or "auto"
@@ -90,6 +92,7 @@ class MotionSettings:
     motions: tuple[Path, ...] = ()
     springs: bool = False
     space: str = ""
+    is_overlay: bool = False
     average_shape: bool = False
     source_rest: int | str = "auto"
     feet: bool = True

@@ -336,6 +336,7 @@ class _Capture:
             results.model,
             notes,
             space=space if len(results.people) > 1 else "",
+            is_in_camera=space == "camera",
             in_space=self.in_space if len(results.people) > 1 else None,
             views_of=None
             if cameras_of is None or space != "world"

@@ -73,6 +73,8 @@ class Capture:
         Recognised contents of the file, for ``viewer info``.
     space : "world", "camera" or ""
         The space of its bodies if the file has several; empty if it has only one.
+    is_in_camera : bool
+        Whether its people are in the space of a camera, which is at the origin.
     in_space : callable or None
         Returns the same capture in ``"world"`` or ``"camera"`` space; None if it has only one.
     model : str
@@ -93,4 +95,5 @@ class Capture:
     views_of: Callable[[RestRoots], tuple[CameraView, ...]] | None = None
     facts: tuple[tuple[str, str], ...] = ()
     space: str = ""
+    is_in_camera: bool = False
     in_space: Callable[[str], Capture] | None = None
