@@ -1,5 +1,7 @@
 """Values of keyed transforms, compared with closed forms and the formulas of glTF."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
@@ -168,3 +170,12 @@ def test_keys_at_irregular_times_are_recognised():
         clip_of(channel(0, "translation", at, np.zeros((len(at), 3)))) for at in (regular, odd)
     ]
     assert [is_regular(clip) for clip in clips] == [True, False]
+
+
+def test_end_of_the_range_tells_the_rate_of_a_held_pose():
+    """A program at 24 frames per second holds one key for a frame."""
+    held = channel(0, "translation", [0.0], np.zeros((1, 3)))
+    assert key_rate(replace(clip_of(held), end=1.0 / 24.0)) == 24.0
+    # An end between frames tells nothing.
+    walk = channel(0, "translation", np.arange(20) / 24.0, np.zeros((20, 3)))
+    assert key_rate(replace(clip_of(walk), end=0.9)) == 24.0

@@ -58,6 +58,9 @@ def _estimated(clip: TransformClip) -> float:
     times = np.unique(np.concatenate([np.array([clip.start]), *lists.values()]))
     rounding = _SINGLE * float(np.abs(times[[0, -1]]).max())
     since = times - clip.start
+    if len(since) == 1:
+        # A pose that is held for some frames: only the end of the range tells the rate.
+        since = np.array([0.0, clip.end - clip.start])
     for rate in (*_RATES, *_BROADCAST):
         if _is_on_frames(since, rate, rounding):
             return rate
