@@ -11,13 +11,14 @@ from formats.synthetic_smpl import model
 from numpy.testing import assert_allclose, assert_array_equal
 from plain_smpl import smpl_forward
 from rig.hand_made import skeleton
-from seamed import PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
+from seamed import OTHER_PICTURE, PICTURE, POSITIONS, TRIANGLES, UVS, seamed_actor, seamed_mesh
 
 import viewer
 from viewer.diagnostics import Phrase
 from viewer.errors import OutputError, RigError, UnsupportedFormatError
 from viewer.export import export
 from viewer.rig.figure import Figure
+from viewer.rig.material import Texture
 from viewer.rig.posing.pose_record import PoseRecord, apply_record
 from viewer.rig.scene import Actor
 from viewer.rig.skeleton import ball_skeleton
@@ -298,6 +299,27 @@ def test_texture_is_copied(tmp_path):
     again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
     assert names(tmp_path) == ["cloth0.png", "rig.skel", "rig.skin"]
     assert_array_equal(again.figure.mesh.materials[0].image, PICTURE)
+
+
+def test_embedded_images_are_named_as_files(tmp_path):
+    """Images in glTF files have names such as image0: two of them keep apart in one folder."""
+    of_triangle = np.array([0, 1, 2], np.int32)
+    embedded = seamed_mesh(pictures=(PICTURE, PICTURE, OTHER_PICTURE), of_triangle=of_triangle)
+    shared = [
+        replace(material, base_texture=Texture(name, image))
+        for material, name, image in zip(
+            embedded.materials,
+            ("Skin.001", "Skin.001", "image0"),
+            (PICTURE, PICTURE, OTHER_PICTURE),
+            strict=True,
+        )
+    ]
+    mesh = replace(embedded, materials=tuple(shared))
+    again, _ = there_and_back(seamed_actor(mesh=mesh), tmp_path)
+    assert names(tmp_path) == ["rig.skel", "rig.skin", "rig_0.png", "rig_2.png"]
+    pictures = [material.image for material in again.figure.mesh.materials]
+    for found, expected in zip(pictures, (PICTURE, PICTURE, OTHER_PICTURE), strict=True):
+        assert_array_equal(found, expected)
 
 
 # Data in another form

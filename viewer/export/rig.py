@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from mimetypes import guess_type
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +13,9 @@ from viewer.errors import RigError
 from viewer.export._course_rig import CourseSkeleton, course_skeleton
 from viewer.export._left_out import extra_parts, not_held_note
 from viewer.export._losses.posed import PoseLosses
-from viewer.formats import Source, all_or_none, keeping_written, read, write
+from viewer.formats import Source, all_or_none, free_path, keeping_written, read, write
 from viewer.formats.skin import lost_parts
+from viewer.media.image import encode_png
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.hierarchy import depth_first
@@ -43,6 +45,7 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
     assert figure.skeleton is not None and pose is not None  # figures with joints have a pose
     course, rig, sources = _as_rig(actor, skinning)
     skel, skin = path.with_suffix(".skel"), path.with_suffix(".skin")
+    rig = _with_picture_names(rig, skin)
     notes = [Diagnostic("X001.skel", skel, values={"n": figure.skeleton.n_joints})]
     with keeping_written() as saved, all_or_none(_files(rig, skel, skin)):
         write(rig, skel)
@@ -70,6 +73,31 @@ def _files(rig: Figure, skel: Path, skin: Path) -> list[Path]:
         return [skel]
     pictures = [material.texture for material in rig.mesh.materials if material.image is not None]
     return [skel, skin, *(skin.parent / name.replace("\\", "/") for name in pictures if name)]
+
+
+def _with_picture_names(rig: Figure, skin: Path) -> Figure:
+    """Return a figure whose embedded images are named as files, after the ``.skin``.
+
+    glTF files name them ``image0`` or not at all: without a suffix, few programs would open them,
+    and two figures in one folder would have different images of one name.
+    """
+    if rig.mesh is None:
+        return rig
+    names: dict[bytes, str] = {}  # by the image, which materials may share
+    materials = []
+    for index, material in enumerate(rig.mesh.materials):
+        texture = material.base_texture
+        if texture is not None and texture.image is not None and not _is_picture(texture.name):
+            data, stem = encode_png(texture.image), f"{skin.stem[:80]}_{index}"
+            if data not in names:
+                names[data] = free_path(skin.parent, stem, ".png", data).name
+            material = replace(material, base_texture=replace(texture, name=names[data]))
+        materials.append(material)
+    return replace(rig, mesh=replace(rig.mesh, materials=tuple(materials)))
+
+
+def _is_picture(name: str) -> bool:
+    return (guess_type(name)[0] or "").startswith("image/")
 
 
 def _as_rig(actor: Actor, skinning: Skinning) -> tuple[CourseSkeleton, Figure, np.ndarray | None]:
