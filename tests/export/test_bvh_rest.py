@@ -118,9 +118,8 @@ def test_names_are_written_as_they_are(tmp_path: Path) -> None:
     assert bvh.read(Source.open(tmp_path / "out.bvh")).figure.skeleton.names == ODD
     # Colons and full stops are read by all programs.
     assert notes[1] == (
-        "some programs cannot read 5 joint names, because of spaces or characters outside ASCII, "
-        'or because they are empty or repeated: left leg, "", é:x, センター, a  b; --safe-names '
-        "changes them"
+        "some programs cannot read 5 joint names that are empty or repeated, or have spaces or "
+        'characters outside ASCII: left leg, "", é:x, センター, a  b; --safe-names changes them'
     )
     # Repeated names do not confuse the comparison with the motion, which finds no error.
     assert len(notes) == 2

@@ -32,7 +32,9 @@ _FIGURE = "figure."  # label of the DOFs that place a figure as a whole
 def add_pose_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the options that shape and pose."""
     group = parser.add_argument_group("shape and pose, applied in this order")
-    group.add_argument("--hands", choices=("flat", "mean"), help="start from flat or mean hands")
+    group.add_argument(
+        "--hands", choices=("flat", "mean"), help="hand pose to which hand parameters are added"
+    )
     group.add_argument(
         "--pose",
         metavar="FILE|A,B,…",

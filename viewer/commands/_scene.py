@@ -58,8 +58,8 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         "files",
         nargs="*",
         metavar="FILES",
-        help=f"files ({', '.join(SUFFIXES)}), folders of PIG or EasyMocap, names of body models in "
-        "the model folder, such as smplx:neutral, a texture image; see viewer help formats"
+        help=f"files ({', '.join(SUFFIXES)}), folders (PIG, EasyMocap and others), names of body "
+        "models in the model folder, such as smplx:neutral, a texture image; see viewer help formats"
         f"{f' (default: {default})' if default else ''}",
     )
     add_animation_argument(group)

@@ -104,7 +104,7 @@ def _add_limits(group: argparse._ArgumentGroup) -> None:
         help="frames per second of captures, and for sampling keyframed clips (default: 30)",
     )
     group.add_argument(
-        "--hands", choices=("mean", "flat"), help="hand pose for pose parameters of 0"
+        "--hands", choices=("mean", "flat"), help="hand pose to which hand parameters are added"
     )
 
 

@@ -159,9 +159,9 @@ MESSAGES = {
     "X005.position-channels": "{n:#joint} below the root {n:?translates and has|translate and "
     "have} position channels: {names:list8}",
     "X005.joints-renamed": "{n:#joint name} changed: {pairs:list8}",
-    "X005.odd-names": "some programs cannot read {n:#joint name}, because of spaces or characters "
-    "outside ASCII, or because they are empty or repeated: {names:list8}; --safe-names changes "
-    "them",
+    "X005.odd-names": "some programs cannot read {n:#joint name} that {n:?is|are} empty or "
+    "repeated, or {n:?has|have} spaces or characters outside ASCII: {names:list8}; --safe-names "
+    "changes {n:?it|them}",
     "X005.joints-translate": "{n:#joint} below the root {n:?translates|translate}: {names:list8}",
     "X005.shape-changes": "the shape changes over time: bone lengths are those of frame {frame}",
     "X005.scale-changes": "the figure's scale changes from {low:g} to {high:g}: bone lengths are "
