@@ -59,7 +59,8 @@ def add_file_arguments(parser: argparse.ArgumentParser, default: str = _DEFAULT)
         nargs="*",
         metavar="FILES",
         help=f"files ({', '.join(SUFFIXES)}), folders (PIG, EasyMocap and others), names of body "
-        "models in the model folder, such as smplx:neutral, a texture image; see viewer help formats"
+        "models in the model folder, such as smplx:neutral, a texture image; see viewer help "
+        "formats"
         f"{f' (default: {default})' if default else ''}",
     )
     add_animation_argument(group)
