@@ -8,6 +8,7 @@ import pytest
 
 from viewer.cli import run
 from viewer.commands import COMMANDS
+from viewer.commands._batch.jobs import JOBS
 
 BASH = shutil.which("bash")
 
@@ -53,6 +54,16 @@ def test_bash_completes_options_of_a_command(script):
 
 
 @pytest.mark.skipif(BASH is None, reason="needs bash")
+def test_bash_completes_jobs_of_batch_and_their_options(script, tmp_path):
+    (tmp_path / "walk.bvh").touch()
+    assert set(completed(script, "batch", "")) >= set(JOBS)
+    assert completed(script, "batch", "len") == []
+    assert {"--to", "--workers", "--fps"} <= set(completed(script, "batch", "convert", "--"))
+    assert "--to" not in completed(script, "batch", "lint", "--")
+    assert "walk.bvh" in completed(script, "batch", "convert", "wa", cwd=tmp_path)
+
+
+@pytest.mark.skipif(BASH is None, reason="needs bash")
 def test_bash_completes_choices_and_files(script, tmp_path):
     (tmp_path / "walk.bvh").touch()
     assert "never" in completed(script, "lint", "--fail-on", "")
@@ -60,7 +71,7 @@ def test_bash_completes_choices_and_files(script, tmp_path):
     assert "walk.bvh" in completed(script, "render", "--output", "wa", cwd=tmp_path)
 
 
-@pytest.mark.parametrize("shell", ["zsh", "tcsh"])
+@pytest.mark.parametrize("shell", ["zsh", "tcsh", "fish"])
 def test_scripts_of_other_shells_list_all_commands(capsys, shell):
     assert run(["completion", shell]) == 0
     out = capsys.readouterr().out

@@ -17,6 +17,6 @@ COMMANDS = {
     "models": "list body models: found, missing, where they are published, and their licences",
     "doctor": "check this machine: packages, OpenGL, display, and how to install missing parts",
     "help": "show a page of the manual",
-    "completion": "print a script that completes commands and options in bash, zsh or tcsh",
+    "completion": "print a script that completes commands and options in bash, zsh, tcsh or fish",
 }
 """Modules in this folder, each with ``add_arguments(parser)`` and ``run(arguments)``."""

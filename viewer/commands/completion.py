@@ -7,16 +7,17 @@ from importlib import import_module
 from typing import Any
 
 from viewer.commands import COMMANDS
+from viewer.commands._batch.jobs import JOBS, add_all_arguments
 from viewer.commands._usage import Parser
 
 __all__ = ["add_arguments", "command_line", "run"]
 
-_SHELLS = ("bash", "zsh", "tcsh")
+_SHELLS = ("bash", "zsh", "tcsh", "fish")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.usage = "%(prog)s bash|zsh|tcsh"
+    parser.usage = "%(prog)s bash|zsh|tcsh|fish"
     parser.add_argument(
         "shell", choices=_SHELLS, help="the shell; see below for where to put its script"
     )
@@ -24,7 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.epilog = (
         "bash: viewer completion bash > ~/.local/share/bash-completion/completions/viewer\n"
         "zsh:  viewer completion zsh > a file _viewer in a folder of $fpath\n"
-        "tcsh: viewer completion tcsh > a file that ~/.tcshrc sources"
+        "tcsh: viewer completion tcsh > a file that ~/.tcshrc sources\n"
+        "fish: viewer completion fish > ~/.config/fish/completions/viewer.fish"
     )
 
 
@@ -38,18 +40,30 @@ def run(arguments: argparse.Namespace) -> int:
 
 def command_line() -> argparse.ArgumentParser:
     """Return the whole command line as one parser; file arguments are marked for completion."""
-    import shtab
-
     whole = Parser(prog="viewer", description="View, check and convert skinned characters.")
     whole.add_argument("--version", action="store_true", help="print the version")
     commands: Any = whole.add_subparsers(dest="command", parser_class=Parser)
     for name, text in COMMANDS.items():
         parser = commands.add_parser(name, help=text, description=text)
-        import_module(f"viewer.commands.{name}").add_arguments(parser)
-        for action in parser._actions:  # argparse has no public name for this action
-            if _names_a_file(action):
-                action.complete = shtab.FILE
+        if name == "batch":
+            jobs: Any = parser.add_subparsers(dest="job", parser_class=Parser)
+            for job, kind in JOBS.items():
+                inner = jobs.add_parser(job, help=kind.title, description=kind.title)
+                add_all_arguments(inner, job)
+                _complete_files(inner)
+        else:
+            import_module(f"viewer.commands.{name}").add_arguments(parser)
+            _complete_files(parser)
     return whole
+
+
+def _complete_files(parser: argparse.ArgumentParser) -> None:
+    """Mark the arguments whose values are files."""
+    import shtab
+
+    for action in parser._actions:  # argparse has no public name for this action
+        if _names_a_file(action):
+            action.complete = shtab.FILE  # type: ignore[attr-defined]
 
 
 def _names_a_file(action: argparse.Action) -> bool:

@@ -71,6 +71,12 @@ def job_parser(job: str) -> Parser:
     """
     parser = Parser(prog=f"viewer batch {job}", description=JOBS[job].title)
     parser.add_argument("job", choices=[job], help=argparse.SUPPRESS)
+    add_all_arguments(parser, job)
+    return parser
+
+
+def add_all_arguments(parser: argparse.ArgumentParser, job: str) -> None:
+    """Add the arguments of a command, and those of the batch."""
     add_job_arguments(parser, job)
     kind = JOBS[job]
     known = {action.dest for action in parser._actions}
@@ -81,7 +87,6 @@ def job_parser(job: str) -> Parser:
     output = {"always": "-o OUT ", "maybe": "[-o OUT] ", "never": ""}[kind.writes]
     first = "REFERENCE " if job == "diff" else ""
     parser.usage = f"%(prog)s {first}PATHS {output}[options]"
-    return parser
 
 
 def add_job_arguments(parser: argparse.ArgumentParser, job: str) -> None:
