@@ -191,6 +191,8 @@ def test_gender_is_shown_and_kept_on_writing(models, tmp_path, capsys):
     assert "C019: made for a female SMPL+H body, but SMPLH_MALE is male SMPL+H" in (
         capsys.readouterr().out
     )
+    assert run(["lint", str(path)]) == 0
+    assert "walk: body of female SMPL+H\n" in capsys.readouterr().out
     # Another model does not make the coefficients those of another gender, but the user may.
     for options, gender in (
         ([], "female"),

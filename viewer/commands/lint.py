@@ -142,6 +142,9 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         for finding in findings:
             print_line((finding_text(finding), _STYLES.get(finding.severity, "")))
+        for body in described["bodies"]:
+            title = " ".join(filter(None, (body["gender"], body["model"])))
+            print(f"{body['name']}: body of {title}")
         print(summary(findings, len(files)))
     if arguments.fail_on == "never":
         return 0

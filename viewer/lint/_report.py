@@ -74,6 +74,15 @@ def describe(findings: Sequence[Finding], scene: Scene) -> dict[str, Any]:
     return {
         "findings": [_describe(finding, scene) for finding in findings],
         "counts": {kind: counts[kind] for kind in reversed(SEVERITIES)},
+        "bodies": [
+            {
+                "name": printable(actor.name),
+                "model": actor.shape_space.model or None,
+                "gender": actor.shape_space.gender or None,
+            }
+            for actor in scene.actors
+            if actor.shape_space.title
+        ],
     }
 
 
