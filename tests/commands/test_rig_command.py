@@ -369,6 +369,18 @@ def test_landmarks_are_points_or_posed_joints(tmp_path):
         ),
         ("", 1, "expected at least 3 pairs of points, found 0"),
         ("\nhead 1 2 3\n", 2, "expected at least 3 pairs of points, found 1"),
+        (
+            "0 0 0 0 0 0\n1 0 0 1e-300 0 0\n0 2 0 0 1e-300 0\n",
+            3,
+            "expected points that differ in scale by less than 1e9, found extents of 2 in the "
+            "template and 1e-300 in the target",
+        ),
+        (
+            "0 0 0 0 0 0\n0 0 0 1 0 0\n0 0 0 0 1 0\n",
+            3,
+            "expected points that differ in scale by less than 1e9, found extents of 0 in the "
+            "template and 1 in the target",
+        ),
     ],
 )
 def test_invalid_landmarks_are_reported_with_their_line(tmp_path, text, line, message):

@@ -23,6 +23,7 @@ from viewer.rig.pose import Pose
 from viewer.rig.skinning import joint_matrices
 
 _FARTHEST = 1e9  # largest coordinate, in any unit
+_LARGEST_SCALE = 1e9  # largest ratio of the extents of both meshes, or of its inverse
 
 
 def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
@@ -33,7 +34,7 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
     ``pose``: pose of the template.
     Returns (N, 2, 3): the template's point and the target's for each pair.
     Raises FormatError at a line that is not a pair or names an unknown joint, or at the last line
-      if there are fewer than three pairs.
+      if there are fewer than three pairs, or if no scale fits them.
     """
     skeleton = template.require_skeleton()
     joints = joint_matrices(template, pose)[:, :3, 3]
@@ -54,11 +55,16 @@ def read_landmarks(source: Source, template: Figure, pose: Pose) -> Floats:
         if name not in skeleton.names:
             raise _unknown_joint(source, number, name, template)
         pairs.append([joints[skeleton.names.index(name)].tolist(), values])
+    last = max(len(source.data.splitlines()), 1)
     if len(pairs) < 3:
-        last = max(len(source.data.splitlines()), 1)
         count = {"found": len(pairs)}
         raise FormatError(Diagnostic("F002.landmarks", source.path, last, values=count))
-    return np.array(pairs, dtype=np.float64)
+    points = np.array(pairs, dtype=np.float64)
+    own, other = np.ptp(points, axis=0).max(axis=1).tolist()
+    if not (own < _LARGEST_SCALE * other and other < _LARGEST_SCALE * own):
+        extents = {"own": own, "other": other}
+        raise FormatError(Diagnostic("F002.landmark-extents", source.path, last, values=extents))
+    return points
 
 
 def _unknown_joint(source: Source, line: int, name: str, template: Figure) -> FormatError:

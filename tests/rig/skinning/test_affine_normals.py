@@ -1,5 +1,7 @@
 """Normals under joints that scale, shear or reflect, compared with closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -165,6 +167,17 @@ def test_blended_normals_match_the_blended_surface(blend_factor):
     skin = skin_from_lists([pairs] * len(DIRECTIONS), EYES)
     found = mix.deform(DIRECTIONS, DIRECTIONS, skin, palette, blend_factor)[1]
     assert_allclose(found, unit(DIRECTIONS @ np.linalg.inv(linear)), atol=1e-13)
+
+
+def test_fractions_of_vertices_are_blend_factors():
+    palette = np.array([matrix(turn_x(0.9) @ np.diag([3.0, 1, 0.5])), matrix(turn_z(1.4))])
+    skin = skin_from_lists([[(0, 0.6), (1, 0.4)], [(1, 1.0)], [(0, 0.2), (1, 0.8)]], EYES)
+    corners, fractions = np.eye(3), [0.25, 0.5, 1.0]
+    found = mix.deform(corners, corners, replace(skin, dqs_fractions=fractions), palette, None)
+    for row, fraction in enumerate(fractions):
+        wanted = mix.deform(corners, corners, skin, palette, fraction)
+        assert_allclose(found[0][row], wanted[0][row], atol=1e-15)
+        assert_allclose(found[1][row], wanted[1][row], atol=1e-15)
 
 
 @pytest.mark.parametrize("size", [1.0, 1.001, 7.0])

@@ -41,6 +41,8 @@ MESSAGES = {
     "F002.landmark": 'expected six numbers, or a joint and three numbers, found "{found:text}"',
     "F002.landmark-joint": 'expected a joint of {figure:text}, found "{found:text}"; {near}',
     "F002.landmarks": "expected at least 3 pairs of points, found {found}",
+    "F002.landmark-extents": "expected points that differ in scale by less than 1e9, found extents "
+    "of {own:.3g} in the template and {other:.3g} in the target",
 }
 
 PHRASES = {
