@@ -14,12 +14,14 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import UnsupportedFormatError
 from viewer.export import VrmMeta, export, files_written
 from viewer.export._course_rig import course_pose, course_skeleton
-from viewer.formats import all_or_none
+from viewer.export._losses.posed import PoseLosses
+from viewer.formats import Source, all_or_none, keeping_written
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import vertex_normals
 from viewer.rig.pose import Pose
 from viewer.rig.scene import Actor, figure_pose
 from viewer.rig.shape import pose_weights
+from viewer.rig.skinning import Skinning, deform, joint_matrices
 
 RIGGED_SUFFIXES = (".npz", ".skel", ".skin", ".glb", ".gltf")
 """Suffixes that ``files_of`` accepts without further data; ``.vrm`` needs an author."""
@@ -62,10 +64,15 @@ def write_rigged(rigged: Rigged, output: Path, meta: VrmMeta | None = None) -> l
     """
     files = files_of(output)
     if output.suffix.lower() == ".npz":
-        from viewer.formats.rigged import save
+        from viewer.formats.rigged import read, save
 
-        save(rigged.figure, output, _arrays(rigged))
-        return [Diagnostic("X001.rigged", output)]
+        losses, pose = PoseLosses(rigged.figure, Skinning()), rigged.pose
+        with keeping_written() as saved, all_or_none(files):
+            save(rigged.figure, output, _arrays(rigged))
+            again = read(Source(output, saved[output]))
+            joints = joint_matrices(again, pose.copy())[:, :3, 3]
+            losses.look(pose, deform(again, pose.copy())[0], joints)
+        return [Diagnostic("X001.rigged", output), *losses.notes(output)]
     figure = without_correctives(rigged)
     notes: list[Diagnostic] = []
     if output.suffix.lower() in _NODES:

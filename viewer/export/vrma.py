@@ -19,18 +19,21 @@ from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
 from viewer.export._gaps import filled, frames_phrase, gaps_note
 from viewer.export._gltf.document import Document, text_of
+from viewer.export._losses.apart import Apart, Farthest, apart_notes, negligible
 from viewer.export._options import MotionOptions
 from viewer.export._vrm.humanoid import bone_above, human_bones
 from viewer.export._vrm.made import PRESETS
 from viewer.export._vrm.standing import in_t_pose, standing, unit_rotation, vrm_axes
-from viewer.formats import save_bytes
+from viewer.formats import Source, read, save_bytes
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.quaternion import align_signs
 from viewer.rig.geometry.rotation import axis_rotations, matrix_to_quaternion
 from viewer.rig.kinematics import world_matrices
-from viewer.rig.motion.evaluation import Frames, world_frames
+from viewer.rig.motion.evaluation import Frames, frames_of, world_frames
+from viewer.rig.motion.joint_positions import joint_positions
 from viewer.rig.motion.sampled_animation import SampledAnimation
+from viewer.rig.motion.skeleton_motion import SkeletonMotion
 from viewer.rig.scene import figure_pose
 from viewer.rig.units import METRES
 
@@ -72,6 +75,7 @@ def export_animation(
     document = Document(animation.name)
     weights = _fill(document, animation, frames, options.world_up, bones)
     data = document.glb()
+    errors = _losses(Source(path, data), animation, frames, options.world_up, bones)
     save_bytes(path, data)
     values = {
         "bones": len(bones),
@@ -80,7 +84,7 @@ def export_animation(
         "rate": animation.frame_rate,
         "size": len(data),
     }
-    notes = [Diagnostic("X001.vrma", path, values=values)]
+    notes = [Diagnostic("X001.vrma", path, values=values), *errors]
     notes += gaps_note(animation.frames.present, animation.first_frame, options.closing)
     others = animation.figure.require_skeleton().n_joints - len(bones)
     if others:
@@ -188,11 +192,7 @@ def _moved(
     rotations: dict[str, Floats],
 ) -> tuple[dict[str, Floats], Floats]:
     """Return the world rotations of the nodes (F, 3, 3), and the positions of the hips (F, 3)."""
-    own = vrm_axes(figure, figure_pose(figure), bones)
-    axes = own
-    if world_up != figure.up:
-        quarter = np.asarray(-np.pi / 2 if world_up == "z" else 0.0)
-        axes = axis_rotations(0, quarter)
+    axes = _axes(figure, world_up, bones)
     world = world_frames(figure, frames)
     turns = {}
     for bone, joint in bones.items():
@@ -202,6 +202,41 @@ def _moved(
         turns[bone] = axes @ turned @ rotations[bone].T
     scale = METRES.get(figure.unit, 1.0)
     return turns, scale * world[:, bones["hips"], :3, 3] @ axes.T
+
+
+def _axes(figure: Figure, world_up: str, bones: dict[str, int]) -> Floats:
+    """Return the rotation from the axes of the motion's world to those of VRM."""
+    if world_up == figure.up:
+        return vrm_axes(figure, figure_pose(figure), bones)
+    return axis_rotations(0, np.asarray(-np.pi / 2 if world_up == "z" else 0.0))
+
+
+def _losses(
+    source: Source,
+    animation: SampledAnimation,
+    frames: Frames,
+    world_up: str,
+    bones: dict[str, int],
+) -> list[Diagnostic]:
+    """Read a file back, and return a note with the largest error of a human bone's position.
+
+    The file's bones have the lengths of the T-pose, and no joints between them.
+    """
+    motion, figure = read(source), animation.figure
+    assert isinstance(motion, SkeletonMotion)
+    rate = motion.clip.timing.frame_rate
+    again = frames_of(motion.figure, motion.clip, np.arange(frames.n_frames) / rate)
+    found = joint_positions(motion.figure, again) / METRES.get(figure.unit, 1.0)
+    found = found @ _axes(figure, world_up, bones)
+    joints = [bones[name] for name in motion.figure.require_skeleton().names]
+    there = np.flatnonzero(animation.frames.present)
+    off = found[there] - world_frames(figure, frames)[there[:, None], joints, :3, 3]
+    distances = np.linalg.norm(off, axis=2)
+    row, bone = np.unravel_index(int(distances.argmax()), distances.shape)
+    worst = Farthest(float(distances[row, bone]), joints[int(bone)], int(there[row]))
+    is_exact = worst.distance <= negligible(figure, frames, there)
+    apart = Apart(None if is_exact else worst, None, len(there), len(there))
+    return apart_notes(source.path, figure, apart, animation.first_frame)
 
 
 def _add_expressions(

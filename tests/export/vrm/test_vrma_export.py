@@ -12,8 +12,11 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
+from viewer.diagnostics import Diagnostic
+from viewer.export import MotionOptions, export_animation
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actor
+from viewer.rig.motion.single_frame import single_frame
 from viewer.rig.scene import Actor
 
 LIMBS = (("leftUpperArm", "leftLowerArm"), ("rightUpperLeg", "rightLowerLeg"), ("hips", "head"))
@@ -104,3 +107,21 @@ def test_expressions_are_written_and_other_figures_refused(
     assert_allclose(found.pose.shape_weights[names.index("happy")], 0.5, rtol=0, atol=1e-6)
     assert run(["convert", "-o", str(tmp_path / "fox.vrma")]) == 2
     assert "required human bones not found" in capsys.readouterr().err
+
+
+def test_scale_that_the_format_cannot_hold_is_reported(tmp_path: Path) -> None:
+    """The hips are written where they are; all other bones keep their distances from the hips."""
+    hero, out = tmp_path / "hero.vrm", tmp_path / "out.vrma"
+    hero.write_bytes(swinging().glb())
+    actor = load(hero).actors[0]
+    assert not any(note.code == "X002" for note in _exported(actor, out))
+    actor.pose.figure_scale = 2.0
+    (note,) = (note for note in _exported(actor, out) if note.code == "X002")
+    places = viewer.joint_matrices(actor.figure, viewer.rest_pose(actor.figure.skeleton))[:, :3, 3]
+    own = dict(actor.figure.skeleton.humanoid.joints)
+    farthest = max(np.linalg.norm(places[joint] - places[own["hips"]]) for joint in own.values())
+    assert note.values["joint"].values["distance"] == pytest.approx(farthest, rel=1e-5)
+
+
+def _exported(actor: Actor, path: Path) -> list[Diagnostic]:
+    return export_animation(single_frame(actor), path, "vrma", MotionOptions())
