@@ -147,3 +147,20 @@ def test_motions_are_recognised_in_spite_of_objects_that_cannot_be_read(tmp_path
     objects = np.array([gzip.GzipFile], dtype=object)
     np.savez(tmp_path / "a.npz", mocap_framerate=60.0, labels=objects, **arrays)
     assert detect(Source.open(tmp_path / "a.npz")) == "amass"
+
+
+@pytest.mark.parametrize(
+    ("shape", "text"),
+    [
+        ((6, 263), "probably features of HumanML3D or KIT"),
+        ((6, 322), "probably motions of Motion-X"),
+        ((6, 22, 3), "probably positions of joints"),
+        ((6, 72), "found a single array (6 x 72 float64)"),
+    ],
+)
+def test_array_without_a_name_is_described(tmp_path, shape, text):
+    np.save(tmp_path / "a.npy", np.zeros(shape))
+    with pytest.raises(FormatError) as caught:
+        detect(Source.open(tmp_path / "a.npy"))
+    assert caught.value.diagnostic.key == "F002.unnamed-array"
+    assert text in str(caught.value)

@@ -24,6 +24,8 @@ MESSAGES = {
     "W003.finite": _FINITE,
     "F003.limit": _LIMIT,
     "W003.limit": _LIMIT,
+    "F002.unnamed-array": "expected arrays with names, as in .npz or .pkl, found a single array "
+    "({found}){hint:+, {}}",
     "F002.npz": "expected a valid .npz file, found a damaged one ({reason:text})",
     "F002.npz-twice": "{item:text}: expected a single entry with this name, found {found}",
     "F002.npz-encrypted": "{item:text}: expected stored or deflated data, found encrypted data",
@@ -112,7 +114,12 @@ PHRASES = {
     "row-vertex": "vertex {index}",
     "row-triangle": "triangle {index}",
     "row-joint": "joint {index}",
-    "row-frame": "row {index}",
+    "array-humanml": "probably features of HumanML3D or KIT, which are not read: recover joints or "
+    "SMPL poses with its own code first",
+    "array-motionx": "probably motions of Motion-X, which are not read: save its columns under the "
+    "names of SMPL-X (global_orient, body_pose, transl, betas …)",
+    "array-joints": "probably positions of joints, which are not read: fit SMPL poses to them "
+    "first",
     "element": "{indices:list}",
     # Unsupported values
     "unread-objects": "object array",

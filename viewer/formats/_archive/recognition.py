@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 
+from viewer.diagnostics import Phrase
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of
-from viewer.formats._archive.values import Archive
+from viewer.formats._archive.values import Archive, describe
 from viewer.formats._format import Format
 from viewer.formats._source import Source
 from viewer.phrases import printable
@@ -32,9 +33,23 @@ def archive_format(source: Source, formats: Mapping[str, Format]) -> str:
         return "video_mocap"
     if not keys:
         raise source.fault("F002.empty-archive")
+    if archive.kind == "npy" and keys == ("arr_0",) and archive.shape(keys[0]):
+        shape = archive.shape(keys[0])
+        known = next((text for sizes, text in _ARRAYS if shape[-len(sizes) :] == sizes), None)
+        found = describe(archive.get(keys[0]))
+        hint = Phrase(known) if known else ""
+        raise source.fault("F002.unnamed-array", found=found, hint=hint)
     raise source.fault("F002.unknown-archive", found=[printable(key, 40) for key in keys])
 
 
+# Arrays of text-to-motion work, by the sizes of their last axes.
+_ARRAYS = (
+    ((263,), "array-humanml"),
+    ((251,), "array-humanml"),
+    ((322,), "array-motionx"),
+    ((22, 3), "array-joints"),
+    ((21, 3), "array-joints"),
+)
 _OF_EASYMOCAP = ("Rh", "Th", "keypoints3d", "annots")
 
 
