@@ -299,7 +299,7 @@ def test_strings_of_any_encoding_are_read(value: Any) -> None:
     ("value", "found"),
     [
         (1, ("F002.text", None, {"item": "v", "found": Phrase("found-value", value="1")})),
-        (["a"], ("F002.text", None, {"item": "v", "found": Phrase("found-list", n=1)})),
+        (["a", "b"], ("F002.text", None, {"item": "v", "found": Phrase("found-list", n=2)})),
         (np.array(["a", "b"]), ("F002.text", None, {"item": "v", "found": Phrase("found-texts",
          shape=(2,))})),
         (ROWS, ("F002.text", None, {"item": "v", "found": Phrase("found-array", shape=(4, 3),
