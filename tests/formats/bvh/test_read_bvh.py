@@ -342,6 +342,15 @@ def test_the_axis_along_which_frames_are_upright_is_up() -> None:
     assert warnings == [Phrase("up-of-frames", up="z", axis="+y")]
 
 
+def test_frames_are_named_as_the_evidence_if_the_rest_pose_has_another_axis() -> None:
+    # The rest pose is along x, and rotated by 90 degrees about z in every frame.
+    text = GOOD.replace("0.0 -0.9 0.0", "-0.9 0 0").replace("0.0 0.6 0.0", "0.6 0 0")
+    rows = "0 0 1 90 0 0 0 0 0 0 0 0 0 0 0\n" * 2
+    motion, warnings = read(text.partition("0.0333333\n")[0] + "0.0333333\n" + rows)
+    assert ("up", "y, from the frames") in motion.figure.facts
+    assert warnings == [Phrase("up-of-frames", up="y", axis="+x")]
+
+
 def test_bvh_is_recognised_by_content() -> None:
     assert detect(Source("x.bvh", GOOD.encode())) == "bvh"
     assert detect(Source("x.txt", b"  hierarchy\nroot a{}")) == "bvh"

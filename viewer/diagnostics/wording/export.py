@@ -143,8 +143,8 @@ MESSAGES = {
     "file are others: {names:list8}",
     "X005.skel-scaled": "joints are scaled, which .skel cannot store: the bindings of the .skin "
     "scale the vertices, and bones keep their lengths when the file is posed",
-    "X005.skel-names": "{n:#name} of joints {n:?is|are} changed, because .skel has no braces or "
-    "keywords in names: {names:list8}",
+    "X005.skel-names": "{n:#joint name|is|are} changed, because .skel has no braces or keywords in "
+    "names: {names:list8}",
     "X005.seams": "split at texture seams: {before} vertices become {after} in the .skin",
     "X005.common-root": "several roots: a common parent joint {joint:name} was added",
     "X005.unit-unknown": "lengths are unchanged: the unit of {figure:text} is unknown",

@@ -168,12 +168,15 @@ def guess_up(
             return up, (("up", f"{up}, from the rest skeleton"),), notes
         note = Phrase("up-of-frames", up=other, axis=rest or Phrase("up-unclear"))
         return other, (("up", f"{other}, from the frames"),), (note,)
-    told = []
     if up == "z":
-        told.append(Phrase("up-of-head", up="z"))
-    elif rest not in ("+y", ""):
-        told.append(Phrase("up-against-rest", up="y", axis=rest))
-    return up, (("up", f"{up}, from the rest skeleton"),), tuple(told)
+        return "z", (("up", "z, from the rest skeleton"),), (Phrase("up-of-head", up="z"),)
+    if rest == "+y":
+        return "y", (("up", "y, from the rest skeleton"),), ()
+    if stands == "+y":
+        note = Phrase("up-of-frames", up="y", axis=rest or Phrase("up-unclear"))
+        return "y", (("up", "y, from the frames"),), (note,)
+    told = (Phrase("up-against-rest", up="y", axis=rest),) if rest else ()
+    return "y", (("up", "y, assumed"),), told
 
 
 def _lies(posed: Floats, along: str, up: str, size: float) -> bool:
