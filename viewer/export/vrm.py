@@ -33,8 +33,9 @@ from viewer.export._vrm.standing import in_t_pose, standing
 from viewer.export._vrm.upgraded import upgraded
 from viewer.formats._vrm.bones import given_bones
 from viewer.formats._vrm.conformance import MOST_WEIGHT, is_weight, weighted_binds
-from viewer.formats._vrm.json_parts import part
+from viewer.formats._vrm.json_parts import listed, part
 from viewer.formats._vrm.numbers import value_of
+from viewer.formats._vrm.springs import EXTENDED
 from viewer.rig.figure import Figure
 from viewer.rig.file_record import VrmRecord
 from viewer.rig.humanoid import REQUIRED_BONES
@@ -232,6 +233,9 @@ def _add_kept(
     if record.version == 1 and not data["meta"].get("name"):
         data["meta"]["name"] = text_of(body.figure.name)
     _add(document, body, built, extensions)
+    colliders = listed(extensions.get("VRMC_springBone"), "colliders")
+    if any(part(each, "extensions", EXTENDED) is not None for each in colliders):
+        _declare(document, EXTENDED)
     return [_written(data, extensions, record.version), *_lost(maps.lost)]
 
 

@@ -12,6 +12,7 @@ from formats.vrm.swinging import HAIR, swinging
 from numpy.testing import assert_allclose
 
 import viewer
+from viewer.cli import run
 from viewer.loading import MotionSettings, load
 from viewer.rig.motion.evaluation import pose_actor
 from viewer.rig.motion.instances import pose_actors
@@ -146,3 +147,30 @@ def test_baked_frames_contain_the_simulation(folder: Path) -> None:
     actor.clip, actor.springs = with_baked_springs(actor, 30.0), None
     for frame, points in zip((0, 7, 20), wanted, strict=True):
         assert_allclose(hair(actor, frame / 30), points, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "tail", "radius"),
+    [
+        ({"sphere": {"offset": [1, 2, 3], "radius": 0.5, "inside": True}}, 1, [1, 2, 3], 0.5),
+        ({"capsule": {"offset": [1, 2, 3], "tail": [4, 5, 6], "radius": 1}}, 0, [4, 5, 6], 1.0),
+        ({"plane": {"offset": [1, 2, 3], "normal": [0, 1, 0]}}, 2, [1, 3, 3], 0.0),
+        ({"plane": {"offset": [1, 2, 3]}}, 2, [1, 2, 4], 0.0),
+    ],
+)
+def test_extended_colliders_replace_the_shape(
+    tmp_path: Path, shape: dict[str, Any], kind: int, tail: list[float], radius: float
+) -> None:
+    file, name = swinging(1), "VRMC_springBone_extended_collider"
+    (first, *_) = file.root["extensions"]["VRMC_springBone"]["colliders"]
+    first["extensions"] = {name: {"specVersion": "1.0", "shape": shape}}
+    file.root["extensionsUsed"] = [*file.root.get("extensionsUsed", []), name]
+    path, out = tmp_path / "a.vrm", tmp_path / "b.vrm"
+    path.write_bytes(file.glb())
+    assert run(["convert", str(path), "-o", str(out)]) == 0
+    for each in (path, out):  # the extension is kept when it is written
+        scene = viewer.load(each)
+        shapes = springs_in(scene.actors[0]).colliders
+        assert shapes.kinds[0] == kind and shapes.radii[0] == radius
+        assert_allclose([shapes.offsets[0], shapes.tails[0]], [[1, 2, 3], tail], atol=1e-12)
+        assert not [found for found in scene.diagnostics if name in found.message]

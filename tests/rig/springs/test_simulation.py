@@ -13,7 +13,7 @@ from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.kinematics import forward_kinematics
 from viewer.rig.skeleton import Skeleton, ball_skeleton
 from viewer.rig.springs.simulation import STEPS_PER_SECOND, Simulation
-from viewer.rig.springs.springs import Colliders, Springs
+from viewer.rig.springs.springs import INSIDE, PLANE, Colliders, Springs
 
 STEP = 1.0 / STEPS_PER_SECOND
 
@@ -125,6 +125,42 @@ def test_sphere_stops_the_point_at_the_sum_of_both_radii() -> None:
     assert_allclose(np.linalg.norm(tails.now[0] - [0, 0, 0]), 0.75, rtol=0, atol=STEP / 2)
     assert_allclose(np.linalg.norm(tails.now[0] - [0, 1, 0]), 1.0, rtol=0, atol=1e-12)
     assert tails.now[0, 0] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "offset", "tail", "radius"),
+    [
+        # A floor at the height -0.5 from the pivot.
+        (PLANE, (0, -0.5, 0), (0, 0.5, 0), 0.0),
+        # Hollow shapes around the point at rest, 1 from the pivot.
+        (INSIDE, (1, 0, 0), (1, 0, 0), 0.8),
+        (INSIDE, (1, 0, -2), (1, 0, 2), 0.8),
+    ],
+    ids=["plane", "sphere", "capsule"],
+)
+def test_planes_and_hollow_shapes_hold_the_point(
+    kind: int, offset: tuple[float, ...], tail: tuple[float, ...], radius: float
+) -> None:
+    """The point with the radius 0.25 falls from +x onto the plane, or to the wall of the shape."""
+    rows = np.array([offset], float), np.array([tail], float), np.array([radius])
+    shape = Colliders(np.array([1]), *rows, np.array([kind]))
+    springs = springs_of(
+        [0],
+        [[1, 0, 0]],
+        gravity=(0, -1, 0),
+        drags=0.3,
+        radii=0.25,
+        colliders=shape,
+        obstacles=((0,),),
+    )
+    skeleton = skeleton_of(springs, (-1, -1), ((0, 1, 0), (0, 1, 0)))
+    tails, _ = run(skeleton, 600)
+    point = tails.now[0] - [0, 1, 0]
+    if kind == PLANE:
+        assert_allclose(point[1], -0.25, rtol=0, atol=STEP / 2)
+    else:
+        assert_allclose(np.linalg.norm(point - [1, 0, 0]), 0.8 - 0.25, rtol=0, atol=STEP / 2)
+    assert point[0] > 0.5
 
 
 @pytest.mark.parametrize("center", [-1, 0])

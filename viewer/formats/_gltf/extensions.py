@@ -27,6 +27,7 @@ _CHARACTERS = (
     "VRM",
     "VRMC_node_constraint",
     "VRMC_springBone",
+    "VRMC_springBone_extended_collider",
     "VRMC_vrm",
     "VRMC_vrm_animation",
 )

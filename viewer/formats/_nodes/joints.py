@@ -221,7 +221,7 @@ def _springs_of(springs: Springs, own: Mapping[int, int]) -> Springs | None:
         centers=np.array([own.get(int(springs.centers[row]), -1) for row in rows]),
         colliders=Colliders(
             np.array([own[int(shapes.joints[index])] for index in kept], np.int32),
-            *(values[kept] for values in (shapes.offsets, shapes.tails, shapes.radii)),
+            *(getattr(shapes, name)[kept] for name in ("offsets", "tails", "radii", "kinds")),
         ),
         obstacles=tuple(
             tuple(places[index] for index in springs.obstacles[row] if index in places)

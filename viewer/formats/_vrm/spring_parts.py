@@ -11,6 +11,7 @@ from viewer.formats._nodes.content import NodeTree
 from viewer.formats._vrm.json_parts import is_index, listed
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.rotation import quaternion_to_matrix
+from viewer.rig.springs.springs import OUTSIDE
 
 __all__ = [
     "Shape",
@@ -38,12 +39,13 @@ class SpringJoint:
 
 @dataclass(frozen=True, slots=True)
 class Shape:
-    """A sphere or capsule."""
+    """A sphere, capsule or plane, as in ``Colliders``."""
 
     node: int
     offset: Floats
     tail: Floats
     radius: float
+    kind: int = OUTSIDE
 
 
 def obstacles_of(spring: Any, groups: list[tuple[int, ...]]) -> tuple[int, ...]:

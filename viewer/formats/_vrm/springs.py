@@ -6,7 +6,9 @@
         springs         joints (node, stiffness, dragForce, gravityPower, gravityDir, hitRadius),
                         center (node), colliderGroups; each joint points at the next one
         colliderGroups  colliders
-        colliders       node, shape: sphere (offset, radius) or capsule (offset, tail, radius)
+        colliders       node, shape: sphere (offset, radius) or capsule (offset, tail, radius);
+                        VRMC_springBone_extended_collider replaces the shape: also inside, or
+                        plane (offset, normal)
 
 Version 0.x is in ``old_springs.py``.
 """
@@ -29,11 +31,12 @@ from viewer.formats._vrm.spring_parts import (
     obstacles_of,
     tail_between,
 )
-from viewer.rig.springs.springs import Colliders, Springs
+from viewer.rig.springs.springs import INSIDE, OUTSIDE, PLANE, Colliders, Springs
 
 __all__ = ["read_springs"]
 
 EXTENSION = "VRMC_springBone"
+EXTENDED = "VRMC_springBone_extended_collider"
 _DOWN = (0.0, -1.0, 0.0)
 
 
@@ -78,6 +81,7 @@ def _springs(joints: list[SpringJoint], shapes: list[Shape], n_chains: int) -> S
             np.array([each.offset for each in shapes]).reshape(-1, 3),
             np.array([each.tail for each in shapes]).reshape(-1, 3),
             np.array([each.radius for each in shapes]),
+            np.array([each.kind for each in shapes], np.int32),
         ),
         obstacles=tuple(each.obstacles for each in joints),
         n_chains=n_chains,
@@ -89,7 +93,9 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[Shape], lis
     places: dict[int, int] = {}
     shapes: list[Shape] = []
     for index, each in enumerate(listed(told, "colliders")):
-        shape = _shape(part(each, "node"), part(each, "shape"), file.tree.n_nodes)
+        extended = part(each, "extensions", EXTENDED, "shape")
+        told_shape = part(each, "shape") if extended is None else extended
+        shape = _shape(part(each, "node"), told_shape, file.tree.n_nodes)
         if shape is None:
             at = f"/extensions/{EXTENSION}/colliders/{index}"
             source.warn("G006.collider", at)
@@ -104,8 +110,8 @@ def _shapes(file: NodeFile, told: Any, source: Source) -> tuple[list[Shape], lis
 
 
 def _shape(node: Any, told: Any, n_nodes: int) -> Shape | None:
-    """Return a collider of version 1.0; None if it is invalid."""
-    kinds = [kind for kind in ("sphere", "capsule") if isinstance(part(told, kind), dict)]
+    """Return a collider of version 1.0, possibly an extended one; None if it is invalid."""
+    kinds = [kind for kind in ("sphere", "capsule", "plane") if isinstance(part(told, kind), dict)]
     if not is_index(node, n_nodes) or len(kinds) != 1:
         return None
     given = part(told, kinds[0])
@@ -114,7 +120,12 @@ def _shape(node: Any, told: Any, n_nodes: int) -> Shape | None:
     radius = value_of(part(given, "radius"), 0.0)
     if offset is None or tail is None or radius is None:
         return None
-    return Shape(node, offset, tail, radius)
+    if kinds[0] == "plane":
+        normal = rows_of(part(given, "normal"), (0.0, 0.0, 1.0))
+        if normal is None or not normal.any():
+            return None
+        return Shape(node, offset, offset + normal, 0.0, PLANE)
+    return Shape(node, offset, tail, radius, INSIDE if part(given, "inside") is True else OUTSIDE)
 
 
 def _chains(

@@ -23,7 +23,7 @@ from viewer.rig.geometry.quaternion import between, multiply
 from viewer.rig.geometry.rotation import quaternion_to_matrix
 from viewer.rig.geometry.vectors import unit
 from viewer.rig.skeleton import Skeleton
-from viewer.rig.springs.springs import Springs
+from viewer.rig.springs.springs import INSIDE, PLANE, Springs
 
 __all__ = ["STEPS_PER_SECOND", "Simulation", "Tails"]
 
@@ -174,17 +174,26 @@ class Simulation:
     def _pushed(
         self, points: Floats, rows: Ints, which: Ints, world: Floats
     ) -> tuple[Floats, Bools]:
-        """Return points moved to the surface of one collider each, and whether they were inside."""
+        """Return points moved to the surface of one collider each, and which were beyond it."""
         shapes = self._springs.colliders
         matrices = world[shapes.joints[which]]
         start = _points(matrices, shapes.offsets[which])
         along = _points(matrices, shapes.tails[which]) - start
-        delta = points - start
+        delta, kinds = points - start, shapes.kinds[which]
+        normals = unit(along)
+        heights = np.einsum("na,na->n", normals, delta)
         square = np.einsum("na,na->n", along, along)
         fraction = np.einsum("na,na->n", along, delta) / np.maximum(square, _SHORT)
         delta = delta - np.clip(fraction, 0.0, 1.0)[:, None] * along
-        distance = np.linalg.norm(delta, axis=-1) - shapes.radii[which] - self._springs.radii[rows]
-        return points - unit(delta) * distance[:, None], distance < 0.0
+        own, reach = self._springs.radii[rows], np.linalg.norm(delta, axis=-1)
+        # Within a hollow shape, the point is moved towards the axis.
+        signs = np.where(kinds == INSIDE, -1.0, 1.0)
+        distance = signs * (reach - shapes.radii[which]) - own
+        directions = signs[:, None] * unit(delta)
+        is_plane = kinds == PLANE
+        distance = np.where(is_plane, heights - own, distance)
+        directions = np.where(is_plane[:, None], normals, directions)
+        return points - directions * distance[:, None], distance < 0.0
 
     def _arcs(self, rows: Ints, heads: Floats, points: Floats, factors: Floats) -> Floats:
         """Return the smallest rotations from the rest directions to the points: (N', 4)."""

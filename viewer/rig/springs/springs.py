@@ -10,30 +10,40 @@ from viewer.data_classes import dataclass
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats, Ints, frozen
 
-__all__ = ["Colliders", "Springs"]
+__all__ = ["INSIDE", "OUTSIDE", "PLANE", "Colliders", "Springs"]
+
+OUTSIDE, INSIDE, PLANE = 0, 1, 2
+"""Kinds of colliders."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Colliders:
-    """Spheres and capsules that follow joints.
+    """Spheres, capsules and planes that follow joints.
 
     Attributes
     ----------
     joints : (C,) int32
         Joint that each shape follows.
     offsets, tails : (C, 3)
-        Centres of both ends in joint space; equal for a sphere.
+        Centres of both ends in joint space; equal for a sphere. For a plane, a point on it and a
+        point in the direction of its normal.
     radii : (C,)
-        Scene units; joints do not scale them.
+        Scene units; joints do not scale them. 0 for a plane.
+    kinds : (C,) int32
+        ``OUTSIDE``, ``INSIDE`` or ``PLANE``: points stay outside of the shape, inside it, or on the
+        side of a plane to which its normal points. Empty if all are ``OUTSIDE``.
     """
 
     joints: Ints
     offsets: Floats
     tails: Floats
     radii: Floats
+    kinds: Ints = ()  # type: ignore[assignment]  # converted to an array below
 
     def __post_init__(self) -> None:
         count = len(self.joints)
+        kinds = self.kinds if len(self.kinds) else np.zeros(count, np.int32)
+        object.__setattr__(self, "kinds", frozen("kinds", kinds, (count,), np.int32))
         for name, shape in (("offsets", (count, 3)), ("tails", (count, 3)), ("radii", (count,))):
             object.__setattr__(self, name, frozen(name, getattr(self, name), shape))
         object.__setattr__(self, "joints", frozen("joints", self.joints, (count,), np.int32))
