@@ -65,7 +65,7 @@ USAGES = {
     "models": "[list | add NAME] [options]",
     "doctor": "[--bench]",
     "help": "[TOPIC | COMMAND]",
-    "completion": "bash|zsh|tcsh",
+    "completion": "bash|zsh|tcsh|fish",
 }
 
 
