@@ -80,3 +80,32 @@ def test_rows_of_lint_count_findings(tmp_path) -> None:
     row = saved(tmp_path / "t.csv", "lint", [result])[0]
     assert (row["errors"], row["warnings"], row["notes"]) == ("2", "1", "0")
     assert row["codes"] == "S004 W002"
+
+
+def test_rows_of_info_are_figures_and_each_cell_is_one_value(tmp_path) -> None:
+    base = {"size": 2.5, "unit": "m", "model": {}}
+    clip = {"range": [1.0, 3.5], "frames": 6, "present_frames": 4, "frame_rate": 2.0,
+            "gender": "female", "model": "SMPL-H"}  # fmt: skip
+    keys = {"range": [0.0, 1.0], "frame_rate": 30.0, "regular": False}
+    actors = [
+        base | {"name": "ann", "clip": clip, "skeleton": {"joints": 24}},
+        base | {"name": "fox", "clip": keys, "animations": [{}, {}],
+                "mesh": {"vertices": 8, "triangles": 12}},
+        base | {"name": "body", "unit": None,
+                "model": {"facts": {"model": "SMPL", "gender": "male"}}},
+    ]  # fmt: skip
+    results = [
+        Result(Item(0, (), "", "x"), "done", values={"actors": actors}),
+        Result(Item(1, (), "", "y"), "failed", 2, message="cannot be read"),
+    ]
+    assert save_table(tmp_path / "t.csv", "info", results) == 2
+    with (tmp_path / "t.csv").open(newline="") as stream:
+        ann, fox, body, failed = csv.DictReader(stream)
+    motion = ("frames", "present_frames", "frame_rate", "duration", "gender", "model")
+    assert [ann[key] for key in motion] == ["6", "4", "2", "2.5", "female", "SMPL-H"]
+    assert [fox[key] for key in motion] == ["", "", "", "1", "", ""]
+    assert [body[key] for key in motion] == ["", "", "", "", "male", "SMPL"]
+    counts = ("figure", "figures", "joints", "vertices", "triangles", "animations", "unit")
+    assert [ann[key] for key in counts] == ["ann", "3", "24", "", "", "0", "m"]
+    assert [fox[key] for key in counts] == ["fox", "3", "", "8", "12", "2", "m"]
+    assert (failed["name"], failed["figures"], failed["message"]) == ("y", "", "cannot be read")

@@ -1,4 +1,4 @@
-"""Tables of a batch: one row per item, as CSV for spreadsheets and statistics."""
+"""Tables of a batch: one row per item (``info``: per figure), as CSV for statistics."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def ordered(results: Iterable[Result]) -> list[Result]:
 
 
 def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
-    """Write one row per item as CSV (RFC 4180, UTF-8); return the number of rows.
+    """Write the table as CSV (RFC 4180, UTF-8); return the number of items.
 
     Parameters
     ----------
@@ -51,13 +51,15 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     job : str
         Name of the command, which determines the columns.
     results : iterable of Result
-        Results in any order; rows are in the order of the inputs.
+        Results in any order; rows are in the order of the inputs. Each has one row; of ``info``,
+        one row per figure.
 
     Raises
     ------
     OutputError
         If it cannot be written.
     """
+    results = list(results)
     rows = table_rows(job, results)
     stream = io.StringIO(newline="")
     writer = csv.writer(stream)
@@ -67,22 +69,23 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     # Without this mark, Excel assumes the system's encoding.
     mark = b"" if text.isascii() else b"\xef\xbb\xbf"
     save_bytes(path, mark + text.encode("utf-8", "backslashreplace"))
-    return len(rows)
+    return len(results)
 
 
 def table_rows(job: str, results: Iterable[Result]) -> list[list[Cell]]:
     """Return the rows of a table, without the header."""
-    cells_of = _CELLS.get(job, _output_cells)
+    rows_of = _ROWS.get(job, _output_rows)
     return [
         [
             result.item.name,
             result.status,
             result.exit_code,
-            *cells_of(result),
+            *cells,
             row_message(result),
             round(result.seconds, 3),
         ]
         for result in ordered(results)
+        for cells in rows_of(result)
     ]
 
 
@@ -139,7 +142,7 @@ def _number(value: object) -> float:
     return math.nan if value is None else float(str(value))
 
 
-def _diff_cells(result: Result) -> list[Cell]:
+def _diff_rows(result: Result) -> list[list[Cell]]:
     found = comparisons(result)
     within = [one.get("within") for one in found if one.get("within") is not None]
     mismatches = mismatches_of(result)
@@ -152,7 +155,7 @@ def _diff_cells(result: Result) -> list[Cell]:
     actors = [actor for one in found for actor in one.get("actors", ())]
     sizes = [_number(actor["size"]) for actor in actors]
     units = {actor.get("unit") or "" for actor in actors}
-    return [*cells, max(sizes, default=None), " ".join(sorted(units)), "; ".join(mismatches)]
+    return [[*cells, max(sizes, default=None), " ".join(sorted(units)), "; ".join(mismatches)]]
 
 
 def mismatches_of(result: Result) -> list[str]:
@@ -194,16 +197,44 @@ def _measure_columns(group: str) -> list[str]:
     ]
 
 
-def _lint_cells(result: Result) -> list[Cell]:
+def _lint_rows(result: Result) -> list[list[Cell]]:
     counts = result.values.get("counts", {})
     codes = sorted({finding["code"] for finding in result.values.get("findings", ())})
-    return [*(counts.get(kind) for kind in ("error", "warning", "note")), " ".join(codes)]
+    return [[*(counts.get(kind) for kind in ("error", "warning", "note")), " ".join(codes)]]
 
 
-def _output_cells(result: Result) -> list[Cell]:
-    return [result.attempts, "; ".join(result.outputs)]
+def _info_rows(result: Result) -> list[list[Cell]]:
+    """Return a row per figure, so that each cell holds one value; one empty row if there is none.
+
+    A capture of two people has two rows, and a column of numbers stays one for pandas.
+    """
+    actors = result.values.get("actors", ())
+    return [_figure_cells(actor, len(actors)) for actor in actors] or [[None] * len(_FIGURE)]
 
 
+def _figure_cells(actor: Mapping[str, Any], n_figures: int) -> list[Cell]:
+    clip, facts = actor.get("clip", {}), actor["model"].get("facts", {})
+    start, end = clip.get("range", (None, None))
+    skeleton, mesh = actor.get("skeleton", {}), actor.get("mesh", {})
+    # The rate that ``info`` gives to keys at irregular times is only a default.
+    rate = clip.get("frame_rate") if clip.get("regular", True) else None
+    return [
+        *(actor["name"], n_figures, clip.get("frames"), clip.get("present_frames"), rate),
+        None if start is None else end - start,
+        *(clip.get(name) or facts.get(name) for name in ("gender", "model")),
+        *(skeleton.get("joints"), mesh.get("vertices"), mesh.get("triangles")),
+        *(len(actor.get("animations", ())), actor["size"], actor["unit"]),
+    ]
+
+
+def _output_rows(result: Result) -> list[list[Cell]]:
+    return [[result.attempts, "; ".join(result.outputs)]]
+
+
+_FIGURE = (
+    *("figure", "figures", "frames", "present_frames", "frame_rate", "duration", "gender"),
+    *("model", "joints", "vertices", "triangles", "animations", "size", "unit"),
+)
 _COLUMNS: dict[str, Sequence[str]] = {
     "diff": [
         *("within", "mismatches"),
@@ -211,5 +242,10 @@ _COLUMNS: dict[str, Sequence[str]] = {
         *("size", "unit", "differs_in"),
     ],
     "lint": ["errors", "warnings", "notes", "codes"],
+    "info": _FIGURE,
 }
-_CELLS: dict[str, Callable[[Result], list[Cell]]] = {"diff": _diff_cells, "lint": _lint_cells}
+_ROWS: dict[str, Callable[[Result], list[list[Cell]]]] = {
+    "diff": _diff_rows,
+    "lint": _lint_rows,
+    "info": _info_rows,
+}

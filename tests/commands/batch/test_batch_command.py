@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 from pathlib import Path
 
@@ -296,3 +297,22 @@ def test_help_of_a_job_has_the_options_of_its_command(capsys):
         run(["batch", "render", "--help"])
     out = capsys.readouterr().out
     assert "--turntable" in out and "--shard" in out and "PATHS" in out
+
+
+def test_table_of_info_has_a_row_per_figure(rigs, capsys):
+    """The inputs are three frames of a BVH at 50 fps, two skeletons, and a broken file."""
+    (rigs / "in" / "walk.bvh").write_text(
+        "HIERARCHY\nROOT hips\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        "JOINT knee\n{\nOFFSET 0 1 0\nCHANNELS 3 Zrotation Xrotation Yrotation\n"
+        "End Site\n{\nOFFSET 0 1 0\n}\n}\n}\n"
+        "MOTION\nFrames: 3\nFrame Time: 0.02\n" + "0 0 0 0 0 0\n" * 3
+    )
+    assert run(["batch", "info", "in", "--table", "t.csv"]) == 1
+    assert "t.csv: table of 4 items" in capsys.readouterr().out
+    rows = {row["name"]: row for row in csv.DictReader(Path("t.csv").read_text().splitlines())}
+    walk, rig, bad = rows["walk.bvh"], rows["a/one.skel"], rows["b/bad.skel"]
+    shown = ("figure", "figures", "frames", "frame_rate", "duration", "vertices", "animations")
+    assert [walk[name] for name in shown] == ["walk", "1", "3", "50", "0.04", "", "0"]
+    assert [rig[name] for name in shown] == ["one", "1", "", "", "", "", "0"]
+    assert [bad[name] for name in shown] == [""] * len(shown)
+    assert bad["status"] == "failed" and bad["message"]

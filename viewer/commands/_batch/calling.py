@@ -97,7 +97,7 @@ def batch(
     report : str or path
         File that gets one line of JSON per input; by default ``report.jsonl`` in ``out``.
     table : str or path
-        CSV file with one row per input.
+        CSV file with one row per input; with ``info``, one per figure of each input.
     overview : str or path
         A page (``.html``) of all inputs, for ``render``, ``lint``, ``diff`` and functions; for
         ``render`` and ``diff`` also contact sheets (``.png``).

@@ -30,7 +30,8 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
         "--table",
         default="",
         metavar="FILE.csv",
-        help="write one row per input (with --shard 0/8: FILE.0-of-8.csv)",
+        help=f"write one row per {'figure of each input' if job == 'info' else 'input'} (with "
+        "--shard 0/8: FILE.0-of-8.csv)",
     )
     if job in _OVERVIEWS:
         kinds = "a page (.html) of all inputs"
