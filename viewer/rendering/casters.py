@@ -80,7 +80,7 @@ class Casters:
                 skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
                 program = joint_program(self.programs, skeleton, options, "", fragment)
                 draw_joints(program, skeleton, placement, view, options)
-            if has_points(actor):
+            if has_points(actor, options):
                 points = self.buffers.points_of(actor)
                 self.late.point_pass.draw_shapes(points, actor.placement, view, fragment)
 

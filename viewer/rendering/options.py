@@ -180,6 +180,8 @@ class DisplayOptions:
         Draw the coarser mesh of figures that have one.
     keypoints : bool
         Draw the figure's keypoints as markers.
+    captured_keypoints : bool
+        Draw the keypoints of captures.
     hidden_parts : tuple of int
         Indices of hidden body parts.
     path_joints : tuple of (actor, joint)
@@ -230,6 +232,7 @@ class DisplayOptions:
     legend: bool = False
     reduced: bool = False
     keypoints: bool = False
+    captured_keypoints: bool = True
     hidden_parts: tuple[int, ...] = ()
     path_joints: tuple[tuple[int, int], ...] = ()
     path_seconds: float = 0.0

@@ -137,7 +137,7 @@ class PickPass:
         for index, actor in enumerate(scene.actors):
             if shows_skeleton(actor, options):
                 self._draw_skeleton(index, actor, near, options)
-            if has_points(actor):
+            if has_points(actor, options):
                 self._draw_points(index, actor, near, options)
             if has_markers(actor, options):
                 self._draw_markers(index, actor, near, options)

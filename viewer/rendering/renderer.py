@@ -215,7 +215,9 @@ class Renderer:
             self.ground_pass.draw_grid(view, box, options.background)
         draw_translucent(self.mesh_pass, meshes, view, options)
         self._draw_blended(meshes, view, options)
-        for actor in filter(has_points, scene.actors):
+        for actor in scene.actors:
+            if not has_points(actor, options):
+                continue
             points = self.buffers.points_of(actor)
             self.late.point_pass.draw(points, actor.placement, view, options, bool(meshes))
         self.late.draw_motion_paths(scene, view, options, target.size)
@@ -308,9 +310,10 @@ class Renderer:
             figures = [actor.figure for actor in scene.actors if actor.figure.mesh is not None]
             self.scalars.update(meshes.singles, options, (whose, joint), figures)
         update_skeletons(self.buffers, scene.actors, options)
-        for actor in filter(has_points, scene.actors):
-            points = self.buffers.points_of(actor)
-            points.update(actor, actor.placement, view, options.min_confidence)
+        for actor in scene.actors:
+            if has_points(actor, options):
+                points = self.buffers.points_of(actor)
+                points.update(actor, actor.placement, view, options.min_confidence)
         return meshes
 
     def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:

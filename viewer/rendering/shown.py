@@ -171,9 +171,11 @@ def has_joint_marks(options: DisplayOptions) -> bool:
     return wanted and options.show != "binding"
 
 
-def has_points(actor: Actor) -> bool:
+def has_points(actor: Actor, options: DisplayOptions) -> bool:
     """Return whether an actor's captured points are drawn."""
-    return actor.is_drawn and actor.figure.points is not None and actor.points is not None
+    if not options.captured_keypoints or not actor.is_drawn:
+        return False
+    return actor.figure.points is not None and actor.points is not None
 
 
 def placement_of(actor: Actor, options: DisplayOptions) -> Floats:

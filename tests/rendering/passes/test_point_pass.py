@@ -216,3 +216,11 @@ def test_radii_of_many_points_follow_their_density() -> None:
     # A cell of the grid has one or two points, so gaps are 1/48 or 1/48 divided by sqrt 2.
     radii = point_radii(points[None])
     assert 0.3 / 48 / 2 <= radii.min() <= radii.max() <= 0.3 / 48
+
+
+def test_hidden_points_leave_the_rest_of_the_picture_as_it_is(offscreen):
+    body = Actor(Figure("square", square()))
+    without = front_view(offscreen, Scene([body]))
+    both = Scene([body, dots((-1.0, 1.0, 0.5), (1.0, -1.0, 0.5))])
+    assert (front_view(offscreen, both) != without).any()
+    np.testing.assert_array_equal(front_view(offscreen, both, captured_keypoints=False), without)

@@ -139,6 +139,10 @@ def _draw_extras(state: AppState) -> None:
     if any(one.figure.mesh and one.figure.mesh.colors is not None for one in state.scene.actors):
         options.vertex_colors = checkbox(state, "Vertex colours", options.vertex_colors)
         explain("vertex colours of the file, which are multiplied by the colours of materials")
+    if any(one.figure.points is not None for one in state.scene.actors):
+        name = "Captured keypoints"
+        options.captured_keypoints = checkbox(state, name, options.captured_keypoints)
+        explain("keypoints of captures, drawn over the bodies")
     if figure.keypoints is not None:
         options.keypoints = checkbox(state, "Keypoints", options.keypoints)
         if figure.reduced is not None:

@@ -179,7 +179,7 @@ class OutlinePass:
             return
         if shows_mesh(actor.figure, options):
             self._cover_mesh(actor, mask, view, options)
-        if has_points(actor):
+        if has_points(actor, options):
             self._cover_points(actor, mask, view, options)
 
     def _cover_joints(
