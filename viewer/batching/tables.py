@@ -14,7 +14,9 @@ from viewer.media.saving import save_bytes
 
 __all__ = [
     "MEASURES",
+    "Cell",
     "comparisons",
+    "figures_of",
     "mismatches_of",
     "ordered",
     "row_message",
@@ -208,8 +210,14 @@ def _info_rows(result: Result) -> list[list[Cell]]:
 
     A capture of two people has two rows, and a column of numbers stays one for pandas.
     """
+    rows = [[*figure.values()] for figure in figures_of(result)]
+    return rows or [[None] * len(_FIGURE)]
+
+
+def figures_of(result: Result) -> list[dict[str, Cell]]:
+    """Return the figures of an item of ``info``, each as the columns of its row."""
     actors = result.values.get("actors", ())
-    return [_figure_cells(actor, len(actors)) for actor in actors] or [[None] * len(_FIGURE)]
+    return [dict(zip(_FIGURE, _figure_cells(actor, len(actors)), strict=True)) for actor in actors]
 
 
 def _figure_cells(actor: Mapping[str, Any], n_figures: int) -> list[Cell]:

@@ -177,3 +177,19 @@ def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> Non
     with pytest.raises(Interrupted):
         save_overview(path, "render", results)
     assert [one.name for one in tmp_path.iterdir()] == ["o.png"] and path.read_bytes() == b"old"
+
+
+def test_page_of_info_lists_figures(tmp_path) -> None:
+    base = {"size": 2.0, "unit": "m", "model": {}}
+    clip = {"range": [0.0, 1.0], "frames": 1, "frame_rate": 2.0}
+    actors = [
+        base | {"name": EVIL, "clip": clip, "skeleton": {"joints": 24}},
+        base | {"name": "rock", "mesh": {"vertices": 8, "triangles": 12}},
+    ]
+    path = tmp_path / "o.html"
+    save_overview(
+        path, "info", [Result(Item(0, (), "", "x.glb"), "done", values={"actors": actors})]
+    )
+    page = Page(path)
+    assert page.row("x.glb")[2] == f"{EVIL}: 1 frame, 24 jointsrock: 12 triangles"
+    assert not [tag for tag, _ in page.tags if tag == "script"]

@@ -316,3 +316,21 @@ def test_table_of_info_has_a_row_per_figure(rigs, capsys):
     assert [rig[name] for name in shown] == ["one", "1", "", "", "", "", "0"]
     assert [bad[name] for name in shown] == [""] * len(shown)
     assert bad["status"] == "failed" and bad["message"]
+
+
+def test_every_job_writes_a_page_and_sheets_without_images_are_refused_first(rigs, capsys):
+    convert = ["batch", "convert", "in/a", "--with", "tiny.skin", "--to", "npz", "-o", "out"]
+    assert [run([*convert, "--overview", name]) for name in ("c.html", "c.png")] == [0, 2]
+    assert "c.html: overview of 1 item" in (said := capsys.readouterr()).out
+    assert (
+        "--overview: contact sheets show the images of render and diff: expected a page (.html) of "
+        'convert, found ".png"; viewer batch render draws the outputs' in said.err
+    )
+    assert '<td class="name">one.skel</td>' in Path("c.html").read_text()
+    for job in ("info", "lint", "rig"):
+        output = ["-o", "new"] if job == "rig" else []
+        assert run(["batch", job, "in", *output, "--overview", "o.png"]) == 2
+        assert f'expected a page (.html) of {job}, found ".png"' in capsys.readouterr().err
+    assert not Path("new").exists() and not Path("c.png").exists()
+    assert run(["batch", "info", "in/a", "--overview", "o.html"]) == 0
+    assert "one: 2 joints" in Path("o.html").read_text()

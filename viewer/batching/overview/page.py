@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from viewer.batching.items import Result
 from viewer.batching.overview.html import bar, document, table, tag, text_of
-from viewer.batching.tables import MEASURES, mismatches_of, ordered, row_message, worst_measure
+from viewer.batching.tables import (
+    MEASURES,
+    Cell,
+    figures_of,
+    mismatches_of,
+    ordered,
+    row_message,
+    worst_measure,
+)
 from viewer.data_classes import dataclass
 from viewer.media.saving import save_text
 from viewer.media.thumbnails import data_uri, thumbnail
@@ -144,6 +152,8 @@ def _columns(job: str, results: Sequence[Result]) -> list[_Column]:
     ]
     if job == "lint":
         columns.append(_Column("Findings", "", _findings))
+    if job == "info":
+        columns.append(_Column("Contents", "", _contents))
     if job == "diff":
         columns += [
             _distance_column(group, results) for group in MEASURES if _is_measured(group, results)
@@ -179,6 +189,20 @@ def _findings(result: Result) -> str:
         tag("span", counted(counts[kind], kind), kind) for kind in _SEVERITIES if counts.get(kind)
     ]
     return ", ".join(parts) or "none"
+
+
+def _contents(result: Result) -> str:
+    """Return a line about each figure of an item of ``info``."""
+    figures = figures_of(result)
+    lines = [_figure_line(figure) for figure in figures[:_MOST_MESSAGES]]
+    left = len(figures) - len(lines)
+    return "<br>".join(map(text_of, [*lines, *([f"and {left} more"] if left else [])]))
+
+
+def _figure_line(figure: Mapping[str, Cell]) -> str:
+    numbers = [(figure[f"{noun}s"], noun) for noun in ("frame", "joint", "triangle")]
+    found = [counted(number, noun) for number, noun in numbers if isinstance(number, int)]
+    return ": ".join(filter(None, (str(figure["figure"]), ", ".join(found))))
 
 
 def _is_measured(group: str, results: Iterable[Result]) -> bool:

@@ -99,8 +99,8 @@ def batch(
     table : str or path
         CSV file with one row per input; with ``info``, one per figure of each input.
     overview : str or path
-        A page (``.html``) of all inputs, for ``render``, ``lint``, ``diff`` and functions; for
-        ``render`` and ``diff`` also contact sheets (``.png``).
+        A page (``.html``) of all inputs; for ``render`` and ``diff`` also contact sheets
+        (``.png``).
     on_result : callable, optional
         Called with each result.
 

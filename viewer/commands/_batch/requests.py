@@ -73,7 +73,7 @@ def request_of(arguments: argparse.Namespace) -> tuple[Request, Job]:
         report=arguments.report or "",
         notes=notes,
         table=name_in_shard(arguments.table, arguments.shard),
-        overview=name_in_shard(getattr(arguments, "overview", ""), arguments.shard),
+        overview=name_in_shard(arguments.overview, arguments.shard),
         joint_map=getattr(arguments, "save_joint_map", None) or "",
     )
     may_replace = arguments.force or arguments.resume

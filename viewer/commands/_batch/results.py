@@ -15,7 +15,6 @@ from viewer.phrases import counted, printable
 
 __all__ = ["add_result_arguments", "check_results", "name_in_shard", "save_results"]
 
-_OVERVIEWS = {"render": "sheet.png", "lint": "page.html", "diff": "page.html"}
 _DRAWN = ("render", "diff")
 
 
@@ -33,16 +32,16 @@ def add_result_arguments(parser: argparse.ArgumentParser, job: str) -> None:
         help=f"write one row per {'figure of each input' if job == 'info' else 'input'} (with "
         "--shard 0/8: FILE.0-of-8.csv)",
     )
-    if job in _OVERVIEWS:
-        kinds = "a page (.html) of all inputs"
-        if job in _DRAWN:
-            kinds += ", or contact sheets of their images (.png, .jpg)"
-        group.add_argument(
-            "--overview",
-            default="",
-            metavar="FILE",
-            help=f"write {kinds}, such as {_OVERVIEWS[job]}; failed inputs are marked",
-        )
+    kinds = "a page (.html) of all inputs"
+    if job in _DRAWN:
+        kinds += ", or contact sheets of their images (.png, .jpg)"
+    example = "sheet.png" if job == "render" else "page.html"
+    group.add_argument(
+        "--overview",
+        default="",
+        metavar="FILE",
+        help=f"write {kinds}, such as {example}; failed inputs are marked",
+    )
     if job == "diff":
         group.add_argument(
             "--expect",
@@ -70,8 +69,11 @@ def check_results(job: str, table: str, overview: str, may_replace: bool, output
     if overview:
         check_overview(overview)
         if job not in _DRAWN and Path(overview).suffix.lower() not in PAGES:
+            is_figure = job in ("convert", "rig")
+            remedy = "; viewer batch render draws the outputs" if is_figure else ""
             raise ViewerError(
-                f'--overview: {job} draws nothing: expected .html, found "{Path(overview).suffix}"'
+                f"--overview: contact sheets show the images of {' and '.join(_DRAWN)}: expected a "
+                f'page (.html) of {job}, found "{Path(overview).suffix}"{remedy}'
             )
         if not output and Path(overview).suffix.lower() not in PAGES:
             raise ViewerError(
