@@ -98,7 +98,7 @@ def _add_output_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Render the images, write them, and print their names."""
     _check_overlay(arguments)
-    size = parse_size(arguments.size or _SIZE)
+    size = parse_size(_SIZE if arguments.size is None else arguments.size)
     output = Path(arguments.output)
     _check_suffix(arguments, output)
     request = request_of(arguments, output)
