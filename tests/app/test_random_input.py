@@ -17,6 +17,7 @@ from imgui_bundle import imgui
 from PIL import Image
 
 from viewer.app import menus
+from viewer.app.posing import pose_actions
 
 KEYS = [
     *"rskwntgfhzyoamcvedqx",
@@ -116,14 +117,14 @@ def _body_files(folder):
 def _keep_inside(folder, monkeypatch):
     """Let dialogs browse any folder, but write only into the given folder."""
     monkeypatch.setenv("HOME", str(folder))
-    for name in ("save_pose", "save_export"):
-        save = getattr(menus, name)
+    for module, name in ((pose_actions, "save_pose"), (menus, "save_export")):
+        save = getattr(module, name)
 
         def save_inside(state, path, save=save):
             if path.resolve().is_relative_to(folder.resolve()):
                 save(state, path)
 
-        monkeypatch.setattr(menus, name, save_inside)
+        monkeypatch.setattr(module, name, save_inside)
 
 
 @pytest.mark.parametrize("files", [_rig_files, _body_files], ids=["rig", "body"])

@@ -136,7 +136,7 @@ def test_python_examples_run_as_printed(
     for name, source in OWN.get(path.name, {}).items():
         if source is None:
             (folder / name).unlink()
-    monkeypatch.setattr("viewer.app.window.show", lambda scene: None)  # no display is needed
+    monkeypatch.setattr("viewer.show", lambda scene: None)  # no display is needed
     names: dict[str, object] = {}
     for example in examples:
         exec(compile(example, path.name, "exec"), names)

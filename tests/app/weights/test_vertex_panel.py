@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from imgui_bundle import imgui
@@ -281,7 +283,8 @@ def test_panel_needs_no_horizontal_scrolling(drive, rig, texts, width, digits):
 def test_weight_is_on_a_separate_line_after_a_long_name(drive, rig, texts):
     hand = drive(*rig, size=(1280, 800), samples=1)
     names = ("root", "a_name_that_is_as_long_as_some_are")
-    object.__setattr__(hand.state.actor.figure.skeleton, "names", names)
+    figure = hand.state.actor.figure
+    object.__setattr__(figure, "skeleton", replace(figure.require_skeleton(), names=names))
     pin_vertex(hand.state, 0, 4)
     hand.step(4)
     assert said(hand, texts).count("w2 = 0.5000") == 1

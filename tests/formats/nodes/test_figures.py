@@ -182,7 +182,7 @@ def test_skinning_method_stated_by_the_file_is_recommended():
     (note,) = notes.diagnostics.warnings
     assert (note.key, note.values) == (
         "F007.skinning-method",
-        {"names": ["body"], "method": "dqs"},
+        {"names": ["body"], "n": 1, "method": "dqs"},
     )
 
 

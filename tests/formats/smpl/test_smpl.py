@@ -311,9 +311,9 @@ def test_facts_list_used_ignored_and_unknown_keys(load):
     assert facts["coefficients"] == "10 shape, 0 expression"
     assert facts["correctives"] == "207 columns"
     assert facts["keys used"] == (
-        "v_template, f, kintree_table, J_regressor, shapedirs, posedirs, weights"
+        "v_template, f, kintree_table, J_regressor, shapedirs, posedirs, gender, weights"
     )
-    assert facts["keys not needed"] == "J, bs_style, bs_type, joint2num, gender"
+    assert facts["keys not needed"] == "J, bs_style, bs_type, joint2num"
     assert facts["keys unknown"] == "author"
     assert load.warnings == []
 
