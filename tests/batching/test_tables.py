@@ -5,6 +5,9 @@ from __future__ import annotations
 import csv
 import math
 
+import numpy as np
+
+import viewer
 from viewer.batching.items import Item, Result
 from viewer.batching.tables import save_table
 
@@ -109,3 +112,21 @@ def test_rows_of_info_are_figures_and_each_cell_is_one_value(tmp_path) -> None:
     assert [ann[key] for key in counts] == ["ann", "3", "24", "", "", "0", "m"]
     assert [fox[key] for key in counts] == ["fox", "3", "", "8", "12", "2", "m"]
     assert (failed["name"], failed["figures"], failed["message"]) == ("y", "", "cannot be read")
+
+
+def test_values_of_a_function_are_columns_with_all_digits(tmp_path, monkeypatch) -> None:
+    returned = {
+        "a.txt": {"height": 0.1234567890123, "n": np.int64(3), "seconds": 9, "list": [1, 2],
+                  "inner": {"x": np.float32(0.5), "word": "=1"}},
+        "b.txt": -2.5,
+    }  # fmt: skip
+    for name in returned:
+        (tmp_path / name).write_text("x")
+    monkeypatch.chdir(tmp_path)
+    viewer.batch([*returned], lambda item: returned[item.name], workers=0, table="t.csv")
+    with (tmp_path / "t.csv").open(newline="") as stream:
+        first, second = csv.DictReader(stream)
+    assert (first["height"], first["n"], first["value.seconds"]) == ("0.1234567890123", "3", "9")
+    assert (first["inner.x"], first["inner.word"], first["value"]) == ("0.5", "'=1", "")
+    assert (second["height"], second["n"], second["value"]) == ("", "", "-2.5")
+    assert "list" not in first and float(first["seconds"]) < 9.0

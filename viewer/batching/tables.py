@@ -5,9 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from viewer.batching.items import Result
 from viewer.media.saving import save_bytes
@@ -21,7 +23,6 @@ __all__ = [
     "ordered",
     "row_message",
     "save_table",
-    "table_rows",
     "worst_measure",
 ]
 
@@ -35,6 +36,7 @@ MEASURES = {
 }
 """Groups of columns, and the measures of ``diff`` whose largest values they contain."""
 
+_FIRST = ("name", "status", "exit_code")
 _FORMULAS = ("=", "+", "-", "@", "\t", "\r")
 
 
@@ -51,7 +53,8 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     path : str or Path
         The file, which is replaced atomically.
     job : str
-        Name of the command, which determines the columns.
+        Name of the command, which determines the columns; ``function`` for a function, whose values
+        are columns.
     results : iterable of Result
         Results in any order; rows are in the order of the inputs. Each has one row; of ``info``,
         one row per figure.
@@ -61,12 +64,29 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     OutputError
         If it cannot be written.
     """
-    results = list(results)
-    rows = table_rows(job, results)
+    results = ordered(results)
+    values = [dict(_cells_in(result.values)) if job == "function" else {} for result in results]
+    names = [*dict.fromkeys(name for one in values for name in one)]
+    own = [*_COLUMNS.get(job, ["attempts", "outputs"])]
+    last = ["message", "seconds"]
+    # A value named like another column would hide it.
+    used = {*_FIRST, *own, *last}
+    header = [
+        *(*_FIRST, *own),
+        *(_safe(f"value.{name}" if name in used else name) for name in names),
+        *last,
+    ]
+    rows_of = _ROWS.get(job, _output_rows)
     stream = io.StringIO(newline="")
     writer = csv.writer(stream)
-    writer.writerow(_columns(job))
-    writer.writerows([[_safe(cell) for cell in row] for row in rows])
+    writer.writerow(header)
+    for result, found in zip(results, values, strict=True):
+        first: list[Cell] = [result.item.name, result.status, result.exit_code]
+        end: list[Cell] = [row_message(result), round(result.seconds, 3)]
+        # Values of functions keep all of their digits.
+        own_values = [_exact(found.get(name)) for name in names]
+        for cells in rows_of(result):
+            writer.writerow([*map(_safe, first), *map(_safe, cells), *own_values, *map(_safe, end)])
     text = stream.getvalue()
     # Without this mark, Excel assumes the system's encoding.
     mark = b"" if text.isascii() else b"\xef\xbb\xbf"
@@ -74,26 +94,19 @@ def save_table(path: str | Path, job: str, results: Iterable[Result]) -> int:
     return len(results)
 
 
-def table_rows(job: str, results: Iterable[Result]) -> list[list[Cell]]:
-    """Return the rows of a table, without the header."""
-    rows_of = _ROWS.get(job, _output_rows)
-    return [
-        [
-            result.item.name,
-            result.status,
-            result.exit_code,
-            *cells,
-            row_message(result),
-            round(result.seconds, 3),
-        ]
-        for result in ordered(results)
-        for cells in rows_of(result)
-    ]
+def _cells_in(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Cell]]:
+    """Yield the numbers and strings of a function's values; those of an inner dict as ``a.b``."""
+    for name, value in values.items():
+        if isinstance(value, np.generic | np.ndarray) and value.ndim == 0:
+            value = value.item()
+        if isinstance(value, Mapping):
+            yield from _cells_in(value, f"{prefix}{name}.")
+        elif value is None or isinstance(value, str | int | float):
+            yield f"{prefix}{name}", value
 
 
-def _columns(job: str) -> list[str]:
-    own = _COLUMNS.get(job, ["attempts", "outputs"])
-    return ["name", "status", "exit_code", *own, "message", "seconds"]
+def _exact(cell: Cell) -> Cell:
+    return cell if isinstance(cell, float) else _safe(cell)
 
 
 def _safe(cell: Cell) -> Cell:

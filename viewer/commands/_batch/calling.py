@@ -98,6 +98,7 @@ def batch(
         File that gets one line of JSON per input; by default ``report.jsonl`` in ``out``.
     table : str or path
         CSV file with one row per input; with ``info``, one per figure of each input.
+        Numbers and strings that a function returns are columns.
     overview : str or path
         A page (``.html``) of all inputs; for ``render`` and ``diff`` also contact sheets
         (``.png``).
