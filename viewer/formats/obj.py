@@ -72,7 +72,7 @@ def read(source: Source) -> Figure:
     # These tables are large and no longer needed.
     parts.normals, parts.corners = parts.normals[:0].copy(), parts.corners[:0].copy()
     materials, of_face = _materials(source, parts)
-    names, part_of_face = _parts_of(parts)
+    names, part_of_face = _parts_of(source, parts)
     mesh = Mesh(
         positions=freeze(positions),
         normals=freeze(filled_normals(source, normals, positions, triangles)),
@@ -210,11 +210,16 @@ def _named(runs: Sequence[tuple[int, str]], count: int) -> tuple[list[str], Ints
     return names, of_run[np.searchsorted(first, np.arange(count), side="right")]
 
 
-def _parts_of(parts: ObjParts) -> tuple[tuple[str, ...], Ints]:
+def _parts_of(source: Source, parts: ObjParts) -> tuple[tuple[str, ...], Ints]:
     """Return the names of objects, or else of groups, and the index of each face's name.
 
-    A file with fewer than two of them has no parts.
+    A file with fewer than two of them has no parts. Groups within objects are reported, as a face
+    has one part, unless they are kept as materials.
     """
+    objects, groups = ({name: None for _, name in parts.runs[word]} for word in (b"o", b"g"))
+    within = [name for name in groups if name and name not in objects]
+    if len(objects) > 1 and len(within) > 1 and parts.runs[b"usemtl"]:
+        source.warn("F007.obj-groups", n=len(within), names=within)
     for word in (b"o", b"g"):
         names, of_face = _named(parts.runs[word], len(parts.counts))
         used = np.unique(of_face[of_face >= 0])

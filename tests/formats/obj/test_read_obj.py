@@ -227,6 +227,19 @@ def test_groups_are_used_as_materials_if_there_are_none() -> None:
     assert ("parts", "2 groups and objects") in figure.facts
 
 
+def test_groups_within_objects_are_named_as_ignored() -> None:
+    vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+    faces = "usemtl red\no body\ng arm\nf 1 2 3\ng leg\nf 1 3 2\no hat\ng hat\nf 2 3 1\n"
+    figure, warnings = read(vertices + faces)
+    assert figure.mesh.parts == ("body", "hat")
+    note = "2 groups within objects ignored, as a face has one part: arm, leg"
+    assert any(note in str(warning) for warning in warnings)
+    # The groups of a single object are its parts.
+    figure, warnings = read(vertices + faces.replace("o hat\n", ""))
+    assert figure.mesh.parts == ("arm", "leg", "hat")
+    assert not any("groups within" in str(warning) for warning in warnings)
+
+
 def test_single_object_is_not_used_as_a_material() -> None:
     figure = silent("o body\n" + SQUARE + "s 1\nf 1 2 3\n")
     assert figure.mesh.materials == ()

@@ -37,6 +37,7 @@ MESSAGES = {
     "F007.obj-lines": "{n:#line} not drawn",
     "F007.obj-points": "{n:#point} not drawn",
     "F007.obj-edges": "{n:#face} with fewer than 3 corners not drawn",
+    "F007.obj-groups": "{n:#group} within objects ignored, as a face has one part: {names:list8}",
     "F007.obj-texcoords": "omitted {n} texture coordinates not used by any face",
     "F007.obj-normals": "omitted {n} normals not used by any face",
     "F007.obj-corners": "{n:#triangle corner} without vt: 0 0 used",
