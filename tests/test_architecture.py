@@ -9,6 +9,7 @@ from functools import cache
 from pathlib import Path
 
 import pytest
+from house import reached
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "viewer"
@@ -316,17 +317,6 @@ def import_graph() -> dict[str, set[str]]:
 def module_name(path: Path) -> str:
     parts = path.relative_to(ROOT).with_suffix("").parts
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-
-
-def reached(graph: dict[str, set[str]], start: str) -> set[str]:
-    """Return the modules that a module imports, directly or indirectly."""
-    found: set[str] = set()
-    left = [start]
-    while left:
-        for other in graph[left.pop()] - found:
-            found.add(other)
-            left.append(other)
-    return found
 
 
 def test_modules_have_no_circular_imports() -> None:
