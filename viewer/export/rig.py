@@ -83,15 +83,16 @@ def _with_picture_names(rig: Figure, skin: Path) -> Figure:
     """
     if rig.mesh is None:
         return rig
-    names: dict[bytes, str] = {}  # by the image, which materials may share
+    names: dict[bytes, str] = {}  # by the pixels of the image, which materials may share
     materials = []
     for index, material in enumerate(rig.mesh.materials):
         texture = material.base_texture
         if texture is not None and texture.image is not None and not _is_picture(texture.name):
-            data, stem = encode_png(texture.image), f"{skin.stem[:80]}_{index}"
-            if data not in names:
-                names[data] = free_path(skin.parent, stem, ".png", data).name
-            material = replace(material, base_texture=replace(texture, name=names[data]))
+            pixels, stem = texture.image.tobytes(), f"{skin.stem[:80]}_{index}"
+            if pixels not in names:
+                data = encode_png(texture.image)
+                names[pixels] = free_path(skin.parent, stem, ".png", data).name
+            material = replace(material, base_texture=replace(texture, name=names[pixels]))
         materials.append(material)
     return replace(rig, mesh=replace(rig.mesh, materials=tuple(materials)))
 
