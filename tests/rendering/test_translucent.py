@@ -25,6 +25,14 @@ def test_translucent_actor_shows_opaque_actors_behind_it_but_not_its_back(offscr
     np.testing.assert_allclose(seen[:3], expected, atol=2)  # of 255, for rounding of both images
 
 
+def test_opacity_of_the_display_multiplies_that_of_actors(offscreen):
+    options = plain(background="transparent", opacity=0.5)
+    scene = scene_of(sphere())
+    for own, alpha in ((1.0, 127.5), (0.5, 63.75), (0.0, 0.0)):
+        scene.actors[0].opacity = own
+        assert abs(middle(draw(offscreen, scene, options))[3] - alpha) < 1.0
+
+
 def test_translucent_actors_do_not_show_through_each_other(offscreen):
     scene = scene_of(sphere(), sphere(radius=0.5, center=(0.0, 0.0, -1.5)))
     options = plain(background="transparent")

@@ -291,6 +291,7 @@ def display_of(arguments: argparse.Namespace) -> DisplayOptions:
         xray=arguments.xray,
         joint_names=arguments.joint_names,
         joint_axes=arguments.joint_axes,
+        opacity=arguments.opacity,
         cameras=arguments.cameras,
         image_brightness=_brightness(arguments),
     )
@@ -364,12 +365,6 @@ def follow_notes(arguments: argparse.Namespace, scene: Scene) -> list[str]:
         f"{option} {called}: {count} match; the first one, {printable(actors[0].name, 60)}, is "
         f"chosen{how}"
     ]
-
-
-def set_opacity(arguments: argparse.Namespace, scene: Scene) -> None:
-    """Make all figures translucent if that is requested."""
-    for actor in scene.actors:
-        actor.opacity *= arguments.opacity
 
 
 def hide_parts(arguments: argparse.Namespace, scene: Scene, options: DisplayOptions) -> None:

@@ -29,7 +29,6 @@ from viewer.commands._view import (
     hide_parts,
     look_through_video,
     parse_size,
-    set_opacity,
     warn_of_missing,
 )
 from viewer.errors import UnsupportedFormatError, ViewerError
@@ -117,7 +116,6 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.overlay is not None:
         size = _overlay_size(arguments, scene) or size
     hide_parts(arguments, scene, options)
-    set_opacity(arguments, scene)
     print_warnings(choose_subject(scene, options))
     print_warnings(warn_of_missing(scene, options) + camera_notes(arguments, scene, options))
     if request is not None and request.kind == "onion":

@@ -34,7 +34,6 @@ from viewer.commands._view import (
     follow_notes,
     hide_parts,
     look_through_video,
-    set_opacity,
     warn_of_missing,
 )
 from viewer.formats import free_path, opened_text
@@ -152,7 +151,6 @@ def _start(arguments: argparse.Namespace, options: DisplayOptions) -> _Start:
     use_file_method(arguments, scene, options.skinning)
     print_warnings(look_through_video(arguments, scene))
     hide_parts(arguments, scene, options)
-    set_opacity(arguments, scene)
     print_warnings(warn_of_missing(scene, options) + follow_notes(arguments, scene))
     prepare_scene(scene)
     points = scene_points(scene, options.show)

@@ -65,7 +65,7 @@ class Casters:
         """Draw all shapes with a fragment shader that shows no colours."""
         options = self.options
         for actor, mesh in self.meshes.singles:
-            if actor.opacity <= self.threshold:
+            if options.opacity * actor.opacity <= self.threshold:
                 continue
             placement = placement_of(actor, options)
             self.mesh_pass.draw_shape(mesh, placement, view, options, fragment, self._prepare)
@@ -73,7 +73,7 @@ class Casters:
             how = view, options, fragment, self._prepare
             draw_instance_shapes(self.programs, instances, actors, *how)
         for actor in self.actors:
-            if actor.opacity <= self.threshold:
+            if options.opacity * actor.opacity <= self.threshold:
                 continue
             # Over a skin, a skeleton is an overlay and casts no shadow.
             if shows_skeleton(actor, options) and not shows_mesh(actor.figure, options):

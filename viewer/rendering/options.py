@@ -195,6 +195,8 @@ class DisplayOptions:
     joint_names, joint_axes : bool
         Label the joints, omitting labels that would overlap; draw the axes of the joint spaces
         (x red, y green, z blue).
+    opacity : float
+        Opacity of all figures, 0 to 1; it multiplies that of each actor.
     cameras : bool
         Draw the frusta of calibrated cameras, with their images if there are any.
     image_brightness : float
@@ -240,6 +242,7 @@ class DisplayOptions:
     xray: bool = False
     joint_names: bool = False
     joint_axes: bool = False
+    opacity: float = 1.0
     cameras: bool = False
     image_brightness: float = 0.6
     outline: bool = False

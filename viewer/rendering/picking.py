@@ -227,7 +227,7 @@ class PickPass:
 
     def _draw_points(self, index: int, actor: Actor, view: View, options: DisplayOptions) -> None:
         points = self.passes.buffers.points_of(actor)
-        points.update(actor, actor.placement, view, options.min_confidence)
+        points.update(actor, actor.placement, view, options)
         elements, places, layout = points.elements, actor.points, actor.figure.points
         assert places is not None and layout is not None  # guaranteed by has_points
         if not len(elements):

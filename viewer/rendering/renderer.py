@@ -313,13 +313,13 @@ class Renderer:
         for actor in scene.actors:
             if has_points(actor, options):
                 points = self.buffers.points_of(actor)
-                points.update(actor, actor.placement, view, options.min_confidence)
+                points.update(actor, actor.placement, view, options)
         return meshes
 
     def _draw_meshes(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
         """Draw opaque surfaces, and the lines on them."""
         draw_layer(self.context, options, partial(self._draw_surfaces, meshes, view, options))
-        for actor, mesh in meshes.opaque:
+        for actor, mesh in meshes.opaque(options):
             self.mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options)
 
     def _draw_surfaces(self, meshes: Meshes, view: View, options: DisplayOptions) -> None:
@@ -339,7 +339,7 @@ class Renderer:
     def _draw_layer(
         self, meshes: Meshes, view: View, options: DisplayOptions, blended: bool
     ) -> None:
-        for actor, mesh in meshes.opaque:
+        for actor, mesh in meshes.opaque(options):
             if mesh.mesh.is_blended or not blended:
                 placement = placement_of(actor, options)
                 self.mesh_pass.draw(mesh, placement, view, options, actor.color, blended)
@@ -372,7 +372,7 @@ class Renderer:
         overlays: bool = False,
     ) -> None:
         skeleton, placement = self.buffers.skeleton(actor), placement_of(actor, options)
-        how = selected, opacity * actor.opacity, actor.color, overlays
+        how = selected, opacity * options.opacity * actor.opacity, actor.color, overlays
         self.joint_pass.draw(skeleton, placement, view, options, *how)
 
     def _draw_markers(self, actor: Actor, view: View, options: DisplayOptions) -> None:
@@ -380,7 +380,7 @@ class Renderer:
         markers.update(actor.require_pose(), options.skinning)
         # Marker positions already include the placement of the pose.
         at = actor.placement
-        self.late.keypoint_pass.draw(markers, at, view, options, actor.opacity)
+        self.late.keypoint_pass.draw(markers, at, view, options, options.opacity * actor.opacity)
 
     def posed_mesh(self, actor: Actor) -> PosedMesh:
         """Return an actor's posed mesh, created on first use; its figure must have a mesh."""

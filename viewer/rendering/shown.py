@@ -48,10 +48,9 @@ class Meshes:
     def __bool__(self) -> bool:
         return bool(self.singles or self.instanced)
 
-    @property
-    def opaque(self) -> list[tuple[Actor, PosedMesh]]:
-        """Opaque meshes that are drawn individually."""
-        return [single for single in self.singles if single[0].opacity == 1.0]
+    def opaque(self, options: DisplayOptions) -> list[tuple[Actor, PosedMesh]]:
+        """Return the opaque meshes that are drawn individually."""
+        return [one for one in self.singles if options.opacity * one[0].opacity == 1.0]
 
 
 def prepare_meshes(

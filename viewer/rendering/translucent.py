@@ -29,16 +29,20 @@ def draw_translucent(
     options : DisplayOptions
         Display options.
     """
-    drawn = [one for one in meshes.singles if 0.0 < one[0].opacity < 1.0]
+    drawn = [
+        (actor, mesh, opacity)
+        for actor, mesh in meshes.singles
+        if 0.0 < (opacity := options.opacity * actor.opacity) < 1.0
+    ]
     if not drawn:
         return
 
     def draw() -> None:
-        for actor, mesh in drawn:
+        for actor, mesh, opacity in drawn:
             place = placement_of(actor, options)
             for blended in (False, True)[: 1 + mesh.mesh.is_blended]:
-                mesh_pass.draw(mesh, place, view, options, actor.color, blended, actor.opacity)
+                mesh_pass.draw(mesh, place, view, options, actor.color, blended, opacity)
 
     draw_nearest(mesh_pass.context, draw)
-    for actor, mesh in drawn:
-        mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options, actor.opacity)
+    for actor, mesh, opacity in drawn:
+        mesh_pass.draw_lines(mesh, placement_of(actor, options), view, options, opacity)

@@ -54,6 +54,20 @@ def test_check_box_is_one_step(tall, label, option):
     assert getattr(tall.state.options, option) is before
 
 
+def test_opacity_is_a_slider_and_one_step(tall):
+    opaque = tall.scene_picture()
+    tall.drag("Opacity", 0.25)
+    quarter = tall.state.options.opacity
+    assert quarter == pytest.approx(0.25, abs=0.02)
+    assert (tall.scene_picture() != opaque).any()
+    assert tall.undo_steps == 1
+    tall.key("z", "ctrl")
+    assert tall.state.options.opacity == 1.0
+    assert (tall.scene_picture() == opaque).all()
+    tall.key("y", "ctrl")
+    assert tall.state.options.opacity == quarter
+
+
 def test_skin_opacity_is_a_slider_while_both_are_shown(tall):
     assert "Skeleton opacity" not in tall.state.item_rects
     tall.click(SHOWN["both"])

@@ -57,6 +57,8 @@ def draw(state: AppState) -> None:
             explain("", missing[key])
         if key == "skeleton":
             _draw_bones(state, missing[key])
+    options.opacity = slider(state, "Opacity", options.opacity, 0.0, 1.0, flags=_CLAMP)
+    explain("opacity of all figures")
     if options.show == "both":
         _draw_opacity(state)
     imgui.separator()

@@ -50,8 +50,8 @@ def instance_groups(actors: Sequence[Actor], options: DisplayOptions) -> list[li
         return []
     groups: dict[tuple[int, bytes, bool], list[Actor]] = {}
     for actor in actors:
-        pose, is_plain = actor.pose, actor.opacity == 1.0 and not actor.hidden_parts
-        is_plain = is_plain and not _has_own_look(actor)
+        pose, is_opaque = actor.pose, options.opacity * actor.opacity == 1.0
+        is_plain = is_opaque and not actor.hidden_parts and not _has_own_look(actor)
         if pose is None or not actor.figure.is_attached or not is_plain:
             continue
         is_mirrored = False

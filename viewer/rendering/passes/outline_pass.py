@@ -211,7 +211,7 @@ class OutlinePass:
         self, actor: Actor, mask: tuple[float, ...], view: View, options: DisplayOptions
     ) -> None:
         points = self.tools.buffers.points_of(actor)
-        points.update(actor, actor.placement, view, options.min_confidence)
+        points.update(actor, actor.placement, view, options)
         set_uniforms(self.tools.programs.drawing("point", fragment="mask"), {"u_mask": mask})
         self.tools.points.draw_shapes(points, actor.placement, view, "mask")
 

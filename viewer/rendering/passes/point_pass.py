@@ -136,7 +136,7 @@ class PointBuffers:
         self._numbers: Ints = self.elements
         self._measured: tuple[object, Floats] | None = None
 
-    def update(self, actor: Actor, placement: Floats, view: View, min_confidence: float) -> None:
+    def update(self, actor: Actor, placement: Floats, view: View, options: DisplayOptions) -> None:
         """Upload the actor's current points, with translucent capsules sorted from back to front.
 
         Parameters
@@ -147,23 +147,24 @@ class PointBuffers:
             Matrix from figure space to scene space.
         view : View
             The camera's matrices.
-        min_confidence : float
-            Points below this confidence, and limbs that end at such points, are omitted.
+        options : DisplayOptions
+            Points below its minimum confidence, and limbs that end at such points, are omitted.
         """
+        least, translucency = options.min_confidence, options.opacity * actor.opacity
         points = actor.points
         assert points is not None  # checked by the caller
-        shown = (points[:, 3] > 0.0) & (points[:, 3] >= min_confidence)
+        shown = (points[:, 3] > 0.0) & (points[:, 3] >= least)
         self.center = bounding_box(points[shown, :3]).mean(axis=0) if shown.any() else np.zeros(3)
         ends, opacity = self._capsules(points, shown)
-        opacity = opacity * actor.opacity
+        opacity = opacity * translucency
         toward = (view.matrix @ placement)[2, :3]
         depth = (points[ends, :3].mean(axis=1) - self.center) @ toward
         # Opaque capsules first, then translucent ones from back to front.
         order = np.lexsort((depth, np.where(opacity < _CERTAIN, 1, 0)))
         certain = opacity[order] >= _CERTAIN
         order[certain] = np.sort(order[certain])
-        look = actor.color, actor.opacity
-        key = (points.tobytes(), min_confidence, look, order.tobytes(), id(actor.clip))
+        look = actor.color, translucency
+        key = (points.tobytes(), least, look, order.tobytes(), id(actor.clip))
         if key != self._key:
             self._write(actor, points, ends[order], opacity[order])
             self.elements = self._numbers[order]
