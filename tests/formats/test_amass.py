@@ -485,3 +485,11 @@ def test_file_of_the_first_stage_is_refused_as_a_motion(tmp_path):
 def test_archives_of_other_data_are_described_by_their_keys(tmp_path):
     path = saved(tmp_path / "a.npz", pose_body=waves(3, 63))
     assert refusal(path) == (("F002.motion", None, {"keys": ["pose_body"]}))
+
+
+@pytest.mark.parametrize("key", ["frame_rate", "framerate", "frameRate", "video_fps"])
+def test_frame_rate_of_other_datasets_is_read(tmp_path, key):
+    arrays = first_release(mocap_framerate=None, **{key: np.array(50.0)})
+    motion, warnings = motion_of(saved(tmp_path / "a.npz", **arrays))
+    assert motion.timing.frame_rate == 50.0
+    assert warnings == []

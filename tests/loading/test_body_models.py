@@ -81,6 +81,9 @@ def models(tmp_path: Path) -> Path:
         (np.array("b'male'"), "MALE"),
         (np.array("female", dtype=object), "FEMALE"),
         (np.array([b"male"], dtype=object), "MALE"),
+        (np.array([["male"]]), "MALE"),
+        (np.array(["female"] * 3), "FEMALE"),
+        (np.array(["male"] * 3, dtype=object), "MALE"),
         ("unknown", "NEUTRAL"),
         (None, "NEUTRAL"),
     ],
@@ -91,7 +94,28 @@ def test_gender_of_the_file_chooses_the_model(models, tmp_path, said, gender):
     assert actor.figure.name == f"SMPLH_{gender}"
     assert shown_thigh(actor) == pytest.approx(thigh("smplh", gender), abs=1e-6)
     odd = [note.values["found"] for note in scene.diagnostics if note.key == "F007.motion-gender"]
-    assert odd == (["unknown"] if said == "unknown" else [])
+    assert odd == (["unknown"] if str(said) == "unknown" else [])
+
+
+@pytest.mark.parametrize(
+    ("said", "found"),
+    [
+        (np.array(["male", "female", "male"]), "male, female"),
+        (np.array(1), "a single int64"),
+    ],
+)
+def test_genders_that_are_none_or_several_are_reported(tmp_path, said, found):
+    scene = viewer.load(motion(tmp_path, gender=said))
+    odd = [note.values["found"] for note in scene.diagnostics if note.key == "F007.motion-gender"]
+    assert odd == [found]
+
+
+@pytest.mark.parametrize("said", [["female"], ["F", "female"], "Female"])
+def test_gender_of_a_single_pose_is_read_from_a_list(models, tmp_path, said):
+    path = tmp_path / "pose.json"
+    path.write_text(json.dumps({"body_pose": [0.0] * 63, "gender": said, "model": ["smplh"]}))
+    (actor,) = viewer.load(path).actors
+    assert actor.figure.name == "SMPLH_FEMALE"
 
 
 def test_motions_of_several_genders_have_their_own_models(models, tmp_path):

@@ -22,20 +22,14 @@ import numpy as np
 from viewer.errors import FormatError
 from viewer.formats._archive.checking import archive_of, finite, finite_or_nan, within_reach
 from viewer.formats._archive.values import Archive
+from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in
 from viewer.formats._frame_gaps import gap_notes, invalid_rows, no_frames
 from viewer.formats._neutral import held_rows
 from viewer.formats._source import Source
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.motion.body_motion import BodyMotion
 from viewer.rig.motion.timing import FASTEST, SLOWEST, Timing, is_rate
-from viewer.rig.smpl_family import (
-    FAMILY,
-    ShapeSpace,
-    gender_of,
-    members_by_numbers,
-    model_of_joints,
-    model_title,
-)
+from viewer.rig.smpl_family import FAMILY, ShapeSpace, members_by_numbers, model_of_joints
 
 __all__ = ["has_frames", "read"]
 
@@ -44,10 +38,8 @@ _ROOTS = ("root_orient", "global_orient")
 _TRANSLATIONS = ("trans", "transl", "smpl_trans")
 _SHAPES = ("betas", "shape")
 _EXPRESSIONS = ("expressions", "expression")
-_RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 _BODY = members_by_numbers()[66]
 _SMPL, _SMPLX = FAMILY[24].names, FAMILY[55].names
-_MODELS = ("surface_model_type", "model_type", "model")
 # Keys of parts and, by number of columns, the joints that they rotate.
 _PARTS: tuple[tuple[tuple[str, ...], dict[int, tuple[str, ...]]], ...] = (
     (_ROOTS, {3: _BODY[:1]}),
@@ -66,15 +58,16 @@ _MOST_COMPONENTS = 44
 _FLAGS = ("flat_hand_mean", "use_pca")
 _OWN = ("present", "up")
 _BESIDES = (
-    "gender model model_type surface_model_type num_betas mocap_time_length dmpls marker_data "
+    "num_betas mocap_time_length dmpls marker_data "
     "marker_labels markers labels vids markers_latent latent_labels markers_latent_vids "
     "smpl_scaling smpl_loss"
 )
 _KNOWN = {
-    *_POSES, *_TRANSLATIONS, *_SHAPES, *_EXPRESSIONS, *_RATES, *_FLAGS, *_OWN, *_BESIDES.split(),
+    *_POSES, *_TRANSLATIONS, *_SHAPES, *_EXPRESSIONS, *_FLAGS, *_OWN, *_BESIDES.split(),
+    *RATES, *GENDERS, *MODELS,
     *(key for keys, _ in _PARTS for key in keys),
 }  # fmt: skip
-_OF_MOTIONS = (*_RATES, "mocap_time_length")
+_OF_MOTIONS = (*RATES, "mocap_time_length")
 _OF_AMASS = ("mocap_framerate", "mocap_frame_rate", "mocap_time_length", "dmpls", "pose_body")
 _RATE, _RATE_OF_AIST = 30.0, 60.0
 _MOST_SCALED = 1e6  # maximum scale of a body; AIST++ scales by about 100
@@ -167,7 +160,7 @@ def _refusal(source: Source, archive: Archive) -> FormatError:
         return source.fault("F002.motion-stage")
     if not keys:
         return source.fault("F002.motion-no-keys")
-    if set(keys) <= {"betas", *_BESIDES.split(), *_RATES}:
+    if set(keys) <= {"betas", *_BESIDES.split(), *GENDERS, *MODELS, *RATES}:
         return source.fault("F002.motion-shape", keys=keys)
     return source.fault("F002.motion", keys=keys)
 
@@ -328,7 +321,7 @@ def _single(archive: Archive, key: str) -> float:
 
 
 def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
-    rates = {key: _single(archive, key) for key in _RATES if archive.has(key)}
+    rates = {key: _single(archive, key) for key in RATES if archive.has(key)}
     for key, rate in rates.items():
         if not is_rate(rate):
             raise archive.fault("F002.motion-rate", item=key, low=SLOWEST, high=FASTEST, found=rate)
@@ -384,12 +377,9 @@ def _notice(source: Source, archive: Archive) -> None:
 
 def _shape_space(source: Source, archive: Archive, names: tuple[str, ...]) -> ShapeSpace:
     """Return the model and gender; without a statement, the model with the rotated joints."""
-    said = archive.plain_text("gender")
-    gender = gender_of(said)
-    if said and not gender:
-        source.warn("F007.motion-gender", found=said)
-    for key in _MODELS:
-        title = model_title(archive.plain_text(key))
-        if title:
-            return ShapeSpace(title, gender)
-    return ShapeSpace(model_of_joints(names), gender)
+    said = [archive.objects(key) for key in GENDERS if archive.has(key)]
+    gender, odd = gender_in(said[0] if said else None)
+    if odd:
+        source.warn("F007.motion-gender", found=odd)
+    title = model_in(archive.objects(key) for key in MODELS if archive.has(key))
+    return ShapeSpace(title or model_of_joints(names), gender)

@@ -37,6 +37,7 @@ from viewer.errors import FormatError, RigError, UnsupportedFormatError
 from viewer.formats._archive.checking import archive_of
 from viewer.formats._archive.opening import is_archive
 from viewer.formats._archive.values import describe
+from viewer.formats._body_keys import GENDERS, MODELS, RATES, gender_in, model_in
 from viewer.formats._pose.named_values import NamedValues, described, parse_json
 from viewer.formats._pose.rotations import KEYS, named_rotations, read_rotations
 from viewer.formats._source import Source
@@ -49,7 +50,7 @@ from viewer.rig.arrays import Deferred, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.motion.clip import Clip
 from viewer.rig.posing.pose_record import PARTS, PosePartError, PoseRecord
-from viewer.rig.smpl_family import ShapeSpace, gender_of, model_title
+from viewer.rig.smpl_family import ShapeSpace
 
 __all__ = ["pose_error", "pose_text", "read", "write"]
 
@@ -65,12 +66,11 @@ _PARTS = (*PARTS, "body_pose", *_HANDS)
 _FLAGS = ("flat_hand_mean", "use_pca")
 _KNOWN = ("viewer_pose", "dofs", "dof_names", "scale", *_ALIASES, *_PARTS, *_VECTORS, *_FLAGS)
 _BESIDES = (
-    "figure gender model model_type surface_model_type num_betas fps mocap_framerate "
-    "mocap_frame_rate mocap_time_length dmpls marker_data marker_labels markers labels vids "
+    "figure num_betas mocap_time_length dmpls marker_data marker_labels markers labels vids "
     "markers_latent latent_labels markers_latent_vids"
 )
-_MODELS = ("surface_model_type", "model_type", "model")
-_NOT_NEEDED = _BESIDES.split()  # keys in pose and motion files that are not needed for a pose
+# Keys in pose and motion files that are not needed for a pose.
+_NOT_NEEDED = (*GENDERS, *MODELS, *RATES, *_BESIDES.split())
 # Keys whose J x 3 values are one pose rather than J frames.
 _PER_JOINT = ("body_pose", *_HANDS, *_VECTORS)
 _VERSION = 1
@@ -114,9 +114,8 @@ def _archive_values(source: Source) -> NamedValues:
     for key in set(wanted).intersection(archive.keys):
         value = archive.get(key)
         values[key] = value.values() if isinstance(value, Deferred) else value
-    for key in ("gender", *_MODELS):
-        if key in values:
-            values[key] = archive.plain_text(key)
+    for key in {*GENDERS, *MODELS}.intersection(values):
+        values[key] = archive.objects(key)
     names, dofs = values.pop("dof_names", None), values.get("dofs")
     if names is not None and dofs is not None:
         both = NamedValues(source, {"dof_names": names, "dofs": dofs})
@@ -157,7 +156,7 @@ def _from_values(named: NamedValues) -> PoseRecord:
         flat_hands=_flag(named, "flat_hand_mean"),
         hand_coefficients=_flag(named, "use_pca"),
         joint_rotations=read_rotations(named),
-        shape_space=_shape_space(named.values),
+        shape_space=_shape_space(named),
         line_of=_line_of(named, {**keys, "vector": vector}),
     )
     if translation is not None and len(translation) != 3:
@@ -168,10 +167,16 @@ def _from_values(named: NamedValues) -> PoseRecord:
     return record
 
 
-def _shape_space(values: Mapping[str, Any]) -> ShapeSpace:
-    texts = {key: text for key, text in values.items() if isinstance(text, str)}
-    titles = (model_title(texts.get(key, "")) for key in _MODELS)
-    return ShapeSpace(next(filter(None, titles), ""), gender_of(texts.get("gender", "")))
+def _shape_space(named: NamedValues) -> ShapeSpace:
+    values = named.values
+    key = next((key for key in GENDERS if values.get(key) is not None), GENDERS[0])
+    gender, odd = gender_in(values.get(key))
+    if odd:
+        named.warn("F007.motion-gender", key, found=odd)
+    said = [values[key] for key in MODELS if key in values]
+    # This program writes the titles of all models, others those of the SMPL family.
+    title = str(said[0]) if said and "viewer_pose" in values else ""
+    return ShapeSpace(model_in(said) or title, gender)
 
 
 def _line_of(named: NamedValues, keys: Mapping[str, str]) -> Callable[[str, str], int | None]:

@@ -31,6 +31,7 @@ __all__ = [
     "Sparse",
     "Value",
     "describe",
+    "texts_in",
 ]
 
 _MAX_SIDE = 1 << 27  # maximum rows or columns of a sparse matrix; meshes have far fewer vertices
@@ -257,7 +258,7 @@ class Archive:
         """
         value = self.get(key)
         if not isinstance(value, Deferred):
-            value = self._listed(key, value)
+            value = self._listed(key)
         if value is None or value.dtype.kind not in kinds or not _fits(shape, value.shape):
             found = describe(self.get(key))
             raise self.fault("F002.value", item=key, expected=_wanted(shape, kinds), found=found)
@@ -267,15 +268,13 @@ class Archive:
         """Return the shape of an array of numbers; empty if there is no such array."""
         value = self.get(key) if key in self.keys else None
         if value is not None and not isinstance(value, Deferred):
-            value = self._listed(key, value)
+            value = self._listed(key)
         return value.shape if isinstance(value, Deferred) and value.dtype.kind in "biuf" else ()
 
-    def _listed(self, key: str, value: Value) -> Deferred | None:
+    def _listed(self, key: str) -> Deferred | None:
         """Return numbers in nested lists, or in an array of objects, as an array."""
         if key not in self._arrays:
-            if isinstance(value, Opaque) and self._objects is not None:
-                value = self._objects(key)
-            self._arrays[key] = _from_lists(value)
+            self._arrays[key] = _from_lists(self.objects(key))
         return self._arrays[key]
 
     def sparse(self, key: str, shape: Axes | None = None) -> Sparse:
@@ -313,18 +312,17 @@ class Archive:
         FormatError
             If the value is none of these.
         """
+        found = texts_in(self.objects(key))
+        if len(found) != 1:
+            raise self.fault("F002.text", item=key, found=describe(self.get(key)))
+        return found[0]
+
+    def objects(self, key: str) -> Value:
+        """Return a value like ``get``, but an array of objects as a list of them."""
         value = self.get(key)
         if isinstance(value, Opaque) and self._objects is not None:
             value = self._objects(key)
-        if isinstance(value, list) and len(value) == 1:
-            value = value[0]
-        if isinstance(value, Deferred) and value.dtype.kind in "SU" and value.shape in ((), (1,)):
-            value = value.values().reshape(-1)[0].item()
-        if isinstance(value, bytes):
-            return value.decode("utf-8", "replace")
-        if isinstance(value, str):
-            return value
-        raise self.fault("F002.text", item=key, found=describe(value))
+        return value
 
     def plain_text(self, key: str) -> str:
         """Return a single string, including bytes converted by ``str``; empty if there is none."""
@@ -358,6 +356,18 @@ class Archive:
     def fault(self, key: str, *, item: str, **values: Any) -> FormatError:
         """Return the exception for an error in the value called ``item``; see ``Source.fault``."""
         return self.source.fault(key, item=printable(self.label + item, 60), **values)
+
+
+def texts_in(value: Value) -> list[str]:
+    """Return the strings in a value and its nested lists; empty if it has anything else."""
+    if isinstance(value, Deferred) and value.dtype.kind in "SU":
+        value = value.values().ravel().tolist()
+    if isinstance(value, bytes):
+        return [value.decode("utf-8", "replace")]
+    if isinstance(value, str):
+        return [value]
+    items = [texts_in(item) for item in value] if isinstance(value, list | tuple) else []
+    return [text for item in items for text in item] if all(items) else []
 
 
 def describe(value: Value) -> Phrase:

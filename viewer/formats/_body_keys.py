@@ -1,0 +1,40 @@
+"""Keys that stand beside the parameters of a body: its gender, its model, and the frame rate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from viewer.formats._archive.values import Value, describe, texts_in
+from viewer.phrases import printable
+from viewer.rig.smpl_family import gender_of, model_title
+
+__all__ = ["GENDERS", "MODELS", "RATES", "gender_in", "model_in"]
+
+GENDERS = ("gender", "genders")
+MODELS = ("surface_model_type", "model_type", "body_model", "smpl_type", "model")
+RATES = (
+    *("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate", "frameRate", "framerate"),
+    *("video_fps", "frames_per_second"),
+)
+
+
+def gender_in(value: Value) -> tuple[str, str]:
+    """Return the gender that a value states, also once for each frame; else what it states.
+
+    >>> gender_in(b"F"), gender_in(["female", "male", "male"])
+    (('female', ''), ('', 'female, male'))
+    """
+    said = [text for text in texts_in(value) if text.strip()]
+    found = {gender_of(text) for text in said}
+    if len(found) == 1 and "" not in found:
+        return found.pop(), ""
+    if said:
+        return "", printable(", ".join([*dict.fromkeys(map(str.strip, said))][:3]), 60)
+    is_left_open = value is None or texts_in(value) or value == [] or value == [None]
+    return "", "" if is_left_open else str(describe(value))
+
+
+def model_in(values: Iterable[Value]) -> str:
+    """Return the title of the first model of the family that values state; empty for none."""
+    titles = (model_title(text) for value in values for text in texts_in(value)[:1])
+    return next(filter(None, titles), "")
