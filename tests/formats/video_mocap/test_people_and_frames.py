@@ -6,6 +6,8 @@ Every body is at x = frame, y = person, so its place tells where it belongs.
 from __future__ import annotations
 
 import json
+import pickle
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -130,6 +132,10 @@ CASES: dict[str, tuple[Any, Presence]] = {
                        stacked([(1, 1)], track_ids=np.array([9])), {},
                        stacked([(3, 1), (3, 0)], track_ids=np.array([9, 4]))],
                       {4: [0, 3], 9: [0, 1, 3]}),
+    "a frame of no rows": ([stacked([(0, 0), (0, 1)], track_ids=np.array([4, 9])),
+                            {"pose": np.zeros((0, 72)), "trans": np.zeros((0, 3)),
+                             "track_ids": np.zeros(0)},
+                            stacked([(2, 1)], track_ids=np.array([9]))], {4: [0], 9: [0, 2]}),
     "rows with a frame number": ([stacked([(5, 0), (5, 1)], frame=5), stacked([(8, 0)], frame=8)],
                                  {0: [5, 8], 1: [5]}),
     "rows of a longer list": ([stacked([(0, 0), (0, 1)]), stacked([(1, 0)]), stacked([(2, 0)])],
@@ -188,3 +194,55 @@ def test_people_without_numbers_or_names_are_refused() -> None:
     given = {**SMPL, "track_id": [0.5] * 6, "frame_id": NUMBERS}
     with pytest.raises(FormatError, match=r"track_id: expected a number or a name .* found 0.5"):
         open_results(Source("a.pkl", joblib_file(given)))
+
+
+def per_frame(rows: list[list[tuple[int, int]]], /, **more: Any) -> dict[str, Any]:
+    """Return a list for each key, with the rows of one frame in each item."""
+    frames = [[body(*row) for row in frame] for frame in rows]
+    sizes = {"pose": 72, "trans": 3}
+    return {
+        key: [np.array([one[key] for one in frame]).reshape(-1, size) for frame in frames]
+        for key, size in sizes.items()
+    } | more
+
+
+TWO_THEN_ONE = [[(0, 4), (0, 7)], [(1, 7), (1, 4)], [], [(3, 7)]]
+OF_FRAMES = [[4, 7], [7, 4], [], [7]]
+OF_PEOPLE = {4: [0, 1], 7: [0, 1, 3]}
+
+
+@pytest.mark.parametrize("key", ["track_ids", "person_ids"])
+def test_lists_of_frames_have_as_many_rows_as_people(tmp_path: Path, key: str) -> None:
+    content = per_frame(TWO_THEN_ONE, **{key: OF_FRAMES, "fps": 25})
+    for data in (pickle.dumps(content), json.dumps(plain(content)).encode()):
+        suffix = ".json" if data.startswith(b"{") else ".pkl"
+        source = Source(tmp_path / f"people{suffix}", data)
+        assert found_in(source) == (OF_PEOPLE, 0, 4, 25.0)
+
+
+def test_lists_of_frames_have_numbers_beside_them(tmp_path: Path) -> None:
+    content = per_frame(TWO_THEN_ONE, track_ids=OF_FRAMES, frame_ids=np.array([0, 1, 2, 3]) + 20)
+    people, first, n_frames, _ = found_in(Source(tmp_path / "people.pkl", pickle.dumps(content)))
+    assert people == {4: [20, 21], 7: [20, 21, 23]}
+    assert (first, n_frames) == (20, 4)
+
+
+def test_arrays_of_frames_and_people_are_rows_of_each_frame(tmp_path: Path) -> None:
+    content = per_frame(TWO_THEN_ONE[:2])
+    stack = {key: np.stack(items) for key, items in content.items()}  # (2, 2, 72) and (2, 2, 3)
+    ids = {"track_ids": np.array(OF_FRAMES[:2])}
+    source = Source(tmp_path / "people.pkl", pickle.dumps(stack | ids))
+    assert found_in(source)[0] == {4: [0, 1], 7: [0, 1]}
+
+
+def test_arrays_of_objects_are_lists_of_frames(tmp_path: Path) -> None:
+    content = per_frame([TWO_THEN_ONE[0], TWO_THEN_ONE[3]], track_ids=[OF_FRAMES[0], OF_FRAMES[3]])
+    arrays = {}
+    for key, items in content.items():
+        arrays[key] = np.empty(2, dtype=object)
+        arrays[key][:] = items
+    assert arrays["pose"][1].shape == (1, 72)
+    # The second frame of the file is the fourth of the motion, so x is 3 in it.
+    arrays["frame_ids"] = np.array([0, 3])
+    source = Source(tmp_path / "people.npz", npz(**arrays))
+    assert found_in(source)[0] == {4: [0], 7: [0, 3]}

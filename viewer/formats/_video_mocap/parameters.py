@@ -12,9 +12,11 @@
 
 Dicts may be nested: people by number, frames in a list, or parameters within another dict. All keys
 except the poses may also stand in one of the dicts around them, once, or as a list with one value
-for each dict. Several rows with the same frame are several people. In a list of frames, None, an
-empty list and a dict without poses are frames without people. AMASS files and single poses have
-other spellings and are read by ``amass.py`` and ``pose.py``.
+for each dict. Several rows with the same frame are several people. Poses may also be a list with
+the rows of each frame, one for each person; other lists and arrays of this length then belong to
+the frames too. In a list of frames, None, an empty list, no rows and a dict without poses are
+frames without people. AMASS files and single poses have other spellings and are read by
+``amass.py`` and ``pose.py``.
 """
 
 from __future__ import annotations
@@ -255,7 +257,8 @@ def _layout(
         for level in range(len(around) - 1, 0, -1):
             items, beside = around[level].keys, around[level - 1]
             for key in keys:
-                if beside.has(key) and key not in path and _length(beside, key) == len(items):
+                is_free = key not in path and not archive.has(key)
+                if beside.has(key) and is_free and _length(beside, key) == len(items):
                     return _Value(beside, key, items.index(path[level]))
         return None
 
@@ -264,7 +267,13 @@ def _layout(
 
     frames = frame = None
     if count > 1:
-        frames = first(_FRAMES, lambda scope, key: scope.shape(key) == (count,))
+        # A number in the dict itself is that of all rows, whatever stands around it.
+        frames = first(
+            _FRAMES,
+            lambda scope, key: (
+                scope.shape(key) == (count,) and (scope is archive or not archive.has(key))
+            ),
+        )
         frames = frames or first(
             (_DETECTIONS,), lambda scope, key: scope.shape(key)[:1] == (count,)
         )
@@ -354,13 +363,75 @@ def _found(
     budget = budget or RowBudget(archive)
     budget.spend(_COST if layout is None else layout.count)
     if layout is not None:
-        yield _Found(path, around, archive, layout)
+        # A frame with arrays of no rows has no people.
+        if layout.count or not (around and around[-1].is_list):
+            yield _Found(path, around, archive, layout)
         return
+    by_frame = None if archive.is_list else _by_frame(archive)
+    if by_frame is not None:
+        key, frames = by_frame
+        found = [*_found(frames, budget, (*around, archive), (*path, key))]
+        known = {one.path[len(path) + 1] for one in found}
+        if found and all(name in known or frames.get(name) is None for name in frames.keys):
+            yield from found
+            return
     depth = sum(not scope.is_list for scope in around)
     for key in archive.keys if depth < _DEEPEST or archive.is_list else ():
         inner = archive.inside(key)
         if inner is not None:
             yield from _found(inner, budget, (*around, archive), (*path, key))
+
+
+def _by_frame(archive: Archive) -> tuple[str, Archive] | None:
+    """Return the key of poses that are a list of frames, and these frames as a list of dicts.
+
+    Each frame has its own rows, one for each person; it is None without any. None if there is no
+    such list.
+    """
+    names = (*_WHOLE, *_ROOTS)
+    key = next((key for key in names if archive.has(key) and len(_items(archive, key, 3))), None)
+    if key is None:
+        return None
+    poses = _items(archive, key, 3)
+    columns = {
+        name: items for name in archive.keys if len(items := _items(archive, name)) == len(poses)
+    }
+
+    def frame(index: str) -> Archive:
+        return Archive(
+            archive.source,
+            archive.kind,
+            tuple(columns),
+            lambda name: columns[name][int(index)],
+            label=f"{archive.label}{index}.",
+        )
+
+    def has_rows(pose: Value) -> bool:
+        return bool(pose.shape[:1] != (0,) if isinstance(pose, Deferred) else pose)
+
+    return key, Archive(
+        archive.source,
+        archive.kind,
+        tuple(map(str, range(len(poses)))),
+        lambda index: poses[int(index)] if has_rows(poses[int(index)]) else None,
+        frame,
+        archive.label,
+        is_list=True,
+    )
+
+
+def _items(archive: Archive, key: str, n_axes: int = 1) -> Sequence[Value]:
+    """Return the items of a list, or those of an array of at least some axes; else none."""
+    value = archive.objects(key)
+    if isinstance(value, list | tuple):
+        return value
+    if not isinstance(value, Deferred) or len(value.shape) < n_axes:
+        return ()
+    return [_item(value, index) for index in range(value.shape[0])]
+
+
+def _item(array: Deferred, index: int) -> Deferred:
+    return Deferred(array.shape[1:], array.dtype, lambda: np.array(array.values()[index]))
 
 
 _Person = int | str | tuple[int, ...]
