@@ -17,7 +17,7 @@ from viewer.rig.posing.pose_record import PoseRecord
 from viewer.rig.smpl_family import FAMILY, ShapeSpace
 
 SMPLH, SMPLX, SMPL = FAMILY[52].names, FAMILY[55].names, FAMILY[24].names
-NO_RATE = ("F007.motion-no-rate", None, {"rate": 30.0})
+NO_RATE = ("F007.no-rate", None, {"rate": 30.0})
 
 
 def saved(path, **arrays):

@@ -99,7 +99,7 @@ def test_capture_without_a_rate_has_that_of_the_video(tmp_path, video):
     assert scene.actors[0].clip.timing.frame_rate == 50.0
 
 
-@pytest.mark.parametrize(("rate", "keys"), [(None, ["F007.capture-no-rate"]), (25.0, [])])
+@pytest.mark.parametrize(("rate", "keys"), [(None, ["F007.no-rate"]), (25.0, [])])
 def test_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
     write_frames(tmp_path / "take" / "smpl", {n: [body(0), body(1)] for n in range(3)})
     scene = load(tmp_path / "take", motion=MotionSettings(frame_rate=rate))
@@ -112,7 +112,7 @@ def test_assumed_frame_rate_is_reported_once(tmp_path, rate, keys):
 def test_single_frame_needs_no_frame_rate(tmp_path):
     write_frames(tmp_path / "take" / "smpl", {0: [body(0)]})
     keys = [note.key for note in load(tmp_path / "take").diagnostics]
-    assert "F007.capture-no-rate" not in keys
+    assert "F007.no-rate" not in keys
 
 
 @pytest.mark.parametrize("option", ["video", "images"])

@@ -333,7 +333,7 @@ def _rate(source: Source, archive: Archive, is_aist: bool) -> float:
         source.warn("F007.motion-aist-rate", rate=_RATE_OF_AIST)
         return _RATE_OF_AIST
     if not source.options.get("fps"):  # a requested rate replaces the assumed one
-        source.warn("F007.motion-no-rate", rate=_RATE)
+        source.warn("F007.no-rate", rate=_RATE)
     return _RATE
 
 

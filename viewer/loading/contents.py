@@ -199,7 +199,7 @@ def _read(source: Source, settings: MotionSettings) -> Content:
             images=settings.images,
         )
         if capture.n_frames > 1 and not (settings.frame_rate or video):
-            source.warn("F007.capture-no-rate", rate=rate)
+            source.warn("F007.no-rate", rate=rate)
         return capture
     if kind == "video_mocap":
         from viewer.formats.video_mocap import open_results

@@ -260,7 +260,7 @@ def test_last_slahmr_iteration_of_a_folder_is_read(tmp_path: Path) -> None:
     body = next(iter(open_results(source).parts())).bodies[0]
     assert_allclose(body.translations, slahmr()["trans"][0])
     keys = [one.key for one in source.diagnostics.warnings]
-    assert keys == ["F007.video-last", "F007.video-no-rate"]
+    assert keys == ["F007.video-last", "F007.no-rate"]
 
 
 def test_slahmr_folder_whose_result_lacks_the_axis_of_people_is_refused(tmp_path: Path) -> None:

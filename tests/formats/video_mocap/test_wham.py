@@ -65,7 +65,7 @@ def test_frame_rate_is_given_or_assumed(given: float | None, rate: float, tmp_pa
     body = next(iter(open_results(source, given).parts())).bodies[4]
     assert (body.timing.frame_rate, body.timing.first_frame) == (rate, 0)
     keys = [found.key for found in source.diagnostics.warnings]
-    assert keys == ([] if given else ["F007.video-no-rate"])
+    assert keys == ([] if given else ["F007.no-rate"])
 
 
 def refusal(changes: dict[str, Any]) -> str:

@@ -88,7 +88,6 @@ MESSAGES = {
     "F007.motion-angles": "{item:text}: angles used as stored, without the mean hand pose",
     "F007.motion-place": "no trans array: the body stays in place",
     "F007.motion-rates": "conflicting frame rates ({rates:list}): the first one is used",
-    "F007.motion-no-rate": "no frame rate: the common {rate:g} fps assumed (--fps sets it)",
     "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",
     "F007.motion-tissue": "dmpls (soft tissue) of {n:#frame} omitted",
     "F007.motion-gender": "gender: expected female, male or neutral, found {found:text}: the "

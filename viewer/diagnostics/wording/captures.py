@@ -116,10 +116,7 @@ MESSAGES = {
     "F007.video-rows": "no frame numbers: the rows of each {item:text} are its frames, in order",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
-    "F007.capture-no-rate": "no frame rate in the files: {rate:g} frames per second assumed (--fps "
-    "sets it)",
-    "F007.video-no-rate": "no frame rate in the file: {rate:g} frames per second assumed (--fps "
-    "sets it)",
+    "F007.no-rate": "no frame rate in the data: {rate:g} fps assumed (--fps sets it)",
 }
 
 PHRASES = {

@@ -231,7 +231,7 @@ def capture_of(source: Source, results: Results, options: Options) -> Capture:
     known = options.frame_rate, results.frame_rate, options.video_rate
     rate = capture_rate(*known)
     if not any(known) and last > first:
-        source.warn("F007.video-no-rate", rate=rate)
+        source.warn("F007.no-rate", rate=rate)
     source.used_options |= {"space"} | ({"average-shape"} if _shapes_vary(results) else set())
     capture = _Capture(source, results, options, first, last - first + 1, rate, gaps)
     return capture.in_space(space)
