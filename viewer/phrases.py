@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-__all__ = ["counted", "listed", "one_of", "printable", "quoted", "rounded"]
+__all__ = ["counted", "file_size", "listed", "one_of", "printable", "quoted", "rounded"]
 
 _PLURALS = {"vertex": "vertices", "matrix": "matrices"}
+_BYTES = {"GB": 1e9, "MB": 1e6, "kB": 1e3}
 
 
 def printable(text: object, limit: int = 200) -> str:
@@ -42,6 +43,18 @@ def rounded(value: float, digits: int = 3) -> str:
     """
     is_long = 10.0**digits - 0.5 <= abs(value) < 1e6
     return format(value, ",.0f" if is_long else f".{digits}g")
+
+
+def file_size(count: int) -> str:
+    """Return a number of bytes as file managers show it: in powers of 1000.
+
+    >>> file_size(958), file_size(1248), file_size(999_999), file_size(3_146_672)
+    ('958 bytes', '1.25 kB', '1 MB', '3.15 MB')
+    """
+    if count < 1000:
+        return counted(count, "byte")
+    unit = next((unit for unit, one in _BYTES.items() if count >= 0.9995 * one), "kB")
+    return f"{rounded(count / _BYTES[unit])} {unit}"
 
 
 def counted(count: int, noun: str, one: str = "", many: str = "", of: int | None = None) -> str:

@@ -39,7 +39,7 @@ def sample(spec: str) -> Any:
         return 1.5
     if spec in ("text", "name", "quoted") or spec.startswith("+"):
         return "x\ny"  # the value may come from a file
-    return 3 if spec == "d" else "x"
+    return 3 if spec in ("d", "bytes") else "x"
 
 
 @pytest.mark.parametrize("key", MESSAGES)

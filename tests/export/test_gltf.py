@@ -51,7 +51,7 @@ def test_roof_round_trips(tmp_path):
     size = (tmp_path / "out.glb").stat().st_size
     assert notes == [
         f"{tmp_path / 'out.glb'}: 7 vertices (5 before they were split along texture seams), "
-        f"3 triangles, 2 joints, {size} bytes"
+        f"3 triangles, 2 joints, {size / 1000:.3g} kB"
     ]
     assert gltf.nodes[gltf.parents[gltf.named("tip")]]["name"] == "root"
 

@@ -11,6 +11,7 @@
 ``{names:all}``        every name
 ``{shape:axes}``       the axes of an array: ``800 x 3``; letters stand for any size
 ``{names:or}``         alternatives
+``{size:bytes}``       the size of a file: ``1.25 kB``
 ``{n:#vertex}``        a count with its noun: ``3 vertices``
 ``{n:#vertex|is|are}`` the same with a verb that agrees
 ``{n:#frame/{all}}``   a count of a total: ``3 of 20 frames``; a verb may follow
@@ -27,7 +28,7 @@ from collections.abc import Callable, Mapping, Sequence
 from string import Formatter
 from typing import Any
 
-from viewer.phrases import counted, listed, one_of, printable, quoted, rounded
+from viewer.phrases import counted, file_size, listed, one_of, printable, quoted, rounded
 
 _SIGNED = re.compile(r"\+z?[.\d]*[efg%]")  # specification of a signed number
 _DIGITS = re.compile(r"\.(\d)g")  # specification of a number rounded to some digits
@@ -124,5 +125,6 @@ _PLAIN: dict[str, Callable[[Any], str]] = {
     "axes": _axes,
     "all": lambda names: ", ".join(map(printable, names)) or "none",
     "or": _alternatives,
+    "bytes": file_size,
 }
 _FORMATTER = _Formatter()

@@ -22,17 +22,17 @@ MESSAGES = {
     "X001.anim": "{channels:#channel} with {keys:#key}, {start:zg} to {end:zg} s{how:+, {}}",
     "X001.bvh": "{joints:#joint}, {rest:+{} and }{frames} at {rate:g} fps, {unit}, {up} up, "
     "channels {order}",
-    "X001.gltf": "{counts:all}, {size} bytes",
-    "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size} bytes",
-    "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, {size} "
-    "bytes",
-    "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size} bytes",
+    "X001.gltf": "{counts:all}, {size:bytes}",
+    "X001.gltf-motion": "{counts:all}, {frames} at {rate:g} fps, {size:bytes}",
+    "X001.gltf-animations": "{counts:all}, {n:#animation} with {n:?its|their} own keys, "
+    "{size:bytes}",
+    "X001.gltf-figures": "{n_figures:#figure}: {figures:list}{others:+; {}}, {size:bytes}",
     "X001.gltf-motions": "{n_figures:#figure}: {figures:list}; one animation of {seconds:.4g} s"
-    "{others:+; {}}, {size} bytes",
+    "{others:+; {}}, {size:bytes}",
     "X001.vrm": "VRM {version}: {parts:all}",
-    "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, {size} "
-    "bytes",
-    "X001.gltf-arrays": "array data, {size} bytes",
+    "X001.vrma": "{bones:#human bone}, {expressions:#expression}, {frames} at {rate:g} fps, "
+    "{size:bytes}",
+    "X001.gltf-arrays": "array data, {size:bytes}",
     "X001.mesh": "{vertices:#vertex}, {triangles:#triangle}",
     "X001.texture": "its texture",
     "X001.one-mesh": "1 file, {first:text}{missing:+" + _MISSING,
