@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 import pytest
+from formats.gltf.files import skinned
 from PIL import Image
 
 from viewer.cli import run
@@ -243,3 +244,20 @@ def test_invalid_tolerances_are_refused(tmp_path, capsys, arguments, message):
     folder = write(tmp_path / "a")
     code, _, error = said(capsys, folder, folder, *arguments)
     assert code == 2 and error == f"viewer: {message}\n"
+
+
+@pytest.mark.parametrize(
+    ("shift", "shown"), [(0.0125, "12.5 mm"), (2.5, "2.5 m"), (12345.0, "12,345 m")]
+)
+def test_lengths_of_a_known_unit_are_millimetres_or_metres(tmp_path, capsys, shift, shown):
+    paths = []
+    for name, offset in (("a", 0.0), ("b", shift)):
+        folder = tmp_path / name
+        folder.mkdir()
+        file = skinned()
+        file.root["nodes"][1]["translation"] = [offset, 0, 0]
+        (folder / "rig.glb").write_bytes(file.glb())
+        paths.append(str(folder / "rig.glb"))
+    _, lines, _ = said(capsys, *paths, "--poses", "0")
+    [positions] = [line for line in lines if "joint positions" in line]
+    assert f"at most {shown} " in positions

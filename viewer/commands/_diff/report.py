@@ -9,7 +9,7 @@ from dataclasses import field
 from viewer.commands._printing import table_lines
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic, described
-from viewer.phrases import printable
+from viewer.phrases import printable, rounded
 from viewer.rig.comparison import Difference, Measure
 from viewer.rig.units import METRES
 
@@ -47,13 +47,14 @@ class Compared:
 def amount(value: float, kind: str, difference: Difference) -> str:
     """Return a number as text: lengths in millimetres or as a fraction of the size."""
     if kind == "angle":
-        return f"{math.degrees(value):.4g}\N{DEGREE SIGN}"
+        return f"{rounded(math.degrees(value), 4)}\N{DEGREE SIGN}"
     if kind == "weight":
-        return f"{value:.4g}"
+        return rounded(value, 4)
     if difference.unit in METRES:
-        return f"{1000.0 * METRES[difference.unit] * value:.4g} mm"
+        metres = METRES[difference.unit] * value
+        return f"{rounded(metres, 4)} m" if metres >= 1.0 else f"{rounded(1000.0 * metres, 4)} mm"
     percent = 100.0 * value / difference.size if difference.size > 0.0 else math.nan
-    return f"{value:.4g} ({percent:.3g} % of the size)"
+    return f"{rounded(value, 4)} ({rounded(percent)} % of the size)"
 
 
 def lines_of(compared: Compared, tolerance: float | None) -> list[str]:
