@@ -178,6 +178,15 @@ def test_untracked_people_have_unique_names(recording, tmp_path, capsys):
     assert lines[0].startswith(f"{tmp_path}/w-3.bvh")  # people with a track are listed first
 
 
+def test_untracked_people_in_one_file_are_named(recording, tmp_path, capsys):
+    frames = {0: [body(-1), body(3)], 1: [body(3), body(-1)]}
+    folder = write_frames(tmp_path / "un" / "smpl", frames)
+    assert convert(folder, *recording[1:], "-o", tmp_path / "w.glb") == 0
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        "un untracked: not tracked, possibly a different person in each frame"
+    )
+
+
 def test_untracked_people_round_trip_untracked(recording, tmp_path):
     frames = {0: [body(-1), body(3), body(-1, seed=1.0)], 1: [body(3), body(-1)]}
     folder = write_frames(tmp_path / "un" / "smpl", frames)

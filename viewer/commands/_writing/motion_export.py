@@ -190,7 +190,7 @@ def write_motions(
         notes = _write_together(there, scene, output, options, still, check)
     else:
         notes = _write(there, output, key, options, check)
-    notes += _untracked_notes(there, key)
+    notes += _untracked_notes(there, key, is_one and len(there) > 1)
     for part in parts:
         if not part.present.any():
             values = {"figure": part.animation.name, "frames": part.span}
@@ -303,13 +303,17 @@ def _write_capture(parts: list[_Part], output: Path, options: MotionOptions) -> 
     return export_animations(animations, output, options, people)
 
 
-def _untracked_notes(parts: list[_Part], key: str) -> list[Diagnostic]:
-    """Return a note about files of untracked people."""
-    names = [
-        printable(part.path.name) if key != "easymocap" else person_label(part.actor.person)
-        for part in parts
-        if part.actor.person is not None and not is_tracked(part.actor.person)
-    ]
+def _untracked_notes(parts: list[_Part], key: str, is_together: bool) -> list[Diagnostic]:
+    """Return a note about files of untracked people, or about these people in one file."""
+    names = []
+    for part in parts:
+        person = part.actor.person
+        if person is None or is_tracked(person):
+            continue
+        if key == "easymocap":
+            names.append(person_label(person))
+        else:
+            names.append(printable(part.animation.name if is_together else part.path.name))
     if not names:
         return []
     return [Diagnostic("X005.untracked", values={"names": names})]
