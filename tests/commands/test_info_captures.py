@@ -40,7 +40,7 @@ def test_bounding_boxes_contain_only_present_people(info, tmp_path):
     assert lines[:4] == [
         "kp body25 0",
         "  box        (0, 0, 1) to (0, 0, 1.6), size 0.6, z up",
-        "  clip       kp: 0 to 0.0666667 s, 3 frames at 30 fps, 25 points, 8.0 % visible",
+        "  clip       kp: 0 to 0.067 s, 3 frames (3 to 5) at 30 fps, 25 points, 8.0 % visible",
         "    1 frame is missing: 5",
     ]
     assert lines[4:6] == ["kp body25 4", "  box        none: absent at this time, z up"]

@@ -6,6 +6,7 @@ import json
 
 import pytest
 from app.tiny import write_rig
+from formats.gltf.files import File, skinned
 
 from viewer.cli import run
 
@@ -141,3 +142,52 @@ def test_many_unlimited_dofs_are_only_counted(tmp_path, capsys, joints, dofs_lis
     lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
     assert sum(line.startswith("j") for line in lines) == dofs_listed
     assert f"{summary} (--json lists all)" in lines
+
+
+def test_triangles_are_degenerate_by_the_criterion_of_lint(tmp_path, capsys):
+    # The third corner is 1e-9 from the line through the others: the area is not exactly 0.
+    (tmp_path / "flat.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0.3 1e-9 0\nv 0 1 0\nf 1 2 3\nf 1 2 4\n"
+    )
+    assert run(["info", str(tmp_path / "flat.obj")]) == 0
+    assert "2 triangles (1 degenerate)" in capsys.readouterr().out
+    run(["lint", str(tmp_path / "flat.obj")])
+    assert "M001: 1 of 2 triangles have zero area" in capsys.readouterr().out.replace("has", "have")
+
+
+@pytest.mark.parametrize(
+    ("corner", "box"),
+    [
+        # Three more digits than the power of ten of the size: 1.732 has thousandths.
+        ("1 1 0.9999", "(0, 0, 0) to (1, 1, 1), size 1.732"),
+        ("123.456 0 0.00004", "(0, 0, 0) to (123.5, 0, 0), size 123.5"),
+        ("0.00123456 0 0", "(0, 0, 0) to (0.001235, 0, 0), size 0.001235"),
+    ],
+)
+def test_boxes_have_the_digits_of_their_size(corner, box, tmp_path, capsys):
+    (tmp_path / "a.obj").write_text(f"v 0 0 0\nv {corner}\nv 0 0 0\nf 1 2 3\n")
+    assert run(["info", str(tmp_path / "a.obj")]) == 0
+    assert f"  box        {box}, y up" in capsys.readouterr().out.splitlines()
+
+
+@pytest.mark.parametrize(("scale", "height"), [(0.0, "0.000"), (2.5, "2.500")])
+def test_height_at_rest_is_that_of_the_scaled_joints(scale, height, tmp_path, capsys):
+    # A triangle of height 1 on a joint that the file scales at rest.
+    file = skinned()
+    file.root["nodes"][1]["scale"] = [scale] * 3
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    assert run(["info", str(tmp_path / "a.glb")]) == 0
+    assert f"rest       {height} m high, " in capsys.readouterr().out
+
+
+def test_mass_is_that_of_people(tmp_path, capsys):
+    # A tetrahedron with three edges of 6 m has 36 cubic metres.
+    corners = [[0, 0, 0], [6, 0, 0], [0, 6, 0], [0, 0, 6]]
+    file = File(scene=0, scenes=[{"nodes": [0]}])
+    mesh = file.mesh(corners)
+    file.primitive["indices"] = file.accessor([0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3], "H")
+    file.add("nodes", {"mesh": mesh})
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    assert run(["info", str(tmp_path / "a.glb")]) == 0
+    line = next(one for one in capsys.readouterr().out.splitlines() if "  rest " in one)
+    assert line == "  rest       6.000 m high, 36 m3"

@@ -62,7 +62,7 @@ def about_z(joint, angle):
 def test_box_has_its_height_volume_and_weight(describe, lines, box):
     # 1 x 2 x 3 m with z up are 6 cubic metres of 985 kg each.
     assert describe(box)["rest"] == pytest.approx({"height": 3, "volume": 6, "mass": 5910})
-    assert "rest       3.000 m high, 6000.00 litres, 5910.0 kg at 985 kg/m3" in lines(box)
+    assert "rest       3.000 m high, 6 m3, 5,910.0 kg at 985 kg/m3" in lines(box)
 
 
 def test_inside_out_box_has_the_same_measurements(describe, tmp_path):

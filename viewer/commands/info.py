@@ -15,8 +15,8 @@ from viewer.commands._scene import add_scene_arguments, open_scene
 from viewer.commands._usage import require_files
 from viewer.diagnostics import described
 from viewer.diagnostics.record import note_values
-from viewer.phrases import counted, listed, printable
-from viewer.rig.mesh import Mesh, bounding_box, box_size, triangle_areas
+from viewer.phrases import counted, listed, printable, rounded
+from viewer.rig.mesh import Mesh, bounding_box, box_size, flat_triangles
 from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Scene, actor_points, scene_unit
 from viewer.rig.skeleton import (
@@ -37,8 +37,7 @@ __all__ = ["add_arguments", "describe", "run"]
 # If more unlimited DOFs than this differ from 0, only their number is printed.
 MOST_FREE_DOFS = 24
 
-
-_FAR = 1e3  # distance from the origin, in sizes, beyond which a box is shown with more digits
+_BOX_DIGITS = 4  # digits of a size; those of the corners of a box have the same precision
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -171,12 +170,11 @@ def _finite(value: float) -> float | None:
 
 
 def _describe_mesh(mesh: Mesh) -> dict[str, Any]:
-    areas = triangle_areas(mesh.positions, mesh.triangles)
     lengths = np.linalg.norm(mesh.normals, axis=1)
     return {
         "vertices": mesh.n_vertices,
         "triangles": mesh.n_triangles,
-        "degenerate_triangles": int((areas == 0.0).sum()),
+        "degenerate_triangles": int(flat_triangles(mesh).sum()),
         "unused_vertices": int(mesh.n_vertices - len(np.unique(mesh.triangles))),
         "normal_lengths": [float(lengths.min()), float(lengths.max())],
         "has_uvs": mesh.uvs is not None,
@@ -276,11 +274,11 @@ def _box_text(actor: dict[str, Any]) -> str:
         return "none: nothing is visible" if actor["present"] else "none: absent at this time"
     low, high = actor["box"]
     unit = f" {actor['unit']}" if actor["unit"] else ""
-    # Far from the origin, six digits may not tell one end of the box from the other.
-    farthest = max(map(abs, [*low, *high]))
-    digits = ".6g" if farthest < _FAR * actor["size"] else ".10g"
-    points = _point(low, digits), _point(high, digits)
-    return f"{points[0]} to {points[1]}, size {actor['size']:.6g}{unit}"
+    size = actor["size"]
+    # Far from the origin, the corners of a small box have more digits.
+    finest = 10.0 ** (1 - _BOX_DIGITS + math.floor(math.log10(size))) if size > 0.0 else 0.0
+    points = _point(low, finest), _point(high, finest)
+    return f"{points[0]} to {points[1]}, size {rounded(size, _BOX_DIGITS)}{unit}"
 
 
 def _vertices(count: int) -> str:
@@ -367,5 +365,7 @@ def _skin_lines(skin: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _point(values: list[float], digits: str = ".6g") -> str:
-    return f"({', '.join(number_text(value, digits) for value in values)})"
+def _point(values: list[float], finest: float) -> str:
+    """Return coordinates as text, rounded to multiples of ``finest``, a power of ten."""
+    rows = [value if finest == 0.0 else finest * round(value / finest) for value in values]
+    return f"({', '.join(number_text(row, '.10g') for row in rows)})"

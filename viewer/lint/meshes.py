@@ -9,13 +9,12 @@ from viewer.lint._finding import Finding, Subject
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.topology import Edges, edges_of, orientations, welded
 from viewer.rig.geometry.vectors import unit
-from viewer.rig.mesh import Mesh, triangle_areas
+from viewer.rig.mesh import Mesh, flat_triangles, typical_place
 
 __all__ = ["check"]
 
 Indices = NDArray[np.int64]
 
-_FLAT = 1e-7  # height of a triangle within float32 rounding, relative to the mesh
 _UNIT = 0.01  # deviation of a normal's length from 1
 _ZERO = 1e-12  # maximum length of a zero normal
 _AGAINST = -0.1  # cosine to the triangle's normal: perpendicular normals are smoothed over an edge
@@ -26,7 +25,6 @@ _HOLLOW = 1e-6  # volume within rounding, relative to area^1.5, as of two coinci
 # Multiple of the median distance of vertices from their median: feet are at 16 times that distance
 # in models with half of their vertices in the face.
 _FAR = 40.0
-_SAMPLE = 4096  # number of vertices sampled for the median
 
 
 def check(subject: Subject) -> list[Finding]:
@@ -39,7 +37,7 @@ def check(subject: Subject) -> list[Finding]:
     if not whole.any():
         return findings
     known = subject.valid("positions", mesh.n_vertices)[mesh.triangles].all(axis=1) & whole
-    flat = (_heights(mesh) <= _FLAT * _typical(mesh)[1]) & known
+    flat = flat_triangles(mesh) & known
     valid = np.flatnonzero(~flat & whole)
     # Degenerate triangles have neither neighbours nor an orientation.
     corners = welded(mesh.positions, mesh.triangles)[valid]
@@ -51,21 +49,6 @@ def check(subject: Subject) -> list[Finding]:
         *_crowded_edges(subject, mesh, np.flatnonzero(whole)),
         *_sides(subject, mesh, valid, corners, known),
     ]
-
-
-def _heights(mesh: Mesh) -> Floats:
-    """Return the height of each triangle over its longest edge, 0 for a point: (T,)."""
-    corners = mesh.positions[mesh.triangles]
-    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
-    areas = triangle_areas(mesh.positions, mesh.triangles)
-    return np.divide(2.0 * areas, edges, out=np.zeros_like(areas), where=edges > 0.0)
-
-
-def _typical(mesh: Mesh) -> tuple[Floats, float]:
-    """Return the median of the mesh and the median distance from it, both robust to strays."""
-    some = mesh.positions[:: max(1, mesh.n_vertices // _SAMPLE)]
-    center: Floats = np.median(some, axis=0)
-    return center, float(np.median(np.abs(some - center).max(axis=1)))
 
 
 def _flat(subject: Subject, flat: Bools) -> list[Finding]:
@@ -323,7 +306,7 @@ def _vertices(subject: Subject, mesh: Mesh) -> list[Finding]:
                 at=("positions", int(unused[0])),
             )
         )
-    center, typical = _typical(mesh)
+    center, typical = typical_place(mesh)
     distances = np.abs(mesh.positions - center).max(axis=1)
     far = np.flatnonzero(distances > _FAR * typical) if typical > 0.0 else np.zeros(0, np.int64)
     if len(far):

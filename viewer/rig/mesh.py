@@ -20,9 +20,11 @@ __all__ = [
     "area_vectors",
     "bounding_box",
     "box_size",
+    "flat_triangles",
     "hidden_parts",
     "split_seams",
     "triangle_areas",
+    "typical_place",
     "vertex_normals",
     "visible_triangles",
     "visible_vertices",
@@ -37,6 +39,8 @@ PartView: TypeAlias = Literal["both", "auto", "third-person", "first-person", "h
 from the eyes.
 """
 
+_FLAT = 1e-7  # height of a triangle within float32 rounding, relative to the mesh
+_SAMPLE = 4096  # number of vertices sampled for the median
 _ROW = 64  # points per row of a reduction, see bounding_box
 
 
@@ -213,6 +217,24 @@ def triangle_areas(positions: Floats, triangles: Ints) -> Floats:
         Areas, squared units.
     """
     return 0.5 * np.linalg.norm(area_vectors(positions, triangles), axis=1)
+
+
+def flat_triangles(mesh: Mesh) -> Bools:
+    """Return which triangles have no area within float32 rounding: (T,)."""
+    corners = mesh.positions[mesh.triangles]
+    edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2).max(axis=1)
+    areas = triangle_areas(mesh.positions, mesh.triangles)
+    # The height over the longest edge; 0 for a point.
+    heights = np.divide(2.0 * areas, edges, out=np.zeros_like(areas), where=edges > 0.0)
+    flat: Bools = heights <= _FLAT * typical_place(mesh)[1]
+    return flat
+
+
+def typical_place(mesh: Mesh) -> tuple[Floats, float]:
+    """Return the median of the mesh and the median distance from it, both robust to strays."""
+    some = mesh.positions[:: max(1, mesh.n_vertices // _SAMPLE)]
+    center: Floats = np.median(some, axis=0)
+    return center, float(np.median(np.abs(some - center).max(axis=1)))
 
 
 def volume(positions: Floats, triangles: Ints) -> float:

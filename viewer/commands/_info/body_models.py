@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from viewer.phrases import counted, printable
+from viewer.phrases import counted, printable, rounded
 from viewer.rig.figure import Figure
 from viewer.rig.number_text import number_text
-from viewer.rig.pose import Pose
+from viewer.rig.pose import Pose, rest_pose
 from viewer.rig.scene import Actor
 from viewer.rig.shape import shaped
 from viewer.rig.skinning import METHODS, PURE, Skinning
@@ -48,8 +49,19 @@ def describe_model(actor: Actor, skinning: Skinning) -> dict[str, Any]:
 
 def _rest(figure: Figure, pose: Pose | None) -> dict[str, Any]:
     from viewer.rig.inspection.measure import measure
+    from viewer.rig.skinning import deform
 
-    found = measure(figure if pose is None else shaped(figure, pose.shape_weights))
+    rest = figure if pose is None else shaped(figure, pose.shape_weights)
+    skeleton, mesh = figure.skeleton, figure.mesh
+    # A body model is at rest as it was modelled. The joints of other figures may be elsewhere at
+    # rest than where they were when the skin was attached, or be scaled.
+    if mesh is not None and skeleton is not None and figure.is_attached and not figure.pose_layout:
+        still = rest_pose(skeleton)
+        if pose is not None:
+            still.shape_weights = pose.shape_weights
+        positions, _ = deform(figure, still)
+        rest = replace(rest, mesh=replace(rest.mesh or mesh, positions=positions))
+    found = measure(rest)
     return {"height": found.height, "volume": found.volume, "mass": found.mass}
 
 
@@ -110,7 +122,10 @@ def model_lines(model: dict[str, Any], figure: Figure) -> list[str]:
         solid = "open mesh without a volume"
         if rest["volume"] is not None:
             litres = 1000.0 * rest["volume"]
-            solid = f"{litres:.2f} litres, {rest['mass']:.1f} kg at 985 kg/m3"
+            solid = f"{litres:.2f} litres" if litres < 1000.0 else f"{rounded(rest['volume'])} m3"
+            # The density of people says nothing about other figures.
+            if figure.pose_layout is not None:
+                solid += f", {rest['mass']:,.1f} kg at 985 kg/m3"
         lines.append(f"  rest       {rest['height']:.3f} m high, {solid}")
     if any(model.get("shape_weights", [])):
         weights = ", ".join(number_text(weight) for weight in model["shape_weights"])

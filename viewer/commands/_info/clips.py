@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from viewer.phrases import counted, printable
+from viewer.phrases import counted, printable, rounded
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
 from viewer.rig.motion.sampled_clip import SampledClip
 from viewer.rig.motion.timing import Timing
 from viewer.rig.motion.transform_clip import TransformClip
-from viewer.rig.number_text import number_text
 from viewer.rig.scene import Actor, Motion
 from viewer.rig.transforms.rate import is_regular, key_rate
 
 _SHOWN_GAPS = 6
+_MILLISECOND = 0.001
 _NO_NAME = "(no name)"
 
 
@@ -107,7 +107,7 @@ def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
     lines = []
     for row, each in enumerate(animations):
         head = "animations" if row == 0 else ""
-        start, end = map(number_text, each["range"])
+        start, end = map(_seconds, each["range"])
         mark = "*" if each["plays"] else " "
         name = printable(each["name"]) or _NO_NAME
         lines.append(f"  {head:10} {each['number']:{width}}{mark} {name}: {start} to {end} s")
@@ -118,7 +118,7 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     """Return the description as lines of text."""
     start, end = clip["range"]
     name = printable(clip["name"]) or _NO_NAME
-    head = f"  clip       {name}: {number_text(start)} to {number_text(end)} s, "
+    head = f"  clip       {name}: {_seconds(start)} to {_seconds(end)} s, "
     if clip.get("kind") == "transforms":
         return _transform_lines(head, clip)
     if "kind" in clip:
@@ -130,7 +130,7 @@ def clip_lines(clip: dict[str, Any]) -> list[str]:
     if clip["key_times"]:
         first, last = clip["key_times"]
         lines.append(
-            f"    keys from {number_text(first)} to {number_text(last)} s; extrapolation: {modes}"
+            f"    keys from {_seconds(first)} to {_seconds(last)} s; extrapolation: {modes}"
         )
     return lines
 
@@ -140,19 +140,30 @@ def _transform_lines(head: str, clip: dict[str, Any]) -> list[str]:
     modes = ", ".join(f"{mode} {count}" for mode, count in clip["interpolation"].items())
     lines = [f"{head}{counted(clip['channels'], 'channel')}, {counted(clip['keys'], 'key')}"]
     if clip["key_times"]:
-        first, last = map(number_text, clip["key_times"])
+        first, last = map(_seconds, clip["key_times"])
         rate = f"{clip['frame_rate']:g} fps" if clip["regular"] else "irregular times"
         lines.append(f"    keys from {first} to {last} s at {rate}; {paths}; {modes}")
     return lines
 
 
 def _rows_text(clip: dict[str, Any]) -> str:
-    frames = counted(clip["frames"], "frame")
+    frames, first = counted(clip["frames"], "frame"), clip["first_frame"]
+    if first:
+        last = first + clip["frames"] - 1
+        frames += f" ({first} to {last})" if last > first else f" ({first})"
     frames += f" at {clip['frame_rate']:g} fps"
     if clip["kind"] == "points":
         return f"{frames}, {counted(clip['points'], 'point')}, {100 * clip['seen']:.1f} % visible"
     shape = "a different shape in each frame" if clip["shape_varies"] else "one shape"
     return f"{frames}, {counted(clip['joints'], 'joint')}, {shape}"
+
+
+def _seconds(time: float) -> str:
+    """Return a time as text, to the millisecond; shorter ones with three digits."""
+    text = (
+        rounded(time) if 0.0 < abs(time) < _MILLISECOND else f"{time:.3f}".rstrip("0").rstrip(".")
+    )
+    return "0" if text == "-0" else text
 
 
 def _gap_lines(clip: dict[str, Any]) -> list[str]:
