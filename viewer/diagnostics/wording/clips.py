@@ -82,6 +82,6 @@ PHRASES = {
     "dofs-unordered": "its DOFs are not in the order of its joints",
     "one-frame": "frame {frame}",
     "frame-range": "frames {first} to {last}",
-    "resting-height": "{height:.4g} for {seconds:.2g} s",
+    "resting-height": "{height:.3g} for {seconds:.2g} s",
     "low-point": "{name:text} in {percent:.0f} %",
 }
