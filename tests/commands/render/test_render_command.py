@@ -371,3 +371,14 @@ def test_image_can_be_written_to_standard_output(rig, tmp_path, into):
     assert Image.open(io.BytesIO(data)).size == (40, 30)
     assert data.endswith(b"IEND\xaeB`\x82")  # no text follows the image
     assert b"40 x 30" in done.stderr
+
+
+def test_mesh_beyond_the_squares_of_float32_is_drawn_without_warnings(tmp_path):
+    # Warnings are errors in tests. The sides of the ground's patches are 1e20, their product 1e40.
+    mesh = tmp_path / "huge.obj"
+    mesh.write_text("v 0 0 0\nv 1e20 0 0\nv 0 1e20 0\nf 1 2 3\n")
+    image = tmp_path / "huge.png"
+    assert run(["render", str(mesh), "-o", str(image), "--size", "64x64"]) == 0
+    with Image.open(image) as found:
+        red, _, blue = found.convert("RGB").getpixel((28, 36))
+    assert red > blue  # the mesh is beige, the background blue

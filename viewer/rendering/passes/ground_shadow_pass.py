@@ -13,6 +13,7 @@ from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.contact_pass import Contact
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats
+from viewer.rig.geometry.vectors import unit
 
 __all__ = ["GroundShadowPass"]
 
@@ -96,7 +97,8 @@ class GroundShadowPass:
         """Draw the parallelogram given by a corner and two sides, scene space."""
         placement = np.eye(4)
         placement[:3, 0], placement[:3, 1] = first, second
-        placement[:3, 2] = np.cross(first, second)
+        # Only the direction matters: the product of two sides would exceed the range of float32.
+        placement[:3, 2] = np.cross(unit(first), unit(second))
         placement[:3, 3] = origin
         set_model(program, view, placement, np.zeros(3))
         array = self._arrays.get(program, lambda: [(self._corners, "2f4", "in_corner")])
