@@ -159,3 +159,9 @@ def test_hints_differ_for_findings_without_a_line(tmp_path: Path, capsys) -> Non
     lines = capsys.readouterr().out.splitlines()
     assert lines[1] == "    malformed file; remedy: export it again, or open another file"
     assert lines[3] == "    malformed file; remedy: fix the line or export the file again"
+
+
+def test_limits_of_file_sizes_have_separators(tmp_path, capsys):
+    (tmp_path / "a.obj").write_bytes(b"#" * 1_234_567)
+    run(["lint", str(tmp_path / "a.obj"), "--max-size", "1M"])
+    assert "expected at most 1,048,576 bytes, found 1,234,567 " in capsys.readouterr().out

@@ -52,7 +52,7 @@ MESSAGES = {
     "F006.pickle-rest": "ignored {n:#byte} after the end of the pickle",
     # Graded submissions: folders and zip archives
     "F001.submission": "{reason:text}",
-    "F001.submission-size": "expected at most {most} bytes of files, found {found}",
+    "F001.submission-size": "expected at most {most:,.0f} bytes of files, found {found:,.0f}",
     "F001.submission-count": "expected at most {most:#file}, found {found}",
     "F002.submission-kind": _SUBMISSION + "a {suffix:text} file",
     "F002.submission-zip": _SUBMISSION + "a damaged archive ({reason})",

@@ -55,8 +55,8 @@ MESSAGES = {
     "F002.gltf-no-json": "expected a JSON object, found no text",
     "F002.gltf-utf-16": "expected JSON in UTF-8, found UTF-16 text",
     "F002.gltf-json": "expected JSON, found a syntax error: {reason:text} (character {at})",
-    "F001.gltf-text": "expected at most {most} bytes of JSON, found {size}: store the data in a "
-    ".glb or .bin file",
+    "F001.gltf-text": "expected at most {most:,.0f} bytes of JSON, found {size:,.0f}: "
+    "store the data in a .glb or .bin file",
     "F002.gltf-digits": "expected numbers of at most {most} digits, found a longer number",
     "G001.chunk-again": "ignored another {kind:text} chunk",
     "G001.chunk-length": "{kind:text} chunk: expected {expected:#byte}, found {found}",
