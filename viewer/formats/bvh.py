@@ -115,7 +115,8 @@ def _skeleton(table: Table) -> Skeleton:
     parents = np.array(table.parents, dtype=np.int32)
     # Offsets are used as written, because differences of positions would be rounded.
     skeleton = ball_skeleton(table.names, parents, np.zeros((len(parents), 3)))
-    return replace(skeleton, rest_translations=table.offsets, boxes=_boxes(table, parents))
+    boxes = _boxes(table, parents)
+    return replace(skeleton, rest_translations=table.offsets, boxes=boxes, boxes_from_bones=True)
 
 
 def _rest_points(table: Table, skeleton: Skeleton) -> Floats:

@@ -63,6 +63,10 @@ class Skeleton:
         Smallest and largest value; -inf and inf if unlimited.
     boxes : (J, 2, 3) or None
         Lowest and highest corner of the box drawn for each joint, in joint space.
+    boxes_from_bones : bool
+        Whether a reader made the boxes, each from its joint to the next ones or to the far end of
+        the last bone. They are parallel to the joint's axes, so they do not fit oblique bones:
+        pictures show bones by default.
     auxiliary : (J,) bool or None
         Joints that are not in the file: a reader added them to represent a transform or a second
         binding exactly. They have no DOFs, and ``shown_joints`` omits them: lists, pictures and
@@ -87,6 +91,7 @@ class Skeleton:
     rest_dofs: Floats
     dof_limits: Floats
     boxes: Floats | None = None
+    boxes_from_bones: bool = False
     auxiliary: Bools | None = None
     humanoid: Humanoid | None = None
     constraints: tuple[Constraint, ...] = ()

@@ -229,7 +229,9 @@ def test_joints_without_channels_stay_at_rest() -> None:
 
 
 def test_end_sites_are_the_far_ends_of_boxes() -> None:
-    boxes = read(GOOD)[0].figure.skeleton.boxes
+    skeleton = read(GOOD)[0].figure.skeleton
+    boxes = skeleton.boxes
+    assert skeleton.boxes_from_bones
     # With a single child, twice the centre of a box is the child's offset.
     np.testing.assert_allclose(boxes[3].sum(axis=0), [0, 0.2, 0], atol=1e-15)
     np.testing.assert_allclose(boxes[2].sum(axis=0), [0, 0, 0.2], atol=1e-15)

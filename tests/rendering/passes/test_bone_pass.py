@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -116,6 +117,21 @@ def test_default_style_is_the_boxes_of_a_file_or_octahedra(offscreen):
         found = draw(offscreen, scene, 2.0)
         np.testing.assert_array_equal(found, draw(offscreen, scene, 2.0, style))
         assert (found != draw(offscreen, scene, 2.0, "sticks")).any()
+
+
+def test_default_style_of_boxes_made_from_bones_is_bones_to_the_far_ends(offscreen):
+    """The far end of the last bone is the sum of its box's corners: 0.5 right and 0.5 up."""
+    boxes = np.array([[[-0.1, 0.0, -0.1], [0.1, 1.0, 0.1]], [[0.1, 0.1, -0.1], [0.4, 0.4, 0.1]]])
+    scene = scene_of([-1, 0], [[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]], boxes=boxes)
+    figure = scene.actors[0].figure
+    made = replace(figure, skeleton=replace(figure.skeleton, boxes_from_bones=True))
+    scene = alone(made)
+    found = draw(offscreen, scene, 2.0)
+    np.testing.assert_array_equal(found, draw(offscreen, scene, 2.0, "octahedra"))
+    near = draw(offscreen, scene, 0.6)
+    assert at(near, 0.6, 0.2, 0.2)[3] > 0 and at(near, 0.6, 0.4, 0.4)[3] > 0
+    # Without a far end, the last bone would continue the one before it.
+    assert at(near, 0.6, 0.0, 0.06)[3] == 0
 
 
 @pytest.mark.parametrize("style", STYLES)

@@ -54,8 +54,8 @@ def bone_links(skeleton: Skeleton, size: float = 1.0) -> BoneLinks:
     """Return the links of a skeleton.
 
     A joint with several children has a bone to each. A joint without children has a short end in
-    the direction of the previous bone if it can rotate, so that its rotation is visible. Bones
-    between coincident joints have length 0.
+    the direction of the previous bone if it can rotate, so that its rotation is visible. The bone
+    reaches its far end if the file states that. Bones between coincident joints have length 0.
 
     Parameters
     ----------
@@ -75,6 +75,11 @@ def bone_links(skeleton: Skeleton, size: float = 1.0) -> BoneLinks:
     lengths = np.where(lengths > _SAME * size, lengths, 0.0)
     ends = _end_joints(skeleton, above)
     ways, reach = _ends(points, parents, ends, axes, size)
+    if skeleton.boxes is not None and skeleton.boxes_from_bones:
+        # These boxes reach from a leaf joint, at 0, to the far end of its bone.
+        tips = np.einsum("nk,nka->na", skeleton.boxes[ends].sum(axis=1), axes[ends])
+        known = np.linalg.norm(tips, axis=1) > _SAME * size
+        ways[known], reach[known] = unit(tips[known]), np.linalg.norm(tips[known], axis=1)
     joints = np.concatenate([above, ends])
     along = np.abs(np.einsum("nka,na->nk", axes[joints], np.concatenate([unit(spans), ways])))
     ids = np.stack([joints, np.append(children, np.full(len(ends), -1)), along.argmin(axis=1)], 1)

@@ -12,7 +12,7 @@ def bone_style(skeleton: Skeleton, options: DisplayOptions) -> str:
     """Return the style of a drawn skeleton, a key of ``BONES`` other than ``"auto"``."""
     if options.bones != "auto":
         return options.bones
-    return "octahedra" if skeleton.boxes is None else "boxes"
+    return "octahedra" if skeleton.boxes is None or skeleton.boxes_from_bones else "boxes"
 
 
 def skeleton_opacity(skeleton: Skeleton, options: DisplayOptions) -> float:
