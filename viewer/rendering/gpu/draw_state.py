@@ -8,6 +8,7 @@ from contextlib import contextmanager
 import moderngl
 
 __all__ = [
+    "behind",
     "clipped",
     "opacities",
     "sides",
@@ -28,6 +29,19 @@ def without_depth_writes(context: moderngl.Context) -> Iterator[None]:
     finally:
         target.depth_mask = True
         target.use()
+
+
+_FARTHER = 2.0, 8.0  # factor of the slope and units of the polygon offset
+
+
+@contextmanager
+def behind(context: moderngl.Context) -> Iterator[None]:
+    """Draw slightly farther away, so that coincident surfaces hide what is drawn completely."""
+    context.polygon_offset = _FARTHER
+    try:
+        yield
+    finally:
+        context.polygon_offset = 0.0, 0.0
 
 
 @contextmanager

@@ -7,7 +7,7 @@ import math
 import moderngl
 import numpy as np
 
-from viewer.rendering.gpu.draw_state import without_depth_writes
+from viewer.rendering.gpu.draw_state import behind, without_depth_writes
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.passes.background_pass import parse_color
@@ -85,8 +85,9 @@ class GroundPass:
         if self._ground is None:
             content = [(self._corners, "2f4", "in_corner")]
             self._ground = self.context.vertex_array(program, content)
-        # The translucent grid must not hide later draw calls.
-        with without_depth_writes(self.context):
+        # The translucent grid must not hide later draw calls, nor show through a flat mesh on the
+        # ground, which has the same depth.
+        with without_depth_writes(self.context), behind(self.context):
             self._ground.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:

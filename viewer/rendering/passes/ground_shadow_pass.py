@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.effects import SHADOW_UNIT, Shadow
-from viewer.rendering.gpu.draw_state import without_depth_writes
+from viewer.rendering.gpu.draw_state import behind, without_depth_writes
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
@@ -102,8 +102,9 @@ class GroundShadowPass:
         placement[:3, 3] = origin
         set_model(program, view, placement, np.zeros(3))
         array = self._arrays.get(program, lambda: [(self._corners, "2f4", "in_corner")])
-        # Patches are translucent and must not hide anything.
-        with without_depth_writes(self.context):
+        # Patches are translucent and must not hide anything, nor show through a flat mesh on the
+        # ground, which has the same depth.
+        with without_depth_writes(self.context), behind(self.context):
             array.render(moderngl.TRIANGLE_STRIP)
 
     def release(self) -> None:
