@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from formats.gltf.files import TRIANGLE, File, read, refused, skinned, warned
+from formats.gltf.files import TRIANGLE, File, read, refused, skinned, source_of, warned
 
+from viewer.formats._gltf.node_file import read_nodes
 from viewer.formats._nodes.content import Primitive
 
 SQUARE = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]]
@@ -126,6 +127,10 @@ def test_joints_without_weights_are_ignored() -> None:
     file.primitive["attributes"]["JOINTS_1"] = file.accessor([[1, 0, 0, 0]] * 3, "B")
     assert only(file).joints.shape == (3, 4)
     assert warned(file) == [("G004.influence-sets", "/meshes/0/primitives/0/attributes")]
+    source = source_of(file)
+    read_nodes(source)
+    said = [found.message for found in source.diagnostics]
+    assert said == ["joints without weights, or weights without joints, in set 1: ignored"]
 
 
 def test_joints_must_exist_in_the_skin() -> None:

@@ -177,8 +177,8 @@ MESSAGES = {
     "G004.skeleton": "expected the index of a node, found {found}: ignored",
     "G004.bind-count": "expected {expected:#matrix}, one per joint, found {found}: the rest "
     "ignored",
-    "G004.influence-sets": "sets {sets:list} have joints without weights or weights without "
-    "joints: ignored",
+    "G004.influence-sets": "joints without weights, or weights without joints, in set "
+    "{sets:list}: ignored",
     # Animations
     "F002.gltf-no-keys": "expected at least one key time, found none",
     "F002.gltf-times": "key {index}: expected ascending times, found {found:.6g} after "
