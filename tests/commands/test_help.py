@@ -62,7 +62,7 @@ USAGES = {
     "info": "FILES ... [options]",
     "diff": "REFERENCE OTHER ... [options]",
     "lint": "FILES ... [options]",
-    "models": "[list | add NAME] [options]",
+    "models": "[list | names | add NAME] [options]",
     "doctor": "[--bench]",
     "help": "[TOPIC | COMMAND]",
     "completion": "bash|zsh|tcsh|fish",

