@@ -179,6 +179,14 @@ def test_sheets_are_written_together_or_not_at_all(tmp_path, monkeypatch) -> Non
     assert [one.name for one in tmp_path.iterdir()] == ["o.png"] and path.read_bytes() == b"old"
 
 
+def test_message_of_a_failed_item_is_shown_once(tmp_path) -> None:
+    notes = [{"message": "expected a mesh"}, {"message": "the unit is unknown"}]
+    failed = Result(Item(0, (), "", "a.obj"), "failed", 2, message="a.obj:1: expected a mesh")
+    save_overview(tmp_path / "o.html", "convert", [replace(failed, diagnostics=notes)])
+    texts = Page(tmp_path / "o.html").row("a.obj")[2]
+    assert texts == "a.obj:1: expected a meshthe unit is unknown"
+
+
 def test_page_of_info_lists_figures(tmp_path) -> None:
     base = {"size": 2.0, "unit": "m", "model": {}}
     clip = {"range": [0.0, 1.0], "frames": 1, "frame_rate": 2.0}

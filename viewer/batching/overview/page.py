@@ -247,8 +247,11 @@ def _texts(job: str, result: Result) -> list[str]:
         return texts + [f"{one['code']} {one['message']}" for one in findings]
     if job == "diff":
         return texts + mismatches_of(result)
-    others = [one["message"] for one in result.diagnostics if one.get("message") not in texts]
-    return texts + others
+    # The message of a failed item is that of an error, after its file and line.
+    others = (one["message"] for one in result.diagnostics)
+    return texts + [
+        one for one in others if not any(f": {text}".endswith(f": {one}") for text in texts)
+    ]
 
 
 def _message(job: str, result: Result) -> str:
