@@ -130,3 +130,19 @@ def test_values_of_a_function_are_columns_with_all_digits(tmp_path, monkeypatch)
     assert (first["inner.x"], first["inner.word"], first["value"]) == ("0.5", "'=1", "")
     assert (second["height"], second["n"], second["value"]) == ("", "", "-2.5")
     assert "list" not in first and float(first["seconds"]) < 9.0
+
+
+def test_infinite_values_are_the_same_after_a_resumed_run(tmp_path, monkeypatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a.txt").write_text("x")
+    for is_resumed in (False, True):
+        viewer.batch(["a.txt"], _infinite, workers=0, table="t.csv", report="r.jsonl",
+                     resume=is_resumed)  # fmt: skip
+        with (tmp_path / "t.csv").open(newline="") as stream:
+            (row,) = csv.DictReader(stream)
+        assert row["status"] == ("unchanged" if is_resumed else "done")
+        assert (row["low"], row["high"], row["none"]) == ("-inf", "inf", "nan")
+
+
+def _infinite(item) -> dict[str, float]:
+    return {"low": -np.inf, "high": np.inf, "none": np.nan}

@@ -106,7 +106,8 @@ def _cells_in(values: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str
 
 
 def _exact(cell: Cell) -> Cell:
-    return cell if isinstance(cell, float) else _safe(cell)
+    # A report has infinite numbers as text, as JSON has none.
+    return cell if isinstance(cell, float) or cell == "-inf" else _safe(cell)
 
 
 def _safe(cell: Cell) -> Cell:
