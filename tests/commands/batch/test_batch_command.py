@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from app.tiny import SKEL, skin_text, write_rig
 from formats.bvh_text import person
+from formats.synthetic_smpl import model
 
 import viewer
 from viewer.batching.report import read_results
@@ -108,6 +109,33 @@ def test_resume_runs_only_unfinished_items(rigs, capsys):
     Path("tiny.skin").write_text(skin_text() + "\n")
     assert run([*command, "--report", "r.jsonl", "--resume", "--dof", "arm.x=0.5"]) == 0
     assert "3 done" in capsys.readouterr().out
+
+
+def test_resume_notices_a_changed_model_of_each_gender(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    models = tmp_path / "models"
+    models.mkdir()
+    assert run(["models", "--model-path", str(models)]) == 0
+    for gender in ("NEUTRAL", "FEMALE"):
+        np.savez(models / f"SMPLH_{gender}.npz", **model("smplh"))
+    np.savez(
+        "walk.npz",
+        poses=np.zeros((2, 156)),
+        trans=np.zeros((2, 3)),
+        mocap_framerate=30.0,
+        gender="female",
+    )
+    command = ["batch", "convert", "walk.npz", "--model", "smplh", "--to", "bvh", "-o", "out"]
+    command += ["--report", "r.jsonl", "--resume"]
+    for summary in ("1 done", "1 unchanged"):
+        capsys.readouterr()
+        assert run(command) == 0
+        assert summary in capsys.readouterr().out
+    changed = model("smplh")
+    changed["v_template"] = 2.0 * changed["v_template"]
+    np.savez(models / "SMPLH_FEMALE.npz", **changed)
+    assert run(command) == 0
+    assert "1 done" in capsys.readouterr().out
 
 
 def test_text_is_printed_in_the_order_of_the_inputs(rigs, capsys):

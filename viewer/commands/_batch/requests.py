@@ -19,6 +19,7 @@ from viewer.commands._usage import Parser
 from viewer.errors import ViewerError
 from viewer.models import named_files, use_model_folder
 from viewer.phrases import listed, printable
+from viewer.rig.smpl_family import GENDERS
 from viewer.version import VERSION
 
 __all__ = ["request_of"]
@@ -140,4 +141,7 @@ def _files_in(command: argparse.Namespace) -> Iterator[str]:
             if name == "reference":
                 yield from map(str, input_files(text))
             elif isinstance(text, str):
-                yield from (str(path) for path in named_files(text) if os.path.isfile(path))
+                # Each input chooses the model of its own gender.
+                for gender in ("", *GENDERS) if name == "model" else ("",):
+                    found = named_files(text, gender)
+                    yield from (str(path) for path in found if os.path.isfile(path))
