@@ -119,7 +119,7 @@ class Driver:
         with self.holding(held):
             self.press(button)
             self.let_go(button)
-        self.step(2)
+        self.step()
 
     def double_click(self, target):
         self.move(target)
@@ -189,29 +189,29 @@ class Driver:
         self.click(self.place(label, 0.3), held="ctrl")
         self.type(text)
         self.key("enter")
-        self.step(2)
+        self.step()
 
     def menu(self, *titles):
         """Choose an entry of the menu bar."""
         for title in titles:
             self.click(title)
-            self.step(2)
+            self.step()
 
     def show_panel(self, title):
         """Click the tab of a panel that may be hidden behind others."""
         rect = imgui.internal.find_window_by_name(title).dc.dock_tab_item_rect
         # Left of the cross that closes it.
         self.click((rect.min.x + 0.3 * (rect.max.x - rect.min.x), (rect.min.y + rect.max.y) / 2))
-        self.step(2)
+        self.step()
 
     def pick(self, label, number):
         """Choose an entry of a drop-down list."""
         self.click(label)
         x, _y = self.place(label, 0.1)
-        self.step(2)
+        self.step()
         line = imgui.get_style().item_spacing.y + imgui.get_font_size()
         self.click((x, self.state.item_rects[label][3] + 8 + (number + 0.4) * line))
-        self.step(2)
+        self.step()
 
     def open(self, *paths):
         """Drop files on the window and wait for them."""

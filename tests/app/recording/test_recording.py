@@ -49,6 +49,7 @@ def test_menu_opens_the_dialog_and_escape_closes_it(moving):
     moving.step(2)
     assert "Save as…" in moving.state.item_rects
     moving.click("Save as…")
+    moving.step()  # the dialog takes the keys once it has been shown
     assert moving.state.of(Files).dialog is not None and moving.state.of(
         Files
     ).dialog.name.endswith(".mp4")
