@@ -9,6 +9,7 @@ from app.test_panel_pictures import _compare, _shown
 from viewer.app.shown_panels import ShownPanels
 
 pytest.importorskip("scipy")
+pytestmark = pytest.mark.usefixtures("quick_fits")
 
 SIZE = (1000, 1100)
 
