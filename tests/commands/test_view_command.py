@@ -8,17 +8,21 @@ from app.tiny import write_rig
 from PIL import Image
 
 import viewer
+import viewer.commands.view
 from viewer.cli import run
 
 pytestmark = pytest.mark.slow
 
 DRAFT = ("--quality", "draft")
+SMALL = (320, 180)
 
 
 @pytest.fixture(autouse=True)
 def _no_display(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert viewer.commands.view.SIZE == (1280, 720)
+    monkeypatch.setattr(viewer.commands.view, "SIZE", SMALL)
 
 
 def test_figure_is_rendered_to_a_new_file_without_a_display(tmp_path, monkeypatch, capsys):
@@ -38,7 +42,7 @@ def test_figure_is_rendered_to_a_new_file_without_a_display(tmp_path, monkeypatc
         assert len(list(folder.iterdir())) == number + 1
     picture = np.array(Image.open(folder / "tiny.png").convert("RGBA"))
     options = viewer.DisplayOptions(quality="final")
-    assert (picture == viewer.render(viewer.load(*rig), (1280, 720), options=options)).all()
+    assert (picture == viewer.render(viewer.load(*rig), SMALL, options=options)).all()
 
 
 def test_fox_is_rendered_without_display_and_files(tmp_path, monkeypatch, capsys):
