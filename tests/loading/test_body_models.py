@@ -12,8 +12,15 @@ from numpy.testing import assert_allclose
 
 import viewer
 from viewer.cli import run
-from viewer.loading import MotionSettings
+from viewer.errors import OutputError
+from viewer.loading import Contents, MotionSettings
+from viewer.loading.assembly import begin
+from viewer.media.targets import check_targets
 from viewer.models import save_model_folder
+from viewer.rig.captures.capture import Capture, CapturePart
+from viewer.rig.motion.body_motion import BodyMotion
+from viewer.rig.motion.timing import Timing
+from viewer.rig.smpl_family import ShapeSpace
 
 SCALES = {"NEUTRAL": 1.0, "FEMALE": 0.9, "MALE": 1.1}
 LEFT_KNEE, LEFT_HIP = 4, 1
@@ -147,6 +154,30 @@ def test_people_of_one_file_have_their_own_models(models, tmp_path):
     scene = viewer.load(tmp_path / "people.npz")
     assert [actor.figure.name for actor in scene.actors] == ["SMPL_FEMALE", "SMPL_MALE"]
     assert [actor.shape_space.gender for actor in scene.actors] == ["female", "male"]
+
+
+def test_model_of_a_person_who_appears_later_is_an_input(models):
+    for gender in ("FEMALE", "MALE"):
+        add_model(models, "smpl", gender)
+
+    def body(gender: str, rows: list[int]) -> BodyMotion:
+        vectors, space = np.zeros((1, 1, 3)), ShapeSpace("SMPL", gender)
+        timing = Timing(30.0, np.array(rows, dtype=np.int32))
+        return BodyMotion("", timing, ("pelvis",), vectors, np.zeros((1, 3)), shape_space=space)
+
+    parts = (
+        CapturePart(1, {0: body("female", [0, -1])}),
+        CapturePart(2, {1: body("male", [-1, 0])}),
+    )
+    capture = Capture("take", 2, 0, lambda: iter(parts), "y", model="SMPL")
+    contents = Contents(captures=[(models / "take", capture)])
+    scene, (builder,) = begin(contents, MotionSettings())
+    late = models / "SMPL_MALE.npz"
+    assert late not in scene.files
+    builder.read_some()
+    assert late in scene.files
+    with pytest.raises(OutputError, match="input files are never overwritten"):
+        check_targets([late], scene.files, force=True)
 
 
 def test_other_gender_is_used_with_a_warning(models, tmp_path):

@@ -103,9 +103,11 @@ def begin(
     found = (*contents.diagnostics, *cast.diagnostics)
     facts = tuple(fact for _, capture in contents.captures for fact in capture.facts)
     scene = Scene(cast.actors, found, "z" if world_up == "z" else "y", tuple(cast.views), facts)
-    scene.files, scene.images = contents.files, cast.images
-    if settings is not None:
-        scene.files += (*cast.files, *filter(None, [settings.video]))
+    cast.files[:0] = contents.files
+    if settings is not None and settings.video is not None:
+        cast.files.append(settings.video)
+    # The list itself, because people who appear later add the files of their models to it.
+    scene.files, scene.images = cast.files, cast.images
     switched = [capture for _, capture in contents.captures if capture.in_space is not None]
     if switched:
         scene.space = switched[0].space

@@ -44,7 +44,8 @@ class Cast:
     used_options : set of str
         Options that had an effect, see ``unused_options``.
     files : list of Path
-        Files of body models, which are not among the opened files.
+        Files of body models, which are not among the opened files; the scene's list, once there
+        is a scene.
     """
 
     actors: list[Actor]

@@ -219,8 +219,9 @@ class Scene:
         Images of the cameras, if available.
     time : float or None
         Current time of its motions, seconds; None for their start.
-    files : tuple of Path
-        All files from which it was read, including images; no output may overwrite them.
+    files : list of Path
+        All files from which it was read, including images; no output may overwrite them. Models
+        of people who appear later are appended when they are read.
     space : "world", "camera" or ""
         The space of its captured people, if their files contain both; empty otherwise.
     in_space : callable or None
@@ -234,7 +235,7 @@ class Scene:
     views: tuple[CameraView, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
     time: float | None = None
-    files: tuple[Path, ...] = ()
+    files: list[Path] = field(default_factory=list)
     images: CameraImages | None = None
     space: str = ""
     in_space: Callable[[str], Scene] | None = None

@@ -26,7 +26,7 @@ def test_opened_files_leave_no_objects_behind(hand, tmp_path):
         hand.open(tmp_path / f"fox-{number}.glb")
         hand.wait_for_loader()
         hand.step(2)
-        assert hand.state.scene.files == (tmp_path / f"fox-{number}.glb",)
+        assert hand.state.scene.files == [tmp_path / f"fox-{number}.glb"]
         counts.append(gl_objects())
         n_objects.append(len(gc.get_objects()))
     assert not hand.state.error

@@ -355,7 +355,7 @@ def test_open_files_are_never_overwritten(drive_body, tmp_path):
     hand.state.paths = (model,)
     read_with_it = tmp_path / "beside.json"
     read_with_it.symlink_to(model)
-    hand.state.scene.files = (read_with_it,)
+    hand.state.scene.files = [read_with_it]
     for opened in (hand.state.paths, ()):
         hand.state.paths = opened
         for save in (save_export, save_pose):

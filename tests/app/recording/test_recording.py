@@ -271,7 +271,7 @@ def test_input_images_are_not_replaced(moving, tmp_path):
     """The texture is not opened directly; the file of the figure refers to it."""
     texture = tmp_path / "cloth.png"
     texture.write_bytes(b"precious")
-    moving.state.scene.files = (texture,)
+    moving.state.scene.files = [texture]
     start(moving, texture, kind="sheet")
     moving.step(2)
     assert moving.state.error == f"{texture}: input files are never overwritten"
