@@ -861,7 +861,40 @@ def numbered(table: str) -> str:
     return "\n".join(["", *ended, ""])
 
 
+ADVANCED_SKELETON = """
+Root_M = pelvis
+ Hip_R = right_hip
+  HipPart1_R = -
+   Knee_R = right_knee
+    Ankle_R = right_ankle
+     Toes_R = right_foot
+      ToesEnd_R = -
+ Hip_L = left_hip
+  Knee_L = left_knee
+   Ankle_L = left_ankle
+    Toes_L = left_foot
+ Spine1_M = spine1
+  Spine2_M = spine2
+   Chest_M = spine3
+    Scapula_R = right_collar
+     Shoulder_R = right_shoulder
+      ShoulderPart1_R = -
+       Elbow_R = right_elbow
+        Wrist_R = right_wrist
+         IndexFinger1_R = right_index1
+         Cup_R = -
+          PinkyFinger1_R = right_pinky1
+    Scapula_L = left_collar
+     Shoulder_L = left_shoulder
+      Elbow_L = left_elbow
+       Wrist_L = left_wrist
+    Neck_M = neck
+     Head_M = head
+      Jaw_M = jaw
+      Eye_R = right_eye
+"""
 TABLES = {
+    "advanced skeleton": ADVANCED_SKELETON,
     "mixamo with unique numbers": numbered(MIXAMO),
     "biped with unique numbers": numbered(BIPED),
     "daz": DAZ,

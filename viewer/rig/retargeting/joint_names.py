@@ -43,6 +43,7 @@ _FAMILIES = {
     "SMPL": ("collar/thorax shoulder elbow wrist hand", "hip knee ankle foot/toe"),
     "BioVision, AIST++": ("collar shoulder elbow wrist -", "hip knee ankle toe"),
     "Kinect": ("clavicle shoulder elbow wrist hand", "hip knee ankle foot"),
+    "Advanced Skeleton": ("scapula shoulder elbow wrist -", "hip knee ankle toes"),
     "CMU in ASF": ("clavicle humerus radius wrist hand", "femur tibia foot toes"),
     "Poser": ("collar shldr forearm hand -", "thigh shin foot toe"),
     "Daz Genesis 3 and 8": ("collar shldrbend forearmbend hand -", "thighbend shin foot toe"),
@@ -429,9 +430,10 @@ def _key(tokens: list[str]) -> _Key:
     """Return the side, found at either end, and the word of a name."""
     if "".join(tokens) in _XSENS_SPINE:
         return "", "".join(tokens)
-    # Centre joints have the prefix c in VRM, and the suffix x in Auto-Rig Pro.
+    # Centre joints have the prefix c in VRM, and the suffix x in Auto-Rig Pro or m in Advanced
+    # Skeleton.
     tokens = tokens[1:] if len(tokens) > 1 and tokens[0] == "c" else tokens
-    tokens = tokens[:-1] if len(tokens) > 1 and tokens[-1] == "x" else tokens
+    tokens = tokens[:-1] if len(tokens) > 1 and tokens[-1] in ("x", "m") else tokens
     for end in (0, -1):
         if len(tokens) > 1 and tokens[end] in _SIDES:
             rest = tokens[1:] if end == 0 else tokens[:-1]
