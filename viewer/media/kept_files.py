@@ -13,7 +13,15 @@ from viewer.errors import OutputError
 from viewer.media.saving import save_bytes
 from viewer.phrases import printable
 
-__all__ = ["as_json", "checked", "load_kept", "save_kept", "to_stderr", "with_checksum"]
+__all__ = [
+    "as_json",
+    "checked",
+    "has_checksum",
+    "load_kept",
+    "save_kept",
+    "to_stderr",
+    "with_checksum",
+]
 
 Content = TypeVar("Content")
 
@@ -96,6 +104,11 @@ def with_checksum(text: str) -> bytes:
     """Return the bytes of a text after a comment (``;``) that contains its checksum."""
     data = text.encode("utf-8", "surrogateescape")
     return b"%s%08x\n%s" % (_MARK, zlib.crc32(data), data)
+
+
+def has_checksum(data: bytes) -> bool:
+    """Return whether a file begins as ``with_checksum`` writes it; earlier versions wrote none."""
+    return data.startswith(_MARK[:1])
 
 
 def checked(data: bytes) -> str:

@@ -28,12 +28,14 @@ LAYOUT = """\
 Pos=0,19
 Size=281,661
 Collapsed=0
-DockId=0x00000005,0
+DockId=0x00000003,0
 
 [Docking][Data]
-DockSpace   ID=0x07D2A9F3 Window=0x079D3A04 Pos=0,19 Size=1280,781 Split=Y
-  DockNode  ID=0x00000001 Parent=0x07D2A9F3 SizeRef=1280,661 Split=X
-  DockNode  ID=0x00000002 Parent=0x07D2A9F3 SizeRef=1280,120 Selected=0x0F18B61B
+DockSpace     ID=0x07D2A9F3 Window=0x079D3A04 Pos=0,19 Size=1280,781 Split=Y
+  DockNode    ID=0x00000001 Parent=0x07D2A9F3 SizeRef=1280,661 Split=X
+    DockNode  ID=0x00000003 Parent=0x00000001 SizeRef=281,661 Selected=0xEDA48C43
+    DockNode  ID=0x00000004 Parent=0x00000001 SizeRef=997,661 CentralNode=1
+  DockNode    ID=0x00000002 Parent=0x07D2A9F3 SizeRef=1280,120 Selected=0x0F18B61B
 
 """
 
@@ -78,9 +80,40 @@ def test_layout_cut_or_changed_anywhere_is_not_given_to_imgui():
     for data in (*cut, *flipped, *longer):
         with pytest.raises(ValueError, match=r"written|decode"):
             checked(data)
-    for data in (cut[-1], LAYOUT.encode()):
-        path.write_bytes(data)
+    path.write_bytes(cut[-1])
+    set_aside(path, load_layout, "")
+
+
+def test_layout_of_an_earlier_version_has_no_checksum_and_is_used():
+    state_folder().mkdir(parents=True)
+    path, said = state_folder() / "layout.ini", []
+    path.write_text(LAYOUT)
+    assert load_layout(said.append) == LAYOUT and said == []
+    for end in range(1, len(LAYOUT) - 1):  # the last line may be empty or not
+        path.write_text(LAYOUT[:end])
         set_aside(path, load_layout, "")
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("ID=0x00000004", "ID=0x00000003"),  # a dock twice
+        ("Parent=0x00000001", "Parent=0x00000002"),  # a child of a dock that comes later
+        (" Split=X", ""),  # children of a dock that is not split
+        ("Selected=0x0F18B61B", "Split=X"),  # a split dock without children
+        (" CentralNode=1", ""),  # no dock for the view
+        ("Split=X", "Split=X CentralNode=1"),  # the view in a dock with children
+        ("SizeRef=281,661", "SizeRef=2e9,661"),
+        ("Collapsed=0", "Collapsed"),
+        ("[Docking][Data]", "[Docking]"),
+    ],
+)
+def test_layout_whose_docks_do_not_fit_together_is_set_aside(old, new):
+    state_folder().mkdir(parents=True)
+    path = state_folder() / "layout.ini"
+    assert LAYOUT.replace(old, new) != LAYOUT
+    path.write_text(LAYOUT.replace(old, new))
+    set_aside(path, load_layout, "")
 
 
 @pytest.mark.parametrize(

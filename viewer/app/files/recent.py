@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import platformdirs
 from viewer.media.kept_files import (
     as_json,
     checked,
+    has_checksum,
     load_kept,
     save_kept,
     to_stderr,
@@ -106,9 +108,66 @@ def load_layout(say: _Say = to_stderr) -> str:
     """Return the layout of the panels as ImGui wrote it; empty if there is none.
 
     ImGui trusts its file: docks that do not fit together end the process. So only text that was
-    stored completely and is unchanged is returned.
+    stored completely and is unchanged is returned. Earlier versions let ImGui write the file,
+    without a checksum: its text is returned if the docks fit together.
     """
-    return load_kept(state_folder() / "layout.ini", checked, "", say)
+    return load_kept(state_folder() / "layout.ini", _layout, "", say)
+
+
+def _layout(data: bytes) -> str:
+    if has_checksum(data):
+        return checked(data)
+    text = data.decode("utf-8")
+    _check_sections(text)
+    _check_docks([found for line in text.split("\n") if (found := _DOCK.fullmatch(line))])
+    return text
+
+
+_SECTION = re.compile(r"\[(Window|Docking|Table)\]\[[^\n]+\]")
+_NUMBER, _PAIR, _HEX = r"-?\d{1,8}", r"-?\d{1,5},-?\d{1,5}", r"0x[0-9A-F]{8}"
+_ENTRY = re.compile(
+    rf"(Pos|Size|ViewportPos)={_PAIR}|(ViewportId|ClassId)={_HEX}|DockId={_HEX}(,\d{{1,3}})?"
+    rf"|(Collapsed|IsChild|LastUsed)={_NUMBER}|(RefScale=\d+|Column \d+ [^\n]*)"
+)
+_DOCK = re.compile(
+    rf" *Dock(?P<kind>Space|Node) +ID=(?P<id>{_HEX})( Parent=(?P<parent>{_HEX}))?"
+    rf"( Window={_HEX})?( Pos={_PAIR})?( Size(Ref)?={_PAIR})?(?P<split> Split=[XY])?"
+    rf"( NoResize=1)?(?P<central> CentralNode=1)?( (NoTabBar|HiddenTabBar)=1)?"
+    rf"( NoWindowMenuButton=1)?( NoCloseButton=1)?( Selected={_HEX})?"
+)
+
+
+def _check_sections(text: str) -> None:
+    """Raise ValueError unless every line is one that ImGui writes."""
+    first, *lines, last = text.split("\n")
+    if not _SECTION.fullmatch(first) or last:
+        raise ValueError("not written completely")
+    kinds = _SECTION, _ENTRY, _DOCK
+    if not all(not line or any(kind.fullmatch(line) for kind in kinds) for line in lines):
+        raise ValueError("a line that ImGui does not write")
+
+
+def _check_docks(docks: Sequence[re.Match[str]]) -> None:
+    """Raise ValueError unless the docks are trees, whose split nodes have two children each.
+
+    One leaf of each dock space is its central node, which the panels leave free.
+    """
+    n_children, splits, n_central = dict[str, int](), set[str](), 0
+    for found in docks:
+        name, parent, is_split = found["id"], found["parent"], bool(found["split"])
+        if name in n_children or (parent is not None and parent not in splits):
+            raise ValueError("docks do not form a tree")
+        n_children[name] = 0
+        if parent is not None:
+            n_children[parent] += 1
+        if is_split:
+            splits.add(name)
+        if found["central"]:
+            n_central += 1 + is_split
+    if any(n != 2 * (name in splits) for name, n in n_children.items()):
+        raise ValueError("expected two docks in a split one")
+    if not 1 <= n_central == sum(found["kind"] == "Space" for found in docks):
+        raise ValueError("expected one central dock in each dock space")
 
 
 def save_layout(text: str) -> str:
