@@ -40,6 +40,7 @@ from viewer.export._losses.between import rate_note, resampling_losses
 from viewer.export._motion_paths import split_paths
 from viewer.export._options import MotionOptions
 from viewer.formats import all_or_none, save_bytes
+from viewer.rig.captures.carried_view import moving_alone, view_in
 from viewer.rig.figure import Figure
 from viewer.rig.motion.sampled_animation import SampledAnimation
 from viewer.rig.motion.transform_clip import TransformClip
@@ -98,7 +99,7 @@ def export_figures(
         add_figure(document, actor, skinning, own, together, optimizes)
         for actor, own in zip(actors, clips, strict=True)
     ]
-    first, views = actors[0], () if scene is None else scene.views
+    first, views = actors[0], [] if scene is None else [*scene.views]
     if scene is None or len(actors) == 1:
         own = to_metres(first.figure.up, first.figure.unit)
         to_file = own @ np.linalg.inv(first.placement)
@@ -106,7 +107,11 @@ def export_figures(
         to_file = to_metres(scene.up, scene_unit(scene))
     built = [each.built for each in added]
     placing = place_figures(document, actors, built, to_file) if len(actors) > 1 else []
-    lenses = add_cameras(document, views, to_file, [*zip(actors, built, strict=True)])
+    alone = [] if scene is None else moving_alone(scene)
+    if scene is not None and not any(clips):
+        views = [view_in(view, scene) if view.mount and view.mount.path else view for view in views]
+    pairs = [*zip(actors, built, strict=True)]
+    lenses = add_cameras(document, views, to_file, pairs, together, clips, alone)
     extensions = [] if extend is None else extend(document, added[0].body, added[0].built)
     (data,) = _files([(path, document)])
     notes = [_written(path, actors, added, len(views), len(data[path])), *extensions]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -87,11 +88,13 @@ def fits(camera: CameraView, size: tuple[int, ...]) -> bool:
     return abs(size[0] * height / (size[1] * width) - 1.0) <= _TOLERANCE
 
 
-def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Floats:
+def with_cameras(
+    scene: Scene, options: DisplayOptions, points: Floats, poses: Iterable[Scene] | None = None
+) -> Floats:
     """Return the points to frame: the figures' points, and the corners of drawn frusta.
 
-    Cameras that move in frames are framed along their whole path, those that a joint carries where
-    they are now.
+    Cameras that move in frames are framed along their whole path, those that a figure moves where
+    they are in some poses of the scene; without these, where they are now.
     """
     if not options.cameras or not scene.views:
         return points
@@ -100,10 +103,15 @@ def with_cameras(scene: Scene, options: DisplayOptions, points: Floats) -> Float
     from viewer.rig.captures.carried_view import view_in
 
     cameras = [
-        view_at(view_in(camera, scene) if camera.mount else camera, seconds)
+        view_at(camera, seconds)
         for camera in scene.views
+        if camera.mount is None
         for seconds in motion_times(camera, _FRAMED).tolist()
     ]
+    mounted = [number for number, camera in enumerate(scene.views) if camera.mount is not None]
+    if mounted:
+        posed = [scene] if poses is None else poses
+        cameras += [view_in(each.views[number], each) for each in posed for number in mounted]
     return np.concatenate([points, frusta_points(cameras, bounding_box(points))])
 
 

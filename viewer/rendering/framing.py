@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -23,6 +23,7 @@ __all__ = [
     "fit_turntable",
     "follow_candidates",
     "frame_motion",
+    "framed_poses",
     "frames_looked_at",
     "level_shifts",
     "outermost",
@@ -50,12 +51,11 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     box : (2, 3)
         Bounds of all points in the scene: the recording's ``box``.
     """
-    scene, follow, show = copied(recording.scene), recording.follow, recording.options.show
+    follow, show = recording.follow, recording.options.show
     clouds: list[Floats] = []
     boxes: list[Floats] = []
     shift = np.zeros(3)
-    for index in _looked_at(recording):
-        pose_scene(scene, recording, float(recording.times[index]))
+    for index, scene in zip(_looked_at(recording), framed_poses(recording), strict=True):
         if not any(actor.is_drawn for actor in scene.actors) and len(recording.times) > 1:
             continue  # all actors are absent in this frame
         points = outermost(scene_points(scene, show))
@@ -69,6 +69,14 @@ def frame_motion(recording: Recording) -> tuple[Floats, Floats]:
     if not clouds:
         return np.zeros((1, 3)), np.zeros((2, 3))
     return np.concatenate(clouds), bounding_box(np.concatenate(boxes))
+
+
+def framed_poses(recording: Recording) -> Iterator[Scene]:
+    """Yield the scene of a recording, posed at those of its frames that the camera frames."""
+    scene = copied(recording.scene)
+    for index in _looked_at(recording):
+        pose_scene(scene, recording, float(recording.times[index]))
+        yield scene
 
 
 def level_shifts(recording: Recording) -> Floats:

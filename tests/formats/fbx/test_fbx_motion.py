@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.formats._fbx.contents import target_weights
+from viewer.rig.captures.carried_view import view_in
 from viewer.rig.kinematics import world_matrices
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Actor
@@ -206,6 +208,50 @@ def test_cameras_look_along_x_of_their_node(tmp_path: Path) -> None:
     point = view.rotation @ [-2.0, 2.0, 2.0] + view.translation
     assert_allclose(point, [2.0, -1.0, 3.0], atol=1e-12)
     assert scene.actors[0].figure.require_skeleton().names == ("RootNode", "low", "high", "Shot")
+
+
+def filmed(path: Path) -> Path:
+    """Add curves to a file with a camera: the camera moves from x = -5 to -1 in one second."""
+    text = path.read_text()
+    head, rest = text.split("Objects:  {", 1)
+    curve = """
+    AnimationCurveNode: 70, "AnimCurveNode::T", "" {
+        Properties70:  { P: "d|X", "Number", "", "A",-5
+            P: "d|Y", "Number", "", "A",1 }
+    }
+    AnimationCurve: 71, "AnimCurve::", "" {
+        Default: -5
+        KeyVer: 4008
+        KeyTime: *2 { a: 0,46186158000 }
+        KeyValueFloat: *2 { a: -5,-1 }
+        KeyAttrFlags: *1 { a: 4 }
+        KeyAttrDataFloat: *4 { a: 0,0,0,0 }
+        KeyAttrRefCount: *1 { a: 2 }
+    }"""
+    links = """    C: "OO",70,51
+    C: "OP",70,60, "Lcl Translation"
+    C: "OP",71,70, "d|X"
+"""
+    rest = rest.replace("Connections:  {\n", "Connections:  {\n" + links)
+    path.write_text(f"{head}Objects:  {{{curve}{rest}")
+    return path
+
+
+@pytest.mark.parametrize("write", [write_strip, write_two_strips])
+def test_animated_cameras_move(tmp_path: Path, write: Callable[..., Path]) -> None:
+    path = write(tmp_path)
+    text = path.read_text()
+    for old, new in CAMERA.items():
+        assert old in text
+        text = text.replace(old, new, 1)
+    path.write_text(text)
+    scene = viewer.load(filmed(path))
+    (view,) = scene.views
+    for seconds, x in ((0.0, -5.0), (0.5, -3.0), (1.0, -1.0)):
+        scene.time = seconds
+        pose_actors(scene.actors, seconds)
+        there = view_in(view, scene)
+        assert_allclose(-there.rotation.T @ there.translation, [x, 1.0, 0.0], atol=1e-6)
 
 
 def skinned_by(kind: str, more: str = "") -> dict[str, str]:

@@ -16,8 +16,10 @@ from numpy.testing import assert_allclose
 import viewer
 from viewer.cli import run
 from viewer.rendering.camera import camera_from_view, follow_view
-from viewer.rendering.camera_views import drawn_cameras
+from viewer.rendering.camera_views import drawn_cameras, with_cameras
+from viewer.rendering.framing import framed_poses
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.recorder import Recording
 from viewer.rig.captures.carried_view import view_in
 from viewer.rig.motion.evaluation import pose_actor
 
@@ -125,3 +127,110 @@ def test_helper_nodes_that_are_not_written_are_named(
         "2 nodes of the original file without a joint, mesh or camera are not copied: "
         "Armature (with extras), Empty"
     ) in capsys.readouterr().out
+
+
+def dolly(only: bool = False) -> File:
+    """Return a figure beside a camera, 1 unit to the side of a node that animation 0 moves.
+
+    The node slides from x = 0 to 4 at z = 5 and rotates by 90 degrees about y in one second.
+    ``only``: the figure is still.
+    """
+    file = skinned()
+    file.root["nodes"] = [
+        {"mesh": 0, "skin": 0},
+        {"name": "root", "children": [2]},
+        {"name": "tip", "translation": [0, 1, 0]},
+        {"name": "dolly", "translation": [0, 0, 5], "children": [4]},
+        {"name": "eye", "translation": [1, 0, 0], "camera": 0},
+    ]
+    lens = {"yfov": 0.8, "aspectRatio": SIZE[0] / SIZE[1], "znear": 0.1}
+    file.root["cameras"] = [{"type": "perspective", "perspective": lens}]
+    times = file.times([0.0, 1.0])
+    rows = {
+        (3, "translation"): [[0, 0, 5], [4, 0, 5]],
+        (3, "rotation"): [[0, 0, 0, 1], [0, HALF, 0, HALF]],
+        (2, "rotation"): [[0, 0, 0, 1], [0, 0, HALF, HALF]],
+    }
+    samplers, channels = [], []
+    for (node, path), values in list(rows.items())[: 2 if only else 3]:
+        target = {"node": node, "path": path}
+        channels.append({"sampler": len(samplers), "target": target})
+        samplers.append({"input": times, "output": file.accessor(values)})
+    file.root["animations"] = [{"name": "Shot", "channels": channels, "samplers": samplers}]
+    return file
+
+
+# Rotated by 45 and 90 degrees about y, (1, 0, 0) is (c, 0, -c) and (0, 0, -1), from (2, 0, 5) and
+# (4, 0, 5).
+PATH = {0.0: [1, 0, 5], 0.5: [2 + HALF, 0, 5 - HALF], 1.0: [4, 0, 4]}
+
+
+def assert_path(path: Path, atol: float = 1e-12) -> None:
+    scene = viewer.load(path)
+    for seconds, place in PATH.items():
+        scene.time = seconds
+        pose_actor(scene.actors[0], seconds)
+        assert_allclose(center(view_in(scene.views[0], scene)), place, atol=atol)
+
+
+@pytest.mark.parametrize("only", [False, True])
+def test_animated_nodes_beside_figures_move_a_camera(
+    tmp_path: Path, only: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source = saved(dolly(only), tmp_path)
+    assert_path(source, 1e-7)
+    assert run(["info", str(source)]) == 0
+    said = capsys.readouterr()
+    assert "Shot: 0 to 1 s" in said.out and "omitted" not in said.out + said.err
+
+
+def test_camera_keeps_its_own_animation_below_a_still_joint(tmp_path: Path) -> None:
+    file = dolly()
+    # The camera itself is animated, below a joint at (0, 1, 0) that stays at rest.
+    file.root["nodes"][2]["children"] = [4]
+    del file.root["nodes"][3]["children"]
+    eye = file.root["animations"][0]
+    eye["channels"] = [{"sampler": 0, "target": {"node": 4, "path": "translation"}}]
+    scene = viewer.load(saved(file, tmp_path))
+    scene.time = 1.0
+    pose_actor(scene.actors[0], 1.0)
+    assert_allclose(center(view_in(scene.views[0], scene)), [4, 1, 5], atol=1e-12)
+
+
+def test_animated_cameras_are_written_with_their_keys(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, path = saved(dolly(), tmp_path), tmp_path / "b.glb"
+    assert run(["convert", str(source), "-o", str(path)]) == 0
+    said = capsys.readouterr().out
+    assert "first frame" not in said and "not copied" not in said
+    assert_path(path, 1e-6)
+    # A pose has the camera where it is then.
+    assert run(["convert", str(source), "--time", "1", "-o", str(path), "--force"]) == 0
+    (view,) = viewer.load(path).views
+    assert view.mount is None
+    assert_allclose(center(view), [4, 0, 4], atol=1e-6)
+
+
+@pytest.mark.parametrize(("only", "options"), [(True, ()), (False, ("--fps", "20"))])
+def test_camera_motions_that_are_not_written_are_named(
+    tmp_path: Path, only: bool, options: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    source, path = saved(dolly(only), tmp_path), tmp_path / "b.glb"
+    assert run(["convert", str(source), "-o", str(path), *options]) == 0
+    assert "1 camera is written at the first frame only, without its motion: eye" in (
+        capsys.readouterr().out
+    )
+
+
+def test_videos_frame_the_whole_path_of_a_carried_camera(tmp_path: Path) -> None:
+    scene = viewer.load(saved(dolly(), tmp_path))
+    options = DisplayOptions(cameras=True)
+    times = np.array([0.0, 1.0])
+    camera = camera_from_view(scene.views[0], SIZE, "y")
+    recording = Recording(scene, times, camera, SIZE, options)
+    points = np.zeros((1, 3)), np.array([[1.0, 1.0, 1.0]])
+    framed = with_cameras(scene, options, np.concatenate(points), framed_poses(recording))
+    # Frusta begin at the centres of the cameras, of which both ends of the path are framed.
+    for seconds in (0.0, 1.0):
+        assert np.abs(framed - PATH[seconds]).max(axis=1).min() < 1e-6

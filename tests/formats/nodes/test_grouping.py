@@ -169,17 +169,18 @@ def test_deep_chain_of_nodes_is_grouped_in_linear_time():
 
 
 def test_animations_of_other_nodes_are_reported():
-    """A camera belongs to no figure; the transform of a skinned mesh has no effect."""
+    """A camera moves on its own, a lamp does not; the transform of a skinned mesh has no effect."""
     tree = tree_of(
         {"name": "root"},
         {"name": "hip", "parent": 0},
         {"name": "skin", "parent": 0, "mesh": 0, "skin": 0},
         {"name": "eye", "parent": 0, "camera": 0},
+        {"name": "lamp"},
     )
     meshes, cameras = (mesh(triangle(1, 1)),), (NodeCamera("plan", 1.0),)
-    sweep = NodeAnimation("sweep", 0.0, 1.0, frozenset({1, 2, 3}), tuple)
+    sweep = NodeAnimation("sweep", 0.0, 1.0, frozenset({1, 2, 3, 4}), tuple)
     file = file_of(tree, meshes=meshes, skins=(skin([1], 3),), cameras=cameras)
     notes = source()
     figure_group(replace(file, animations=(sweep,)), notes)
     (note,) = notes.diagnostics.warnings
-    assert (note.key, note.values["names"]) == ("F007.animated-others", ["eye"])
+    assert (note.key, note.values["names"]) == ("F007.animated-others", ["lamp"])

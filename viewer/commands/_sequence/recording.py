@@ -204,7 +204,7 @@ def draw_sequence(
     from viewer.commands._progress import Progress
     from viewer.commands._sequence.shots import shots_of
     from viewer.rendering.camera_views import with_cameras
-    from viewer.rendering.framing import fit_turntable, frame_motion, seen_aspect
+    from viewer.rendering.framing import fit_turntable, frame_motion, framed_poses, seen_aspect
     from viewer.rendering.gpu.graphics import thread_graphics
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
@@ -215,7 +215,7 @@ def draw_sequence(
     check_targets(outputs, inputs_of(arguments, scene), arguments.force)
     recording = _recording(request, arguments, scene, shots, options)
     points, recording.box = frame_motion(recording)
-    points = with_cameras(scene, options, points)
+    points = with_cameras(scene, options, points, framed_poses(recording))
     aspect = seen_aspect(camera_of(arguments, scene, points, size), points)
     sink = _sink(request, arguments, options, shots, outputs, size, aspect)
     print_warnings([*shots.notes, *follow_notes(arguments, scene), *getattr(sink, "notes", [])])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from viewer.data_classes import dataclass
+from viewer.formats._nodes.ancestors import with_ancestors
 from viewer.formats._nodes.bindings import bind_rigid, bind_skins, inverse_binds
 from viewer.formats._nodes.content import REACH, NodeFile
 from viewer.formats._nodes.facts import facts_of
@@ -18,11 +19,12 @@ from viewer.formats._nodes.pointers import remember_pointers
 from viewer.formats._nodes.records import record_of
 from viewer.formats._nodes.shapes import blend_shapes_of, shape_columns
 from viewer.formats._nodes.surfaces import Piece, mesh_of, pieces_of, skin_of
-from viewer.formats._nodes.views import Carrier, views_of
+from viewer.formats._nodes.views import Carrier, moved_cameras, views_of
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.figure_group import FigureGroup
 from viewer.rig.file_record import FileRecord
+from viewer.rig.motion.animation import Animation
 
 if TYPE_CHECKING:
     from viewer.formats._source import Source
@@ -58,23 +60,38 @@ def figure_group(file: NodeFile, source: Source) -> FigureGroup:
         raise source.fault("F002.no-figure")
     _check_vertices(file, groups, source)
     readers = read_once(file.animations)
-    file = replace(file, lost_nodes=_lost_nodes(file, groups))
-    found = [_figure(file, members, readers, source) for members in groups]
+    order = scene_order(file) if file.cameras else []
+    cameras = moved_cameras(file, groups, order)
+    written = set[int]().union(*(_above(file, own) for own in cameras))
+    file = replace(file, lost_nodes=_lost_nodes(file, groups, written))
+    found = [
+        _figure(file, members, readers, source, _above(file, own))
+        for members, own in zip(groups, cameras, strict=True)
+    ]
     _note_normals([piece for each in found for piece in each.pieces], source)
     _note_weights([piece for each in found for piece in each.pieces], source)
-    _note_others(file, {node for each in found for node in each.moved}, source)
-    order = scene_order(file) if file.cameras else []
+    shown = {node for each in found for node in each.moved}
+    _note_others(file, shown | written, source)
     _note_methods(file, groups, source)
-    carriers = [Carrier(each.record, each.joints) for each in found]
-    views, left_out = views_of(file.tree, order, file.cameras, carriers)
+    carriers = [
+        Carrier(each.record, each.joints, own) for each, own in zip(found, cameras, strict=True)
+    ]
+
+    def animations(joints: Joints) -> tuple[Animation, ...]:
+        return animations_of(file.animations, readers, joints.own, {})
+
+    views, left_out = views_of(file.tree, order, file.cameras, carriers, animations)
     if left_out:
         source.warn("F007.orthographic", names=left_out)
     return FigureGroup(file.name, tuple(each.figure for each in found), views)
 
 
-def _lost_nodes(file: NodeFile, groups: list[Members]) -> tuple[str, ...]:
-    """Return the names of the nodes that are neither joints, meshes nor cameras."""
-    kept = {node for members in groups for node in (*members.nodes, *members.meshes)}
+def _lost_nodes(file: NodeFile, groups: list[Members], written: set[int]) -> tuple[str, ...]:
+    """Return the names of the nodes that are neither joints, meshes, cameras nor above these.
+
+    ``written``: nodes above cameras that they move.
+    """
+    kept = written | {node for members in groups for node in (*members.nodes, *members.meshes)}
     lost = [n for n in scene_order(file) if n not in kept and file.tree.cameras[n] < 0]
     extras = file.tree.extras
     return tuple(
@@ -95,8 +112,15 @@ class _Made:
     moved: set[int]
 
 
-def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Source) -> _Made:
-    """Return one figure."""
+def _above(file: NodeFile, cameras: set[int]) -> set[int]:
+    """Return the nodes of some cameras and the nodes above them."""
+    return with_ancestors(file.tree.parents.tolist(), cameras)
+
+
+def _figure(
+    file: NodeFile, members: Members, readers: list[Reader], source: Source, beside: set[int]
+) -> _Made:
+    """Return one figure, which plays the animations of some nodes beside it, too."""
     joints = make_joints(file.tree, members.nodes)
     worlds = _worlds(joints, source)
     bindings = bind_skins(joints, worlds, {index: file.skins[index] for index in members.skins})
@@ -115,7 +139,7 @@ def _figure(file: NodeFile, members: Members, readers: list[Reader], source: Sou
         unit=file.unit,
         blend_shapes=blend_shapes_of(file, columns, pieces) if pieces else None,
         facts=facts_of(file, pieces),
-        animations=animations_of(file.animations, readers, joints.own, columns),
+        animations=animations_of(file.animations, readers, joints.own, columns, beside),
         record=record,
     )
     remember_pointers(source, figure.skeleton, file, members, joints, pieces)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from collections.abc import Set as AbstractSet
 from typing import TypeAlias
 
 from viewer.errors import FormatError
@@ -45,6 +46,7 @@ def animations_of(
     readers: list[Reader],
     joints: Mapping[int, int],
     columns: Mapping[int, Ints],
+    beside: AbstractSet[int] = frozenset(),
 ) -> tuple[Animation, ...]:
     """Return the animations that move a joint or blend shape of a figure, in file order.
 
@@ -58,6 +60,8 @@ def animations_of(
         Joint of each node.
     columns : mapping of (S,) int32
         Blend shapes of each node's morph targets.
+    beside : set of int
+        Nodes of cameras that move while the figure plays an animation, even one without channels.
     """
     return tuple(
         Animation(
@@ -71,7 +75,7 @@ def animations_of(
         for number, (animation, read) in enumerate(
             zip(animations, _bound(readers, joints, columns), strict=True)
         )
-        if any(node in joints or node in columns for node in animation.nodes)
+        if any(node in joints or node in columns or node in beside for node in animation.nodes)
     )
 
 

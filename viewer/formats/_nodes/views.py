@@ -1,21 +1,24 @@
-"""Cameras of a file of nodes, as camera views that the joints above them carry."""
+"""Cameras of a file of nodes, as camera views that the nodes above them move."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from collections.abc import Set as AbstractSet
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.formats._nodes.ancestors import with_ancestors
-from viewer.formats._nodes.content import NodeCamera, NodeTree
-from viewer.formats._nodes.joints import Joints, make_joints, rest_worlds
+from viewer.formats._nodes.ancestors import path_to_root, with_ancestors
+from viewer.formats._nodes.content import NodeCamera, NodeFile, NodeTree
+from viewer.formats._nodes.grouping import Members
+from viewer.formats._nodes.joints import Joints, make_joints, rest_worlds, skeleton_of
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraMount, CameraView, extrinsics
+from viewer.rig.captures.camera_view import CameraMount, CameraPath, CameraView, extrinsics
 from viewer.rig.file_record import FileRecord
+from viewer.rig.motion.animation import Animation
 
-__all__ = ["Carrier", "views_of"]
+__all__ = ["Carrier", "moved_cameras", "views_of"]
 
 _HEIGHT = 1080  # height of a view, pixels
 _ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none
@@ -23,10 +26,38 @@ _ASPECT = 16.0 / 9.0  # aspect ratio of cameras that specify none
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Carrier:
-    """A figure whose joints can carry cameras."""
+    """A figure whose joints can carry cameras, and the cameras that its animations move."""
 
     record: FileRecord
     joints: Joints
+    cameras: AbstractSet[int] = frozenset()
+
+
+def moved_cameras(
+    file: NodeFile, groups: Sequence[Members], order: Sequence[int]
+) -> list[set[int]]:
+    """Return the cameras that animated nodes move, other than joints, as a set per figure.
+
+    Each belongs to one of the figures with the nearest joint above it, or of all figures: to that
+    which plays most of the animations.
+    """
+    found = [set[int]() for _ in groups]
+    joints = [set(each.nodes) for each in groups]
+    plays = [
+        {at for at, each in enumerate(file.animations) if each.nodes & {*own, *group.meshes}}
+        for own, group in zip(joints, groups, strict=True)
+    ]
+    for node in order:
+        if file.tree.cameras[node] < 0 or any(node in own for own in joints):
+            continue
+        path = path_to_root(file.tree.parents, node)
+        above = next((at for at in path if any(at in own for own in joints)), None)
+        own = path if above is None else path[: path.index(above)]
+        moving = {at for at, each in enumerate(file.animations) if not each.nodes.isdisjoint(own)}
+        if moving:
+            owners = [at for at, each in enumerate(joints) if above is None or above in each]
+            found[max(owners, key=lambda at: len(plays[at] & moving))].add(node)
+    return found
 
 
 def views_of(
@@ -34,6 +65,7 @@ def views_of(
     order: list[int],
     cameras: tuple[NodeCamera, ...],
     carriers: Sequence[Carrier] = (),
+    animations: Callable[[Joints], tuple[Animation, ...]] = lambda _: (),
 ) -> tuple[tuple[CameraView, ...], list[str]]:
     """Return the perspective cameras of a scene.
 
@@ -47,6 +79,8 @@ def views_of(
         The file's cameras.
     carriers : sequence of Carrier
         The figures of the file.
+    animations : callable
+        Returns the animations of some joints.
 
     Returns
     -------
@@ -69,25 +103,38 @@ def views_of(
             left_out.append(name)
         else:
             world = worlds[joints.carrier[node]]
-            mount = _mount(tree, node, carriers)
+            mount = _mount(tree, node, carriers, animations)
             views.append(_view(name, world, camera.vertical_angle, camera, mount))
     return tuple(views), left_out
 
 
-def _mount(tree: NodeTree, node: int, carriers: Sequence[Carrier]) -> CameraMount | None:
-    """Return the nearest joint at or above a camera's node; None if no figure has one."""
-    below: list[int] = []
-    while node >= 0:
-        for carrier in carriers:
-            joint = carrier.joints.carrier.get(node)
-            if joint is not None:
-                # Without the nodes above, the rest transforms are relative to the joint.
-                chain = make_joints(tree, below[::-1])
-                matrix = rest_worlds(chain)[chain.carrier[below[0]]] if below else np.eye(4)
-                return CameraMount(carrier.record, joint, matrix)
-        below.append(node)
-        node = int(tree.parents[node])
-    return None
+def _mount(
+    tree: NodeTree,
+    node: int,
+    carriers: Sequence[Carrier],
+    animations: Callable[[Joints], tuple[Animation, ...]],
+) -> CameraMount | None:
+    """Return what moves a camera: the nearest joint at or above it, or animated nodes below that.
+
+    None if neither exists.
+    """
+    mover = next((carrier for carrier in carriers if node in carrier.cameras), None)
+    choice = carriers if mover is None else (mover,)
+    owner, joint, below = mover, -1, list[int]()
+    for above in path_to_root(tree.parents, node):
+        found = next((each for each in choice if above in each.joints.carrier), None)
+        if found is not None:
+            owner, joint = found, found.joints.carrier[above]
+            break
+        below.append(above)
+    if owner is None:
+        return None
+    if not below:
+        return CameraMount(owner.record, joint, np.eye(4))
+    # Without the nodes above, the rest transforms are relative to the joint.
+    chain = make_joints(tree, below[::-1])
+    path = None if mover is None else CameraPath(skeleton_of(chain), animations(chain))
+    return CameraMount(owner.record, joint, rest_worlds(chain)[-1], path)
 
 
 def _view(

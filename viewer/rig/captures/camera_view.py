@@ -19,10 +19,13 @@ from viewer.rig.motion.timing import Timing
 
 if TYPE_CHECKING:
     from viewer.rig.file_record import FileRecord
+    from viewer.rig.motion.animation import Animation
+    from viewer.rig.skeleton import Skeleton
 
 __all__ = [
     "CameraMotion",
     "CameraMount",
+    "CameraPath",
     "CameraView",
     "extrinsics",
     "motion_times",
@@ -65,22 +68,42 @@ class CameraMotion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CameraPath:
+    """The nodes that move a camera outside all figures.
+
+    Attributes
+    ----------
+    nodes : Skeleton
+        A chain of nodes as joints, which ends with the camera.
+    animations : tuple of Animation
+        The animations of the file that move them, with joints of ``nodes``.
+    """
+
+    nodes: Skeleton
+    animations: tuple[Animation, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CameraMount:
-    """The joint that carries a camera.
+    """The joint or the nodes that move a camera.
 
     Attributes
     ----------
     record : FileRecord
-        Record of the figure with the joint. Edits of the figure keep it.
+        Record of the figure with the joint, or of one that plays the same animations as the nodes.
+        Edits of the figure keep it.
     joint : int
-        Index of the joint.
+        Index of the joint; -1 if the camera moves in the space of the figure.
     matrix : (4, 4)
-        Camera to joint space; here the camera looks along -z with y up, as in glTF.
+        Camera to joint space at rest; here the camera looks along -z with y up, as in glTF.
+    path : CameraPath or None
+        The nodes that move the camera; None if they are still.
     """
 
     record: FileRecord
     joint: int
     matrix: Floats
+    path: CameraPath | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "matrix", frozen("matrix", self.matrix, (4, 4)))
@@ -111,7 +134,7 @@ class CameraView:
     near, far : float or None
         Distances of the clipping planes that its file states, scene units. They are not used.
     mount : CameraMount or None
-        The joint that carries it; rotation and translation then apply to the rest pose.
+        The joint or the nodes that move it; rotation and translation then apply to the rest pose.
     """
 
     name: str

@@ -1,19 +1,28 @@
-"""Cameras that a joint of a figure carries."""
+"""Cameras that a joint of a figure carries, or nodes of its file move."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
 
-from viewer.rig.captures.camera_view import CameraView, extrinsics, view_at
+import numpy as np
+
+from viewer.rig.arrays import Floats
+from viewer.rig.captures.camera_view import CameraPath, CameraView, extrinsics, view_at
+from viewer.rig.kinematics import forward_kinematics
+from viewer.rig.motion.animation import Animation
+from viewer.rig.motion.transform_clip import TransformClip
+from viewer.rig.pose import local_matrices, rest_pose
 from viewer.rig.scene import Actor, Scene
 from viewer.rig.skinning import joint_matrices
+from viewer.rig.transforms.posing import apply_transforms
+from viewer.rig.transforms.sampling import sample_transforms
 
-__all__ = ["carrier_of", "view_in"]
+__all__ = ["carrier_of", "moving_alone", "played_with", "view_in"]
 
 
 def carrier_of(view: CameraView, actors: Sequence[Actor]) -> Actor | None:
-    """Return the actor whose joint carries a camera; None if no actor does."""
+    """Return the actor that moves a camera with its joint or clip; None if no actor does."""
     mount = view.mount
     if mount is None:
         return None
@@ -33,8 +42,41 @@ def view_in(view: CameraView, scene: Scene) -> CameraView:
     mount, actor = view.mount, carrier_of(view, scene.actors)
     if mount is None or actor is None or actor.pose is None:
         return view_at(view, scene.time or 0.0)
-    joints = joint_matrices(actor.figure, actor.pose)
-    if mount.joint >= len(joints):
-        return view
-    rotation, translation = extrinsics(actor.placement @ joints[mount.joint] @ mount.matrix)
+    world = actor.placement
+    if mount.joint >= 0:
+        joints = joint_matrices(actor.figure, actor.pose)
+        if mount.joint >= len(joints):
+            return view
+        world = world @ joints[mount.joint]
+    matrix = mount.matrix if mount.path is None else _moved(mount.path, actor, scene.time or 0.0)
+    rotation, translation = extrinsics(world @ matrix)
     return replace(view, rotation=rotation, translation=translation, mount=None)
+
+
+def played_with(path: CameraPath, clip: object) -> Animation | None:
+    """Return the animation of a camera that belongs to the clip of a figure; None without one."""
+    if not isinstance(clip, TransformClip) or clip.number < 0:
+        return None
+    return next((each for each in path.animations if each.number == clip.number), None)
+
+
+def moving_alone(scene: Scene) -> list[str]:
+    """Return the names of the cameras that move in a clip without channels for any figure."""
+    found = []
+    for view in scene.views:
+        actor = carrier_of(view, scene.actors)
+        clip = None if actor is None else actor.clip
+        path = None if view.mount is None else view.mount.path
+        if path is not None and isinstance(clip, TransformClip) and not clip.channels:
+            found += [view.name] if played_with(path, clip) is not None else []
+    return found
+
+
+def _moved(path: CameraPath, actor: Actor, time: float) -> Floats:
+    """Return the matrix of a camera's nodes at one time of the scene's clock: (4, 4)."""
+    pose, animation = rest_pose(path.nodes), played_with(path, actor.clip)
+    if animation is not None:
+        samples = sample_transforms(animation.clip(), np.array([time - actor.offset]))
+        apply_transforms(samples, 0, path.nodes, pose)
+    worlds: Floats = forward_kinematics(path.nodes.parents, local_matrices(path.nodes, pose))
+    return worlds[-1]
