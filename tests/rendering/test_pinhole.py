@@ -92,10 +92,13 @@ def test_images_of_another_aspect_ratio_are_letterboxed():
 
 
 def test_principal_point_is_in_the_middle_without_a_size():
-    assert picture_size(camera_view(size=None)) == (600.0, 520.0)
-    assert picture_size(camera_view(size=None, intrinsic=2.0 * K)) == (600.0, 520.0)
-    # Half a pixel is subtracted, because pixels are counted from the centre of the first pixel.
-    assert pixel(camera_view(size=None), (0, 0, 0), (600, 520)) == pytest.approx([300.0, 260.0])
+    # Pixels are counted from the centre of the first pixel: the centre of 601 pixels is 300.
+    assert picture_size(camera_view(size=None)) == (601.0, 521.0)
+    assert picture_size(camera_view(size=None, intrinsic=2.0 * K)) == (601.0, 521.0)
+    assert pixel(camera_view(size=None), (0, 0, 0), (601, 521)) == pytest.approx([300.0, 260.0])
+    # On the axis of the camera, and so in the middle of pictures of any size.
+    centre = pixel(camera_view(size=None), (0, 0, 0), (1202, 1042))
+    assert centre == pytest.approx([600.5, 520.5])
     with pytest.raises(RigError) as caught:
         picture_size(camera_view(size=None, intrinsic=np.diag([800.0, 800.0, 1.0])))
     assert str(caught.value) == (

@@ -20,7 +20,8 @@ _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's c
 def picture_size(view: CameraView) -> tuple[float, float]:
     """Return the width and height of a camera's images, pixels.
 
-    If the files do not state the size, the principal point is assumed to be the image centre.
+    If the files do not state the size, the principal point is assumed to be the image centre:
+    (W - 1) / 2 and (H - 1) / 2, because pixel coordinates begin at the centre of the first pixel.
 
     Raises
     ------
@@ -29,11 +30,12 @@ def picture_size(view: CameraView) -> tuple[float, float]:
     """
     if view.size is not None:
         return float(view.size[0]), float(view.size[1])
-    width, height = 2.0 * view.intrinsic[:2, 2] / view.intrinsic[2, 2]
-    if not (width > 0.0 and height > 0.0):
+    across, down = view.intrinsic[:2, 2] / view.intrinsic[2, 2]
+    width, height = 2.0 * across + 1.0, 2.0 * down + 1.0
+    if not (across > 0.0 and down > 0.0):
         raise RigError(
             f"camera {view.name}: expected a principal point above 0 or the size of the pictures, "
-            f"found {width / 2:g}, {height / 2:g}"
+            f"found {across:g}, {down:g}"
         )
     return float(width), float(height)
 

@@ -147,10 +147,10 @@ def _planes(view: CameraView, to_file: Floats) -> dict[str, float]:
 
 
 def _size(view: CameraView) -> tuple[float, float]:
-    """Return the width and height of the images; twice the principal point if unknown."""
+    """Return the width and height of the images; centred about the principal point if unknown."""
     if view.size is not None:
         return float(view.size[0]), float(view.size[1])
-    return 2.0 * float(view.intrinsic[0, 2]), 2.0 * float(view.intrinsic[1, 2])
+    return 2.0 * float(view.intrinsic[0, 2]) + 1.0, 2.0 * float(view.intrinsic[1, 2]) + 1.0
 
 
 def _is_bent(view: CameraView) -> bool:
