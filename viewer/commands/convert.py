@@ -43,7 +43,7 @@ from viewer.commands._writing.written_actors import (
 )
 from viewer.diagnostics import Diagnostic
 from viewer.diagnostics.record import note_found
-from viewer.errors import RigError, UnsupportedFormatError, ViewerError
+from viewer.errors import FormatError, RigError, UnsupportedFormatError, ViewerError
 from viewer.export import (
     EXPORTERS,
     export,
@@ -160,13 +160,18 @@ def _write_clips(
     arguments: argparse.Namespace, scene: Scene, output: Path, skinning: Skinning
 ) -> list[Diagnostic]:
     """Write figures at rest with their animations, or only with the requested one."""
-    is_chosen = bool(arguments.animation)
+    is_chosen, refused = bool(arguments.animation), list[FormatError]()
 
     def clips_of(actor: Actor) -> Sequence[TransformClip] | None:
-        own = own_animations(actor, is_chosen) if has_own_animations(actor) else ()
+        own = own_animations(actor, is_chosen, refused) if has_own_animations(actor) else ()
         return own or None
 
-    return _write_actors(arguments, scene, output, skinning, clips_of)
+    notes = _write_actors(arguments, scene, output, skinning, clips_of)
+    # Figures of one file share its animations.
+    problems = dict.fromkeys(map(str, refused))
+    return notes + [
+        Diagnostic("X003.invalid-animation", values={"problem": each}) for each in problems
+    ]
 
 
 def _write_actors(

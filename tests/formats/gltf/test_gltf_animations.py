@@ -1,9 +1,14 @@
 """Animations: targets, interpolation, ranges, lazy reading, and omitted animations."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
-from formats.gltf.files import File, animated, read, source_of, warned
+from formats.gltf.files import File, animated, read, skinned, source_of, warned
 
+import viewer
+from viewer.cli import run
 from viewer.diagnostics import Collector
 from viewer.errors import FormatError
 from viewer.formats import Source
@@ -229,3 +234,32 @@ def test_malformed_animation_is_omitted(change: dict[str, object]) -> None:
     file.root["animations"][0] |= change
     assert [found.name for found in read(file).animations] == ["valid"]
     assert [key for key, _ in warned(file)] == ["G005.animation"]
+
+
+def test_invalid_animation_does_not_block_the_others(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = skinned()
+    times = file.times([0.0, 1.0])
+    turn, bad = file.accessor([[0, 0, 0, 1], [0, 0, 1, 0]]), file.accessor([0.0, 0.5])
+    channel = {"sampler": 0, "target": {"node": 2, "path": "rotation"}}
+    file.root["animations"] = [
+        {"name": name, "channels": [channel], "samplers": [{"input": times, "output": output}]}
+        for name, output in (("good", turn), ("bad", bad))
+    ]
+    source, out = tmp_path / "two.glb", tmp_path / "out.glb"
+    source.write_bytes(file.glb())
+    place = "two.glb#/animations/1/samplers/0/output"
+    assert run(["convert", str(source), "-o", str(out)]) == 0
+    said = capsys.readouterr().out
+    assert f"{place}: expected VEC4, found SCALAR" in said and "is not written" in said
+    (actor,) = viewer.load(out).actors
+    assert [each.name for each in actor.figure.animations] == ["good"]
+    assert run(["convert", str(source), "--animation", "bad", "-o", str(out), "--force"]) == 2
+    assert place in capsys.readouterr().err
+    assert run(["info", str(source)]) == 0
+    assert place in capsys.readouterr().out
+    assert run(["info", "--json", str(source)]) == 0
+    (told,) = json.loads(capsys.readouterr().out)["actors"]
+    good, wrong = told["animations"]
+    assert "error" not in good and place in wrong["error"]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.phrases import counted, printable, rounded
 from viewer.rig.captures.points import PointClip
 from viewer.rig.motion.clip import Clip
@@ -89,8 +90,12 @@ def gaps_of(timing: Timing) -> list[list[int]]:
 
 
 def describe_animations(actor: Actor) -> list[dict[str, Any]]:
-    """Return the names and ranges of a figure's animations as JSON data, without their keys."""
-    return [
+    """Return the names and ranges of a figure's animations as JSON data, without their keys.
+
+    An animation with invalid keys has an ``"error"``. Keys whose place in the file is unknown take
+    long to read, and are checked by ``lint`` only.
+    """
+    found: list[dict[str, Any]] = [
         {
             "number": index + 1,
             "name": animation.name,
@@ -99,6 +104,13 @@ def describe_animations(actor: Actor) -> list[dict[str, Any]]:
         }
         for index, animation in enumerate(actor.figure.animations)
     ]
+    for row, animation in zip(found, actor.figure.animations, strict=True):
+        try:
+            if animation.place:
+                animation.clip()
+        except FormatError as problem:
+            row["error"] = str(problem)
+    return found
 
 
 def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
@@ -111,6 +123,8 @@ def animation_lines(animations: list[dict[str, Any]]) -> list[str]:
         mark = "*" if each["plays"] else " "
         name = printable(each["name"]) or _NO_NAME
         lines.append(f"  {head:10} {each['number']:{width}}{mark} {name}: {start} to {end} s")
+        if "error" in each:
+            lines.append(f"    cannot be played: {printable(each['error'])}")
     return lines
 
 

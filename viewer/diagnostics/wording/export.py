@@ -119,6 +119,7 @@ MESSAGES = {
     "X003.of-figure": "{figure:text}: {remark}",
     "X003.idle-animations": "{n:#animation|has|have} no effect on what is written and "
     "{n:?is|are} omitted: {names:list}",
+    "X003.invalid-animation": "{problem}; this animation is not written",
     "X003.other-animations": "{n:#other animation|is|are} not written: {names:list8}",
     "X003.idle-shapes": "keys of {n:#blend shape} that {n:?changes|change} no vertex are omitted: "
     "{names:list}",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from viewer.errors import FormatError
 from viewer.rig.motion.transform_clip import TransformClip
 from viewer.rig.motion.upright import own_up
 from viewer.rig.pose import Pose
@@ -29,7 +30,9 @@ def keeps_keys(scene: Scene, actor: Actor) -> bool:
     return has_own_animations(actor) and not own_up(scene, actor)[1]
 
 
-def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformClip, ...]:
+def own_animations(
+    actor: Actor, only_played: bool = False, refused: list[FormatError] | None = None
+) -> tuple[TransformClip, ...]:
     """Return the animations of an actor, including edits of the one that it plays.
 
     Animations without keys are omitted.
@@ -40,20 +43,27 @@ def own_animations(actor: Actor, only_played: bool = False) -> tuple[TransformCl
         See ``has_own_animations``.
     only_played : bool
         Return only the one that it plays.
+    refused : list of FormatError, optional
+        Receives the errors of animations with invalid keys, which are then left out.
 
     Raises
     ------
     FormatError
-        If the keys of an animation are invalid.
+        If the keys of an animation are invalid, and ``refused`` is not given.
     """
     played = actor.clip if isinstance(actor.clip, TransformClip) else None
     if only_played:
         clips = [] if played is None else [played]
     else:
-        clips = [
-            played if played is not None and index == actor.animation else animation.clip()
-            for index, animation in enumerate(actor.figure.animations)
-        ]
+        clips = []
+        for index, animation in enumerate(actor.figure.animations):
+            try:
+                own = played if index == actor.animation else None
+                clips.append(animation.clip() if own is None else own)
+            except FormatError as problem:
+                if refused is None:
+                    raise
+                refused.append(problem)
         if played is not None and actor.animation < 0:
             clips.append(played)
     return tuple(clip for clip in clips if clip.channels)
