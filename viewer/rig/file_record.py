@@ -110,6 +110,8 @@ class FileRecord:
         Properties of a VRM character.
     has_skin : bool
         Whether the file skins the meshes; otherwise each follows its node.
+    skin_names : tuple of str
+        Names of the skins of the figure.
     """
 
     copyright: str = ""
@@ -126,3 +128,4 @@ class FileRecord:
     lost_nodes: tuple[str, ...] = ()
     vrm: VrmRecord | None = None
     has_skin: bool = True
+    skin_names: tuple[str, ...] = ()

@@ -6,16 +6,17 @@ import io
 import json
 import struct
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from export.seamed import UVS, seamed_mesh
-from formats.gltf.files import File, animated
+from formats.gltf.files import File, animated, skinned
 from numpy.testing import assert_allclose, assert_array_equal
 from PIL import Image
 
 import viewer
-from viewer.export import export, export_clips
+from viewer.export import export, export_clips, export_figures
 from viewer.formats._gltf.node_file import read_nodes
 from viewer.formats._source import Source
 from viewer.rig.figure import Figure
@@ -173,3 +174,24 @@ def test_invalid_tangents_are_omitted(tmp_path):
     (tmp_path / "a.glb").write_bytes(file.glb())
     export(Actor(viewer.load(tmp_path / "a.glb").actors[0].figure), tmp_path / "b.glb")
     assert read_nodes(Source.open(tmp_path / "b.glb")).meshes[0].primitives[0].tangents is None
+
+
+@pytest.mark.parametrize("called", ["", "eye"])
+def test_names_are_kept_or_listed(tmp_path: Path, called: str) -> None:
+    file = skinned()
+    file.root["skins"][0]["name"] = "Armature"
+    file.root["nodes"][2] |= {"name": called, "camera": 0}
+    lens = {"yfov": 1.0, "znear": 0.1}
+    file.root["cameras"] = [{"name": "lens", "type": "perspective", "perspective": lens}]
+    file.root["samplers"] = [{"name": "smooth"}]
+    (tmp_path / "a.glb").write_bytes(file.glb())
+    scene = viewer.load(tmp_path / "a.glb")
+    path = tmp_path / "b.glb"
+    notes = export_figures(scene.actors, path, scene=scene)
+    data = path.read_bytes()
+    root = json.loads(data[20 : 20 + struct.unpack_from("<I", data, 12)[0]])
+    assert [skin["name"] for skin in root["skins"]] == ["Armature"]
+    # A camera is called like its node, if the node has a name.
+    assert root["cameras"][0]["name"] == (called or "lens")
+    (note,) = [note for note in notes if note.key == "X003.file-members"]
+    assert set(note.values["names"]) == {"samplers.name", *(["cameras.name"] if called else [])}

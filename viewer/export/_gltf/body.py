@@ -170,7 +170,10 @@ def _place_meshes(document: Document, body: Body, tree: Tree, meshes: list[Place
     decoding = next(placed.decoding for placed in meshes if placed.part.joint < 0)
     matrices = inverse_bind_matrices(influences, skin.inverse_bind, decoding)
     bound = document.array(matrices, "MAT4")
-    item = {"name": text_of(body.figure.name), "joints": tree.joints + tree.fixed}
+    # Several skins become one.
+    known = () if body.figure.record is None else body.figure.record.skin_names
+    name = known[0] if len(known) == 1 and known[0] else body.figure.name
+    item = {"name": text_of(name), "joints": tree.joints + tree.fixed}
     index = document.add("skins", {**item, "inverseBindMatrices": bound})
     for node in own:
         nodes[node]["skin"] = index

@@ -218,6 +218,8 @@ def not_held(figure: Figure, shape: Shape, is_vrm: bool = False) -> list[Diagnos
     if skeleton is not None and _is_limited(skeleton):
         lost.append(Phrase("part-limits"))
     members = () if figure.record is None else figure.record.unkept()
+    if figure.record is not None and len(figure.record.skin_names) > 1:
+        members = (*members, *(["skins.name"] if any(figure.record.skin_names) else []))
     values = {"names": members, "n": len(members)}
     notes = not_held_note("glTF", lost)
     notes += [Diagnostic("X003.file-members", values=values)] if members else []

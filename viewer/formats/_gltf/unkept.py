@@ -15,6 +15,8 @@ __all__ = ["contents_of", "unkept_members"]
 _EXTRAS, _EXTENSIONS = "extras", "extensions"
 # Lists whose items have application data that is written back.
 _KEPT = frozenset({"nodes", "meshes", "materials", "scenes", "animations"})
+# Lists whose items lose their names: the writer makes new ones, or names cameras after their nodes.
+_UNNAMED = frozenset({"textures", "samplers", "cameras"})
 _DRAWN = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 _READ = re.compile(r"POSITION|NORMAL|TANGENT|COLOR_0|(TEXCOORD|JOINTS|WEIGHTS)_\d+")
 
@@ -40,6 +42,7 @@ def unkept_members(root: dict[str, Any]) -> tuple[str, ...]:
         if kind == "asset":
             found |= dict.fromkeys(_members(kind, [listed], False))
         elif isinstance(listed, list):
+            found |= dict.fromkeys(_names(kind, listed, root))
             found |= dict.fromkeys(_members(kind, listed, kind in _KEPT))
     return tuple(found)
 
@@ -77,6 +80,21 @@ def _members(kind: str, listed: list[Any], keeps_extras: bool) -> Iterator[str]:
                 yield from (f"{name}.{each}" for each in value if not _READ.fullmatch(each))
             elif isinstance(value, list | dict):
                 yield from _members(name, value if isinstance(value, list) else [value], False)
+
+
+def _names(kind: str, listed: list[Any], root: dict[str, Any]) -> Iterator[str]:
+    """Yield the name of a list whose items lose names."""
+    named = {at: item["name"] for at, item in enumerate(_objects(listed)) if item.get("name")}
+    if kind == "cameras":
+        # The node's name comes first; without one, the camera keeps its own.
+        nodes = [node for node in _objects(root.get("nodes")) if node.get("name")]
+        lost = any(
+            named.get(node.get("camera", -1), node["name"]) != node["name"] for node in nodes
+        )
+    else:
+        lost = bool(named)
+    if lost and kind in _UNNAMED:
+        yield f"{kind}.name"
 
 
 def _extensions(kind: str, told: Any) -> Iterator[str]:

@@ -42,6 +42,7 @@ def record_of(
     extras = file.tree.extras
     meshes = [file.meshes[int(file.tree.meshes[node])] for node in nodes]
     none = np.zeros(0, dtype=np.int32)
+    skins = {int(file.tree.skins[node]) for node in nodes} - {-1}
     return FileRecord(
         copyright=str(file.asset.get("copyright") or ""),
         extras=file.extras,
@@ -55,6 +56,7 @@ def record_of(
             part: mesh.extras for part, mesh in enumerate(meshes) if mesh.extras is not None
         },
         mesh_names=tuple(mesh.name for mesh in meshes),
+        skin_names=tuple(file.skins[skin].name for skin in sorted(skins)),
         part_shapes=tuple(columns.get(node, none) for node in nodes),
         target_names=tuple(mesh.target_names for mesh in meshes),
         scene=file.scene,
