@@ -279,3 +279,22 @@ def test_methods_are_blended_by_the_fraction_of_each_vertex(tmp_path: Path) -> N
     # with (0, 1.5); DQS rotates by 45 degrees.
     linear, dual = np.array([0.75, 0.75, 0.0]), np.array([1.5, 1.5, 0.0]) / np.sqrt(2.0)
     assert_allclose(knee, 0.75 * linear + 0.25 * dual, atol=1e-6)
+
+
+@pytest.mark.parametrize("is_cut", [True, False])
+def test_text_cut_before_its_takes_is_reported(
+    tmp_path: Path, is_cut: bool, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Version 6100 ends with the animations, after the connections; all braces are closed."""
+    text = QUAD_5000.replace("5.0.0", "6.1.0").replace("FBXVersion: 5000", "FBXVersion: 6100")
+    head, takes = text.split("Takes:  {")
+    start = 'Model: "Model::Quad" {'
+    assert head.count(start) == 1
+    objects = head.replace(start, 'Objects:  {\nModel: "Model::Quad", "Mesh" {')
+    links = '}\nConnections:  {\n    Connect: "OO", "Model::Quad", "Model::Scene"\n}\n'
+    path = tmp_path / "quad.fbx"
+    path.write_text(objects + links + ("" if is_cut else "Takes:  {" + takes))
+    assert run(["info", str(path)]) == 0
+    said = capsys.readouterr()
+    assert ("no section Takes before the end of the file" in said.out + said.err) is is_cut
+    assert ("Move: 0 to 1 s" in said.out) is not is_cut

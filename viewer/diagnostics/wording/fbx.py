@@ -9,6 +9,8 @@ MESSAGES = {
     "F002.fbx-connections": "expected a section Connections, found the end of the file: it is cut "
     "short",
     "F002.fbx": "not a readable FBX file: {reason:text}",
+    "F007.fbx-takes": "no section Takes before the end of the file: if it is cut short, its "
+    "animations are missing",
     "F007.fbx-converted": "unsupported {what:list} converted to {to:list}",
     "F007.fbx-unused": "not used: {items:list12}",
     "F007.fbx-warning": "FBX library: {text:text}",

@@ -38,6 +38,7 @@ _STRAIGHT = 180.0  # limit of a field of view, degrees
 _TO_CAMERA = np.array([0.0, 0.0, 0.0, 0.0, -math.sqrt(0.5), 0.0, math.sqrt(0.5), 1.0, 1.0, 1.0])
 _BINARY = b"Kaydara FBX Binary"  # first bytes of the binary variant
 _UNSTRUCTURED = re.compile(rb'"[^"]*"|;[^\n]*')  # strings and comments of the text variant
+_STACKED = 7000  # version since which animations are objects instead of a last section, Takes
 _CONNECTED = 6000  # version since which objects are connected by a section of their own
 
 
@@ -103,6 +104,9 @@ def _check_end(source: Source, version: int) -> None:
         raise source.fault("F002.fbx-cut", source.end, n=depth)
     if version >= _CONNECTED and b"Connections:" not in bare:
         raise source.fault("F002.fbx-connections", source.end)
+    if _CONNECTED <= version < _STACKED and b"Takes:" not in bare:
+        # The SDK always writes this section, other programs may not, so the file can be whole.
+        source.warn("F007.fbx-takes", source.end)
 
 
 def _check_arrays(source: Source, arrays: Arrays, place: Callable[[str, int], Phrase]) -> None:
