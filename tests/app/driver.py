@@ -12,6 +12,7 @@ from viewer.app.core.jobs import CountedJob
 from viewer.app.core.state import AppState
 from viewer.app.files.state import Files
 from viewer.app.headless import HeadlessApp
+from viewer.diagnostics.template import in_window
 from viewer.rendering.camera import facing_camera, fit
 from viewer.rendering.gpu.graphics import thread_graphics
 from viewer.rendering.options import DisplayOptions
@@ -32,7 +33,8 @@ def make_state(scene: Scene, paths=(), samples=1) -> AppState:
     fit(camera, scene_points(scene), 1.0)
     files = tuple(map(Path, paths))
     options = DisplayOptions(samples=samples)
-    return AppState(scene, camera, options, scene_box(scene), files)
+    with in_window():
+        return AppState(scene, camera, options, scene_box(scene), files)
 
 
 class Driver:

@@ -11,7 +11,7 @@ import pytest
 
 import viewer
 from viewer.diagnostics import CODES, MESSAGES, Diagnostic, Phrase, wording
-from viewer.diagnostics.template import fields, rendered
+from viewer.diagnostics.template import fields, in_window, rendered
 from viewer.diagnostics.wording import PHRASES
 
 ROOT = Path(viewer.__file__).parent
@@ -56,6 +56,29 @@ def test_every_message_renders_on_one_line(key: str) -> None:
 def test_every_phrase_renders(key: str) -> None:
     values = {name: sample(spec) for name, spec in fields(PHRASES[key]).items()}
     assert "{" not in str(Phrase(key, **values)).replace('"{"', "")
+
+
+def test_messages_name_controls_in_the_window_and_options_elsewhere() -> None:
+    texts = {**MESSAGES, **PHRASES, **{f"{key}.hint": code.hint for key, code in CODES.items()}}
+    differ = 0
+    for key, text in texts.items():
+        values = {name: sample(spec) for name, spec in fields(text).items()}
+        with in_window():
+            shown = rendered(text, values)
+        differ += shown != rendered(text, values)
+        assert not re.search(r"(?<!\S)\(?--[a-z]", shown) or is_about_options(key, text), key
+    assert differ > 40
+    rate = "no frame rate in the data: 30 fps assumed ({} sets it)"
+    note = Diagnostic("F007.no-rate", values={"rate": 30})
+    with in_window():
+        assert str(note) == rate.format("Frames per second in the Timeline")
+    assert str(note) == rate.format("--fps")
+
+
+def is_about_options(key: str, text: str) -> bool:
+    """Return whether a message is about an option that the user has given, or one of a tool."""
+    given = text.startswith("--") or "has no effect" in text
+    return given or key in ("F002.mhr-folder", "F002.submission-several", "F002.submission-folders")
 
 
 def calls() -> list[tuple[str, str, set[str]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import ExitStack
 
 from imgui_bundle import imgui, implot
 
@@ -12,6 +13,7 @@ from viewer.app.files.state import Files
 from viewer.app.frame import Frame
 from viewer.app.preferences.state import Appearance
 from viewer.app.theme import add_system_fonts, apply_theme, lacks_letters
+from viewer.diagnostics.template import in_window
 from viewer.rendering.gpu.graphics import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
@@ -66,6 +68,8 @@ class HeadlessApp:
         appearance.scale = appearance.screen_scale = scale
         imgui.backends.opengl3_init("#version 330")
         self.frame = Frame(state, self._graphics.programs)
+        self._wording = ExitStack()
+        self._wording.enter_context(in_window())
 
     def step(self, frames: int = 1) -> None:
         """Run frames of a sixtieth of a second each; input comes from the queue of ImGui's io.
@@ -114,6 +118,7 @@ class HeadlessApp:
 
     def release(self) -> None:
         """Release everything, including the context unless it was given."""
+        self._wording.close()
         self._make_current()
         self._graphics.rest()
         imgui.backends.opengl3_shutdown()

@@ -37,6 +37,7 @@ from viewer.app.theme import add_system_fonts  # noqa: E402
 from viewer.app.view.flight import Flight  # noqa: E402
 from viewer.app.view.hovering import Hovered  # noqa: E402
 from viewer.app.weights.actions import start_heat_map  # noqa: E402
+from viewer.diagnostics.template import in_window  # noqa: E402
 from viewer.formats import opened_text  # noqa: E402
 from viewer.interrupts import hold, poll  # noqa: E402
 from viewer.loading import MotionSettings  # noqa: E402
@@ -57,6 +58,7 @@ _IDLE_SECONDS = 0.5  # interval between checks for messages that time out, secon
 _BUSY_SECONDS = 0.05  # interval between frames while a file is being read, seconds
 
 
+@in_window()
 def show(
     scene: Scene,
     camera: Camera | None = None,

@@ -273,13 +273,15 @@ def _draw_panels(
 ) -> Bytes:
     from viewer.app.core.state import AppState
     from viewer.app.headless import HeadlessApp
+    from viewer.diagnostics.template import in_window
     from viewer.rendering.gpu.graphics import thread_graphics
 
     if min(size) < 200:
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")
-    state = AppState(scene, camera=camera, options=options, box=box)
-    with deferred(), HeadlessApp(state, size, graphics=thread_graphics(device)) as app:
-        return app.picture(fits)
+    with in_window():
+        state = AppState(scene, camera=camera, options=options, box=box)
+        with deferred(), HeadlessApp(state, size, graphics=thread_graphics(device)) as app:
+            return app.picture(fits)
 
 
 def _grid_step(points: Floats) -> float:

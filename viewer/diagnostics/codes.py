@@ -21,7 +21,7 @@ class Code:
     title : str
         Short description, for lists of codes.
     hint : str
-        Suggested remedy.
+        Suggested remedy, a template without values.
     other_hint : str
         Suggested remedy if no line is known; empty if it is the same.
     """

@@ -18,13 +18,15 @@
 ``{n:?one|many}``      the first for 1, the second for other counts
 ``{near:+; {}}``       the rest of the specification unless the value is empty; ``{}`` is the value,
                        and a list is joined by semicolons; ``{:list}``: formatted as above
+``{window:?one|other}``  the first in the window, the second elsewhere; no value is needed
 =====================  ===========================================================================
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from string import Formatter
 from typing import Any
 
@@ -39,19 +41,36 @@ _LONGEST_NAME = 60
 _NO_TEXT = re.compile("[\udc80-\udcff]")  # bytes that were decoded with "surrogateescape"
 
 
+_WINDOW = "window"
+_open_windows: list[None] = []
+
+
+@contextmanager
+def in_window() -> Iterator[None]:
+    """Word all messages for the window, in every thread: remedies name its controls."""
+    _open_windows.append(None)
+    try:
+        yield
+    finally:
+        _open_windows.pop()
+
+
 def rendered(template: str, values: Mapping[str, Any]) -> str:
     """Return a template with its values filled in."""
-    return _FORMATTER.vformat(template, (), values)
+    return _FORMATTER.vformat(template, (), {_WINDOW: min(len(_open_windows), 1), **values})
 
 
 def fields(template: str) -> dict[str, str]:
     """Return the names of the values of a template, each with its specification."""
-    found = {}
+    found = dict[str, str]()
     for _, name, spec, _ in Formatter().parse(template):
         if name:
-            found[name] = spec or ""
+            inside = fields(spec or "")
+            if name == _WINDOW:
+                found |= inside
+                continue
             # Totals are fields inside the specification: ``{n:#frame/{all}}``.
-            found |= dict.fromkeys(fields(found[name]), "d")
+            found |= {name: spec or "", **dict.fromkeys(inside, "d")}
     return found
 
 

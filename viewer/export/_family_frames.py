@@ -6,6 +6,7 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
+from viewer.diagnostics.template import rendered
 from viewer.errors import RigError
 from viewer.export._left_out import joint_scales_note
 from viewer.export._options import MotionOptions
@@ -88,8 +89,8 @@ def member_of_figure(figure: Figure, what: str, roots: tuple[str, ...]) -> Membe
         )
     if figure.unit not in METRES:
         raise RigError(
-            f"{figure.name} cannot be written as {what}, which is in metres: its unit is unknown "
-            "(for a BVH, --unit sets it)"
+            f"{figure.name} cannot be written as {what}, which is in metres: its unit is unknown"
+            + rendered("{window:?| (for a BVH, --unit sets it)}", {})
         )
     return member
 

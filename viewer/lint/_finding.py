@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from viewer.data_classes import dataclass
 from viewer.diagnostics import CODES, Diagnostic
+from viewer.diagnostics.template import rendered
 from viewer.lint._counting import Counting
 from viewer.lint._track import Track
 from viewer.phrases import printable, rounded
@@ -151,7 +152,8 @@ class Finding:
     def hint(self) -> str:
         """Suggested remedy."""
         code = CODES[self.code]
-        return code.other_hint if code.other_hint and self.line is None else code.hint
+        has_other = code.other_hint and self.line is None
+        return rendered(code.other_hint if has_other else code.hint, {})
 
     def located(
         self,

@@ -15,7 +15,7 @@ from lint.sound import RATE, column, keypoints, scene_of
 from viewer.app.linting.marks import marks_of
 from viewer.app.linting.state import Linting
 from viewer.app.shown_panels import ShownPanels
-from viewer.lint import CODES, Places, describe, lint_scene
+from viewer.lint import Places, describe, lint_scene
 from viewer.rendering.camera import camera_axes
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene
@@ -250,7 +250,10 @@ def test_all_findings_are_copied_as_text_and_json(lint, monkeypatch):
         "column: warning W001: weights of 1 vertex do not sum to 1 (worst: 0.9 at "
         "vertex 5, an error of 0.1)"
     )
-    assert lines[1] == f"    {CODES['W001'].title}; remedy: {CODES['W001'].hint}"
+    assert lines[1] == (
+        "    weights do not sum to 1; remedy: normalise them (Normalise weights in the Skinning "
+        "panel shows the effect)"
+    )
     assert lines[-1] == "0 errors, 1 warning, 0 notes"
     hand.click("Copy JSON")
     scene = scene_of(LIGHT)

@@ -44,7 +44,7 @@ def draw_pose_formats(state: AppState, dialog: FileDialog) -> None:
     """Draw the list of formats of poses."""
     record = state.actor.figure.record
     is_vrm = record is not None and record.vrm is not None
-    why = "other figures need an author and a licence: viewer convert --vrm-author, --vrm-licence"
+    why = "other figures need an author and a licence, which viewer convert takes"
     draw_formats(state, dialog, pose_formats(), {} if is_vrm else {".vrm": why})
 
 

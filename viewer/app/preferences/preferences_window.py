@@ -104,7 +104,7 @@ def _draw_appearance(state: AppState, preferences: Preferences) -> None:
 def _draw_scale(state: AppState, preferences: Preferences) -> None:
     given = state.of(Appearance).given_scale
     if given:
-        with disabled(state, "--scale was given on the command line"):
+        with disabled(state, "the scale was given on the command line"):
             choice(state, "Interface scale", "", {"": f"{100.0 * given:.0f} %"})
         return
     scales = {"0": f"automatic ({100.0 * state.of(Appearance).screen_scale:.0f} %)"}

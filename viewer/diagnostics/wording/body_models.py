@@ -91,7 +91,7 @@ MESSAGES = {
     "F007.motion-aist-rate": "no frame rate: {rate:g} fps assumed, as in AIST++",
     "F007.motion-tissue": "dmpls (soft tissue) of {n:#frame} omitted",
     "F007.motion-gender": "gender: expected female, male or neutral, found {found:text}: the "
-    "gender is unknown (--gender sets it)",
+    "gender is unknown ({window:?open the model of the right gender first|--gender sets it})",
     "F007.motion-keys": "ignored unknown keys: {keys:list12}",
     # PIG models
     "F002.pig-folder": "expected a PIG folder; files missing: {missing:list12}",

@@ -18,9 +18,10 @@ MESSAGES = {
     "F007.bvh-time": "Frame Time: expected {low:g} to {high:,.0f} seconds, found {seconds:g}; "
     "{rate:g} fps assumed",
     "C017.bvh-rate": "Frame Time: expected seconds, found {found:word}, which looks like a frame "
-    "rate; {rate:g} fps assumed (--fps overrides it)",
+    "rate; {rate:g} fps assumed ({window:?Frames per second in the Timeline|--fps} overrides it)",
     "C017.bvh-milliseconds": "Frame Time: expected seconds, found {found:word}, which looks like "
-    "milliseconds; {rate:g} fps assumed (--fps overrides it)",
+    "milliseconds; {rate:g} fps assumed "
+    "({window:?Frames per second in the Timeline|--fps} overrides it)",
     "F007.bvh-positions": "position channels below the root are 0: added to OFFSET instead of "
     "replacing it",
 }

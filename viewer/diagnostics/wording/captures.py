@@ -8,8 +8,9 @@ MESSAGES = {
     "F001.camera-images": "expected a folder of images for a camera ({names:list}), found none",
     "F001.camera-images-cameras": "images need calibrated cameras: intri.yml and extri.yml next to "
     "the recording, found none",
-    "F002.model-folder": "expected a recording, found a folder of body models: name it with "
-    "--model-path, and open one of {names:list12}",
+    "F002.model-folder": "expected a recording, found a folder of body models: "
+    "{window:?choose it with File > Models > Choose model folder|name it with --model-path}, and "
+    "open one of {names:list12}",
     "F002.capture-frames": "expected frame files (smpl_full, smplfull, smpl, keypoints3d: "
     "000000.json …), found none",
     "F002.capture-people": "expected people, found none in {n:#frame}",
@@ -116,7 +117,8 @@ MESSAGES = {
     "F007.video-rows": "no frame numbers: the rows of each {item:text} are its frames, in order",
     "F007.video-parameters": "SMPL parameters of {n} {n:?person|people}: {recognised:list12}"
     "{ignored:+; ignored: {}}",
-    "F007.no-rate": "no frame rate in the data: {rate:g} fps assumed (--fps sets it)",
+    "F007.no-rate": "no frame rate in the data: {rate:g} fps assumed "
+    "({window:?Frames per second in the Timeline sets it|--fps sets it})",
 }
 
 PHRASES = {

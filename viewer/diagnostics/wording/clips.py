@@ -10,26 +10,49 @@ CODES = {
     ),
     "C004": Code("warning", "joint rotates too fast", "look for a flip of its Euler angles"),
     "C005": Code(
-        "warning", "missing frames", "interpolate them (--gaps interpolate:1s) or record again"
+        "warning",
+        "missing frames",
+        "interpolate them ({window:?Interpolate gaps in the Timeline|--gaps interpolate:1s}) or "
+        "record again",
     ),
     "C006": Code("warning", "keys outside the limits", "widen the limits or move the keys"),
-    "C007": Code("warning", "foot sliding", "lock the feet (--lock-feet of viewer convert)"),
+    "C007": Code(
+        "warning",
+        "foot sliding",
+        "lock the feet ({window:?viewer convert|--lock-feet of viewer convert})",
+    ),
     "C008": Code("warning", "foot below the ground", "raise the motion or lower the ground"),
     "C009": Code("error", "clip for another skeleton", "open it with the skeleton it was made for"),
     "C010": Code("note", "zero-length clip", "add keys at different times"),
     "C011": Code("warning", "low-confidence keypoints", "omit them or record again"),
     "C012": Code("note", "keypoints that are never visible", "none if the camera cannot see them"),
-    "C013": Code("note", "unclear ground height", "specify it (--ground)"),
-    "C014": Code("warning", "jitter", "smooth the motion (--smooth of viewer convert)"),
-    "C015": Code("warning", "swapped IDs", "cut the motion there, or join tracks (--merge-ids)"),
+    "C013": Code("note", "unclear ground height", "specify it{window:?| (--ground)}"),
+    "C014": Code(
+        "warning",
+        "jitter",
+        "smooth the motion ({window:?viewer convert|--smooth of viewer convert})",
+    ),
+    "C015": Code(
+        "warning", "swapped IDs", "cut the motion there, or join tracks{window:?| (--merge-ids)}"
+    ),
     "C016": Code(
         "warning",
         "floating feet",
-        "lower the motion (--ground); none if the person stands on something",
+        "lower the motion{window:?| (--ground)}; none if the person stands on something",
     ),
-    "C017": Code("warning", "implausible frame time", "write seconds, or set the rate (--fps)"),
-    "C018": Code("warning", "limbs at rest", "match their joints (--joint-map)"),
-    "C019": Code("warning", "body of another model", "choose its own model (--model, --gender)"),
+    "C017": Code(
+        "warning",
+        "implausible frame time",
+        "write seconds, or set the rate ({window:?Frames per second in the Timeline|--fps})",
+    ),
+    "C018": Code(
+        "warning", "limbs at rest", "match their joints ({window:?Joint match panel|--joint-map})"
+    ),
+    "C019": Code(
+        "warning",
+        "body of another model",
+        "{window:?open its own model first|choose its own model (--model, --gender)}",
+    ),
 }
 
 MESSAGES = {
@@ -63,7 +86,7 @@ MESSAGES = {
     "C015.exchanged": "swaps positions with {other}, {distance} away, in {n:#frame}: "
     "{frames_text:list}",
     "C015.continued": "appears in frame {first}, {distance} from where {other} disappears in frame "
-    "{last}: may be one person (--merge-ids {ids} of viewer convert)",
+    "{last}: may be one person{window:?| (--merge-ids {ids} of viewer convert)}",
     "C016.foot": "{n:#frame/{all}}: both feet rest up to {height} above the ground, highest "
     "at frame {frame}",
     "C019.model": "shape coefficients of {other:text} omitted: they do not apply to {own:text} "

@@ -8,7 +8,11 @@ CODES = {
         "note", "error of a written file", "none if it is small; otherwise choose another format"
     ),
     "X003": Code("note", "data that is not written", "choose a format that can store it"),
-    "X004": Code("note", "missing frames in a written motion", "choose another --gaps"),
+    "X004": Code(
+        "note",
+        "missing frames in a written motion",
+        "{window:?none if they are held|choose another --gaps}",
+    ),
     "X005": Code("note", "data that is written in a different form", "none if intentional"),
     "X006": Code("note", "captured motion that was cleaned up", "none if intentional"),
 }
@@ -80,7 +84,8 @@ MESSAGES = {
     "X003.body-translations": "translations of joints are omitted (up to {distance:.3g} m)",
     "X003.other-shape-space": "the shape coefficients of {own:text} do not apply to {other:text} "
     "and are written as 0",
-    "X003.gender": "EasyMocap cannot store the gender: open the folder with --gender {gender}",
+    "X003.gender": "EasyMocap cannot store the gender: open the folder "
+    "{window:?after the {gender} model|with --gender {gender}}",
     "X003.body-scale": "the figure's scale is omitted ({low:.6g} to {high:.6g})",
     "X003.body-joint-scales": "animated scales of joints are omitted ({low:.6g} to {high:.6g})",
     "X003.bvh-joint-scales": "BVH cannot animate scales of joints ({low:g} to {high:g}): only the "
@@ -105,7 +110,7 @@ MESSAGES = {
     "X003.keypoints": "keypoints next to bodies are not written ({names:all}): to write them, open "
     "only the keypoints3d folder",
     "X003.springs": "{figure:text}: {n:#spring joint} {n:?has|have} the rotations "
-    "of the clip; viewer convert --bake-springs writes the simulated ones",
+    "of the clip; viewer convert {window:?can write|--bake-springs writes} the simulated ones",
     "X003.vrm-motions": "{n:#animation|is|are} omitted: VRM files store no motion; "
     "write motions as .glb",
     "X003.vrm-pose": "the current pose is omitted: VRM files store the rest pose",
@@ -161,8 +166,8 @@ MESSAGES = {
     "have} position channels: {names:list8}",
     "X005.joints-renamed": "{n:#joint name} changed: {pairs:list8}",
     "X005.odd-names": "some programs cannot read {n:#joint name} that {n:?is|are} empty or "
-    "repeated, or {n:?has|have} spaces or characters outside ASCII: {names:list8}; --safe-names "
-    "changes {n:?it|them}",
+    "repeated, or {n:?has|have} spaces or characters outside ASCII: {names:list8}; "
+    "{window:?Safe names in the Export motion dialog|--safe-names} changes {n:?it|them}",
     "X005.joints-translate": "{n:#joint} below the root {n:?translates|translate}: {names:list8}",
     "X005.shape-changes": "the shape changes over time: bone lengths are those of frame {frame}",
     "X005.scale-changes": "the figure's scale changes from {low:g} to {high:g}: bone lengths are "
@@ -170,7 +175,7 @@ MESSAGES = {
     "X005.shape-rows": "the shape changes: betas has one row per frame, which few programs support",
     "X005.shape-averaged": "the shape changes: betas are its average over {n:#frame}",
     "X005.as-smplx": "{figure:text} is not SMPL-X: translations are exact only with an SMPL-X "
-    "model (--model)",
+    "model{window:?, opened before the motion| (--model)}",
     "X005.shape-baked": "the shape is baked into mesh and joints",
     "X005.negative-times": "{n:#animation|begins|begin} before 0, which glTF does not allow, and "
     "{n:?is|are} shifted to begin at 0: {names:list8}",
@@ -185,9 +190,12 @@ MESSAGES = {
     "X005.no-influence": '{n:#vertex} without influence: bound to the node "fixed", which never '
     "moves",
     "X005.own-shape": "shape and translation are those of {figure:text}, which is not an SMPL "
-    "model: other models appear with another shape, and offset (--model selects the model)",
+    "model: other models appear with another shape, and offset "
+    "({window:?open another model before the motion|--model selects the model})",
     "X005.own-root": "translations are relative to the root at rest, ({x:z.4g}, {y:z.4g}, "
-    "{z:z.4g}) m: a model whose root is elsewhere is offset (--model makes translations exact)",
+    "{z:z.4g}) m: a model whose root is elsewhere is offset "
+    "({window:?translations are exact if that model is opened first|--model makes translations "
+    "exact})",
     "X005.metallic-placement": "material {material:name}: its metallic map uses the placement of "
     "its roughness map",
     "X005.springs-baked": "{figure:text}: simulated rotations of {n:#spring joint} are written",

@@ -32,11 +32,12 @@ MESSAGES = {
     "F002.no-motion": "--motion: expected a motion or an animation of a skeleton, found none",
     "F004.animation": "no animation is called {name:quoted}; {hint}",
     "F004.no-animations": "no animation is called {name:quoted}: the files have none",
-    "F004.capture": "{problem}; specify the model with --model",
-    "F004.capture-of-member": "{problem}; specify the {member} model with --model",
+    "F004.capture": "{problem}; {window:?open the model first|specify the model with --model}",
+    "F004.capture-of-member": "{problem}; "
+    "{window:?open the {member} model first|specify the {member} model with --model}",
     "F004.clip-alone": "a clip without a skeleton: open it together with its .skel",
     "F004.clip-taken": "every matching skeleton already has a clip",
-    "F004.model": "{problem} (--model selects the model)",
+    "F004.model": "{problem} ({window:?open another model first|--model selects the model})",
     "F004.morph-alone": "a blend shape without a mesh: open it together with its .skin",
     "F004.picture": "cannot apply the texture image: no texture coordinates in {figures:all}",
     "F004.picture-alone": "an image without a figure: open it together with a figure",
@@ -49,20 +50,25 @@ MESSAGES = {
     "those frames are omitted",
     "F005.texture-outside": "texture {name:text} is outside the folder: not read",
     "F005.texture-unreadable": "texture {problem:text}; drawn untextured",
-    "F007.own-model": "{model:text} from the model folder is used (--model selects another)",
+    "F007.own-model": "{model:text} from the model folder is used "
+    "({window:?open another one first to use it|--model selects another})",
     "F007.own-model-of-other-gender": "{model:text} is used: the model folder has no {wanted:text} "
     "model",
     "F007.own-model-missing": "the model folder has no {wanted:text} model, only {names:list}: "
-    "--gender chooses one",
+    "{window:?open one of them first|--gender chooses one}",
     "F007.own-carrier": "motion computed with {model:text} from the model folder",
     "F007.own-model-unreadable": "the model in the model folder cannot be read: {problem}",
-    "F007.bundled-body": "drawn with the bundled body (--model selects another body)",
+    "F007.bundled-body": "drawn with the bundled body "
+    "({window:?open another body first to use it|--model selects another body})",
     "F007.bundled-body-without-shapes": "drawn with the bundled body, to which the shape "
-    "coefficients of the files do not apply (--model selects another body)",
+    "coefficients of the files do not apply "
+    "({window:?open another body first to use it|--model selects another body})",
     "F007.bundled-body-without-expressions": "drawn with the bundled body, to which the expression "
-    "coefficients of the files do not apply (--model selects another body)",
+    "coefficients of the files do not apply "
+    "({window:?open another body first to use it|--model selects another body})",
     "F007.bundled-body-without-either": "drawn with the bundled body, to which the shape and "
-    "expression coefficients of the files do not apply (--model selects another body)",
+    "expression coefficients of the files do not apply "
+    "({window:?open another body first to use it|--model selects another body})",
     "F007.model-beside": "--model {model:text}: no motion is applied to it with --beside",
     "F007.no-shapes": "no shape coefficients in the files: the model's mean shape is used for all",
     "F007.only-morphs": "{figure:text}: without its .skel, only blend shapes deform it",
@@ -70,17 +76,19 @@ MESSAGES = {
     "F007.stands-alone": "shown separately: {problem}",
     "F004.vrm-bones": "{figure:text} cannot be written as VRM: {n:#required human bone} not found: "
     "{names:list12}",
-    "F004.vrm-meta": "{figure:text} cannot be written as VRM without author and licence: add "
-    "--vrm-author NAME and --vrm-licence URL, such as {licence} (the strictest permissions)",
+    "F004.vrm-meta": "{figure:text} cannot be written as VRM without author and licence: "
+    "{window:?use viewer convert|add --vrm-author NAME and --vrm-licence URL, such as {licence} "
+    "(the strictest permissions)}",
     "F007.unit-matched": "{figure:text} is in {unit}: scaled by {factor:g} to match the scene, "
     "which is in {wanted}",
-    "F007.unit-taken": "{note}; --unit overrides it",
-    "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the others; --unit "
+    "F007.unit-taken": "{note}{window:?|; --unit overrides it}",
+    "F007.unit-taken-and-scaled": "{note}, and scaled to metres to match the "
+    "others{window:?|; --unit overrides it}",
+    "F007.up-judged": "{up} up, estimated from the poses; {window:?Up axis in Preferences|--up} "
     "overrides it",
-    "F007.up-judged": "{up} up, estimated from the poses; --up overrides it",
     "F007.up-judged-over": "{up} up, estimated from the poses: the capture is upside down and is "
-    "rotated upright; --up overrides it",
-    "F007.up-taken": "{note}; --up overrides it",
+    "rotated upright; {window:?Up axis in Preferences|--up} overrides it",
+    "F007.up-taken": "{note}; {window:?Up axis in Preferences|--up} overrides it",
 }
 
 PHRASES: dict[str, str] = {}

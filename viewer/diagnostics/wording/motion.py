@@ -14,8 +14,8 @@ MESSAGES = {
     "again",
     "F004.joints-unmatched": "{motion:text} does not match {figure:text}: expected hips and a leg "
     "or an arm in both, found {n:#matching joint}; not recognised in {motion:text}: "
-    "{unused:list}; in {figure:text}: {idle:list}; match them in the Joint match panel or with "
-    "--joint-map",
+    "{unused:list}; in {figure:text}: {idle:list}; match them "
+    "{window:?in the Joint match panel|in the Joint match panel or with --joint-map}",
     "F004.no-common-joint": "{pose:text} and {figure:text} have no joint names in common",
     "F004.rest-frame": "--source-rest: expected a frame from {first} to {last} with a pose, found "
     "{found}",
@@ -33,28 +33,31 @@ MESSAGES = {
     "F007.joints-at-rest": "joints kept at rest: {names:list12}",
     "C018.limbs-unmatched": "{names:list} of {figure:text} {n:?stays|stay} at rest: nothing in "
     "{motion:text} is recognised as {n:?this joint|these joints} (unused: {unused:list}); match "
-    "{n:?it|them} in the Joint match panel or with --joint-map",
+    "{n:?it|them} in the Joint match panel{window:?| or with --joint-map}",
     "C018.limbs-unknown": "no joint of {figure:text} is recognised as {parts:or}: {motion:text} "
-    "cannot move {n:?it|them} (at rest: {idle:list}); match {n:?it|them} in the Joint match panel "
-    "or with --joint-map",
+    "cannot move {n:?it|them} (at rest: {idle:list}); match {n:?it|them} in the Joint match panel"
+    "{window:?| or with --joint-map}",
     "C018.limbs-still": "{names:list} of {figure:text} never bend, because {partners:list} of "
-    "{motion:text} never do; if this is wrong, match other joints in the Joint match panel or with "
-    "--joint-map",
+    "{motion:text} never do; if this is wrong, match other joints in the Joint match panel"
+    "{window:?| or with --joint-map}",
     "F007.joints-without-partner": "joints of {motion:text} that drive nothing: {names:list12}",
     "F007.rest-asked": "rest pose of {motion:text}: frame {frame}, as requested",
     "F007.rest-frame": "rest pose of {motion:text}: frame {frame}, {pose}, because its zero pose "
-    "is not a standing pose (--source-rest overrides it)",
+    "is not a standing pose{window:?| (--source-rest overrides it)}",
     "F007.rest-anatomy": "rest pose of {motion:text}: estimated from trunk, soles, knees and "
-    "elbows, because neither its zero pose nor any frame is a T- or A-pose (--source-rest "
-    "overrides it)",
+    "elbows, because neither its zero pose nor any frame is a T- or A-pose"
+    "{window:?| (--source-rest overrides it)}",
     "F007.rest-axes": "rest pose of {motion:text}: a T-pose, in which its joint axes are parallel "
-    "to the body's, because its zero pose is not a standing pose (--source-rest overrides it)",
+    "to the body's, because its zero pose is not a standing pose"
+    "{window:?| (--source-rest overrides it)}",
     "F007.rest-straight": "limbs of {motion:text} that hardly bend, so their roll is assumed: "
     "{names:list}",
     "F007.rest-lying": "rest pose of {motion:text}: estimated from trunk, knees and elbows, with "
-    "an assumed slope of the feet, because the person never stands (--source-rest overrides it)",
+    "an assumed slope of the feet, because the person never stands"
+    "{window:?| (--source-rest overrides it)}",
     "F007.feet-planted": "feet of {figure:text} planted during {n:#contact}: they slide by {after} "
-    "instead of {before} ({source} in {motion:text}); --feet off disables this",
+    "instead of {before} ({source} in {motion:text}); "
+    "{window:?Feet on the ground in the Actors panel|--feet off} disables this",
     "F007.feet-gap": "soles of {figure:text} are at most {gap} from the ground during contacts, "
     "instead of {gap_before}",
     "F007.feet-lowered": "{figure:text} is lowered by up to {length}, so that its feet reach "

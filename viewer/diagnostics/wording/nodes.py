@@ -18,7 +18,7 @@ MESSAGES = {
     "omitted: {names:list}",
     "F007.orthographic": "orthographic cameras are not supported: {names:list}",
     "F007.skinning-method": "{n:?skin|skins} {names:list} {n:?asks|ask} for the method {method}: "
-    "used unless --method selects another one",
+    "used unless {window:?the Skinning panel|--method} selects another one",
     "F007.smooth-normals": "{n:#large primitive} without normals: smoothly shaded",
     "W001.divided": "weights of {n:#vertex} do not sum to 1 (error up to {most:.2g}): divided "
     "by their sum",

@@ -28,7 +28,8 @@ _BELOW = "{item}: expected a number within ±3.4e+38, found {found:quoted}"
 MESSAGES = {
     "F001.unreadable": "cannot be read: {reason:text}{near:+; {}}",
     "F001.no-file": "expected a file, found {found}",
-    "F001.too-large": "expected at most {most:,.0f} bytes, found {size:,.0f} (see --max-size)",
+    "F001.too-large": "expected at most {most:,.0f} bytes, found {size:,.0f}"
+    "{window:?| (see --max-size)}",
     "F002.number": _NUMBER,
     "F003.number": _NUMBER,
     "F003.too-large": _BELOW,

@@ -9,7 +9,8 @@ CODES = {
     "R002": Code(
         "warning",
         "unreliable alignment",
-        "specify --up, --facing or landmarks, or pose the template like the target",
+        "specify {window:?Up, Facing|--up, --facing} or landmarks, or pose the template like the "
+        "target",
     ),
     "R003": Code("note", "fitted pose and proportions", "none if they match the target"),
     "R004": Code(
@@ -40,8 +41,9 @@ MESSAGES = {
     "{z:.4g}",
     "R001.error": "alignment error: {error:.2f} % of the target's size (RMS of the best 90 %), "
     "{away:.2f} % from template to target",
-    "R002.error": "unreliable alignment, with an error above {limit:g} %: specify --up, --facing "
-    "or --landmarks, or pose the template like the target (--template-pose)",
+    "R002.error": "unreliable alignment, with an error above {limit:g} %: specify "
+    "{window:?Up, Facing or landmarks|--up, --facing or --landmarks}, or pose the template like "
+    "the target ({window:?Pose it|--template-pose})",
     "R003.gap": "result: {gap}",
     "R003.not-fitted": "pose: not fitted, because {gap} would remain",
     "R003.pose": "pose: template joints rotated to fit, by up to {angle:.0f} degrees "
@@ -54,8 +56,8 @@ MESSAGES = {
     "({gap:.2f} % of the size apart instead of {kept:.2f} %): fit proportions if the target was "
     "stretched",
     "R004.stretched-along-the-target": "the template fits much better if stretched by {scales} "
-    "({gap:.2f} % of the size apart instead of {kept:.2f} %): use --scale axes if the target was "
-    "stretched",
+    "({gap:.2f} % of the size apart instead of {kept:.2f} %): use "
+    "{window:?another Scale|--scale axes} if the target was stretched",
     "R005.all-nearest": "matched {n} of {all} vertices ({ratio:.1%}); all take the weights of the "
     "nearest vertex",
     "R005.matched": "matched {n} of {all} vertices ({ratio:.1%}), inpainted {inpainted}",

@@ -4,7 +4,10 @@ from viewer.diagnostics.codes import Code
 
 CODES = {
     "W001": Code(
-        "warning", "weights do not sum to 1", "normalise them (--normalize shows the effect)"
+        "warning",
+        "weights do not sum to 1",
+        "normalise them ({window:?Normalise weights in the Skinning panel|--normalize} shows the "
+        "effect)",
     ),
     "W002": Code("warning", "negative weights", "set them to 0 and normalise"),
     "W003": Code("error", "non-finite weights", "paint or copy these weights again"),

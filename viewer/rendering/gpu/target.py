@@ -7,6 +7,7 @@ from typing import Any
 import moderngl
 import numpy as np
 
+from viewer.diagnostics.template import rendered
 from viewer.errors import RenderError, ViewerError
 from viewer.rendering.gpu.context import check_errors
 from viewer.rig.arrays import Bytes
@@ -119,7 +120,8 @@ class Target:
         less = "a smaller size needs less"
         if self.samples:
             alone = _gigabytes(target_bytes(self.size, 0))
-            less = f"1 sample per pixel (--samples 1) needs {alone}, {less}"
+            option = rendered("{window:?Samples in Preferences|--samples 1}", {})
+            less = f"1 sample per pixel ({option}) needs {alone}, {less}"
         return RenderError(
             f"an image of {width} x {height} pixels{samples} needs "
             f"{_gigabytes(target_bytes(self.size, self.samples))} of graphics memory, which "
