@@ -20,6 +20,12 @@ GAPS = {
 }
 """Handling of missing frames."""
 
+SAFE_NAMES = (
+    "write joint names with letters, digits and underscores only, each name once, for programs "
+    "that cannot read others; changed names are listed"
+)
+"""What ``MotionOptions.safe_names`` does, for the help of the option and of the check box."""
+
 _CLOSED = "hold"  # default of formats that do not support missing frames
 
 

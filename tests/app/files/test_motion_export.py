@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -334,7 +336,7 @@ def test_dialog_warns_of_any_file_that_would_be_replaced(crowd, tmp_path):
 def _choose_format(hand, suffix):
     # The list of formats shows a few rows at a time.
     for notches in (40, *[-1] * 12):
-        hand.wheel(notches, (500, 530))
+        hand.wheel(notches, "formats")
         hand.step(2)
         _, y0, _, y1 = hand.state.item_rects.get(f"format {suffix}", (0, 0, 0, 0))
         if hand.state.item_rects["formats"][1] + 10 < y0 and y1 < hand.state.item_rects["Name"][1]:
@@ -365,3 +367,32 @@ def test_dialog_for_one_actor_has_no_choice_of_actors(moving, tmp_path):
     moving.click("Save###Save")
     moving.finish_job()
     assert (tmp_path / "tiny.bvh").exists()
+
+
+def test_safe_names_are_an_option_of_the_dialog_for_bvh(moving, tmp_path):
+    actor = moving.state.actor
+    names = ("left hip", *(f"{n}:\u30bb" for n in range(1, actor.figure.skeleton.n_joints)))
+    skeleton = replace(actor.figure.skeleton, names=names)
+    actor.figure = replace(actor.figure, skeleton=skeleton)
+
+    def written(*labels):
+        folder = tmp_path / str(len(list(tmp_path.iterdir())))
+        folder.mkdir()
+        _ask(moving, folder)
+        for label in labels:
+            if label.startswith("."):
+                _choose_format(moving, label)
+            else:
+                moving.click(label)
+        moving.click("Save###Save")
+        moving.finish_job()
+        assert moving.state.error == ""
+        text = (folder / "tiny.bvh").read_text("utf-8")
+        return re.findall(r"^\s*(?:ROOT|JOINT) (.*)$", text, re.MULTILINE)
+
+    assert written() == [*names]
+    assert moving.says("Safe names in the Export motion dialog") and not moving.says("--safe-names")
+    safe = written("Safe names")
+    assert safe[0] == "left_hip" and len({*safe}) == len(names)
+    assert all(re.fullmatch(r"\w+", name, re.ASCII) for name in safe)
+    assert written(".npz", "Safe names", ".bvh") == [*names]  # it is disabled for other formats

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from viewer.app.core.state import AppState
-from viewer.app.core.widgets import choice, explain
+from viewer.app.core.widgets import checkbox, choice, explain
 from viewer.app.files.export_formats import N_ROWS, draw_formats
 from viewer.app.files.file_choice import FileDialog, folder_of
 from viewer.app.files.motion_export import (
@@ -19,6 +19,7 @@ from viewer.app.files.motion_export import (
 )
 from viewer.app.files.state import Files
 from viewer.data_classes import dataclass
+from viewer.export._options import SAFE_NAMES
 from viewer.formats import file_stem
 from viewer.phrases import printable
 from viewer.rig.scene import Actor
@@ -28,9 +29,10 @@ __all__ = ["ask_for_motion"]
 
 @dataclass(slots=True)
 class _Selection:
-    """Whether to export all actors' motions or only the selected actor's."""
+    """Whether to export all actors' motions or only the selected actor's, and how."""
 
     everyone: bool
+    safe_names: bool = False
 
 
 def ask_for_motion(state: AppState, suffix: str = "") -> None:
@@ -52,13 +54,13 @@ def ask_for_motion(state: AppState, suffix: str = "") -> None:
     suffixes = motion_suffixes()
     state.of(Files).dialog = FileDialog(
         folder_of(state.paths),
-        lambda state, paths: save_motion(state, paths[0], selection.everyone),
+        lambda state, paths: save_motion(state, paths[0], selection.everyone, selection.safe_names),
         "save",
         "Export motion",
         suffixes,
         f"{stem}_edited{suffix}" if suffix else f"{stem}{suffixes[0]}",
         more=lambda state, dialog: _draw_more(state, dialog, selection),
-        more_rows=N_ROWS + (1.5 if asks else 0.0),
+        more_rows=N_ROWS + (3.0 if asks else 1.5),
         written=lambda path: motion_files(state, path, selection.everyone),
     )
 
@@ -83,3 +85,7 @@ def _draw_more(state: AppState, dialog: FileDialog, selection: _Selection) -> No
         explain("one file for all" if is_one else "one file per actor, numbered by actor")
     actor = _first(state, selection)
     draw_formats(state, dialog, motion_formats(actor), unsuited_formats(actor))
+    suffix = Path(dialog.typed_name()).suffix.lower() or dialog.suffix
+    why = "" if suffix == ".bvh" else "for .bvh only"
+    selection.safe_names = checkbox(state, "Safe names", selection.safe_names, why)
+    explain(SAFE_NAMES, why)

@@ -144,7 +144,9 @@ class _Part:
     saved: tuple[object, ...]
 
 
-def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
+def save_motion(
+    state: AppState, path: Path, everyone: bool = False, safe_names: bool = False
+) -> None:
     """Write motions within the playback range, in the background.
 
     glTF gets all animations of a figure with their own keys, unless the range is a part of one.
@@ -160,6 +162,8 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
         Whether all actors are written, or only the chosen one. Folders, and formats that hold
         several figures, contain all of them, including those that do not move; other formats get
         one file per actor.
+    safe_names : bool
+        As in ``MotionOptions``.
     """
     if why := no_job_room(state):
         state.error = why
@@ -186,7 +190,7 @@ def save_motion(state: AppState, path: Path, everyone: bool = False) -> None:
             for each in state.scene.actors
             if everyone and each.clip is None and each.pose is not None
         ]
-    options = MotionOptions(skinning=replace(state.options.skinning))
+    options = MotionOptions(skinning=replace(state.options.skinning), safe_names=safe_names)
     n_paths = len({part.path for part in parts})
     more = f" and {n_paths - 1} more" if path.suffix and n_paths > 1 else ""
     title = f"Writing {printable(parts[0].path.name, 60)}{more}"

@@ -25,7 +25,7 @@ from viewer.export import (
     suited_exporter,
 )
 from viewer.export._motion_paths import PERSON, animation_files, is_together, motion_paths
-from viewer.export._options import QUATERNIONS, ROTATION_ORDERS
+from viewer.export._options import QUATERNIONS, ROTATION_ORDERS, SAFE_NAMES
 from viewer.formats import all_or_none
 from viewer.interrupts import raising
 from viewer.phrases import printable
@@ -82,8 +82,7 @@ def add_motion_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--safe-names",
         action="store_true",
-        help="BVH: write joint names with letters, digits and underscores only, each name once, "
-        "for programs that cannot read others; changed names are printed",
+        help=f"BVH: {SAFE_NAMES}",
     )
     group.add_argument(
         "--digits", type=number, default=6, metavar="N", help="BVH: decimals, 1 to 15 (default: 6)"
