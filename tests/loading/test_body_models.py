@@ -317,3 +317,35 @@ def test_recordings_without_a_model_of_their_own_use_the_model_folder(models, tm
     (folder / "000000.json").write_text(json.dumps([person | {"shapes": [[0.0] * 10]}]))
     (actor,) = viewer.load(tmp_path / "take", motion=MotionSettings(gender="male")).actors
     assert actor.figure.name == "SMPL_MALE" and actor.shape_space.gender == "male"
+
+
+@pytest.mark.parametrize("suffix", ["json", "npz"])
+def test_written_pose_holds_model_and_gender(models, tmp_path, suffix):
+    betas = np.array([1.0, -0.5, 0.25])
+    path = tmp_path / f"pose.{suffix}"
+    shape = np.zeros(16)
+    shape[:3] = betas
+    assert run(["convert", str(motion(tmp_path, betas=shape)), "-o", str(path)]) == 0
+    (actor,) = viewer.load(path).actors  # its own model, from the model folder
+    assert actor.figure.name == "SMPLH_FEMALE"
+    assert shown_thigh(actor) == pytest.approx(thigh("smplh", "FEMALE", betas), abs=1e-6)
+    scene = viewer.load(models / "SMPLH_MALE.npz", path)
+    notes = [note for note in scene.diagnostics if note.key == "C019.gender"]
+    assert [note.values["other"] for note in notes] == ["female SMPL+H"]
+    smplx = tmp_path / "SMPLX_NEUTRAL.npz"
+    np.savez(smplx, **model("smplx"))
+    scene = viewer.load(smplx, path)
+    assert not scene.actors[0].pose.shape_weights.any()
+
+
+def test_text_pose_says_that_it_lacks_model_and_gender(models, tmp_path, capsys):
+    path = tmp_path / "pose.txt"
+    assert run(["convert", str(motion(tmp_path)), "-o", str(path)]) == 0
+    lost = "not stored in .txt: the body's model and gender (female SMPL+H)"
+    assert lost in capsys.readouterr().out
+
+
+def test_pose_of_the_bundled_body_states_no_model(tmp_path):
+    path = tmp_path / "pose.json"
+    assert run(["convert", "--body", "-o", str(path)]) == 0
+    assert "model" not in json.loads(path.read_text())

@@ -36,14 +36,19 @@ def export(actor: Actor, path: Path, skinning: Skinning) -> list[Diagnostic]:
         raise RigError(f"figure {figure.name} has no skeleton and therefore no pose")
     again = figure_pose(figure)
     with keeping_written() as saved, all_or_none([path]):
-        write(record_of(figure, pose), path)
-        apply_record(read(Source(path, saved[path])), figure, again)
+        record = record_of(figure, pose, actor.shape_space.gender)
+        write(record, path)
+        stored = read(Source(path, saved[path]))
+        apply_record(stored, figure, again)
     losses, how = PoseLosses(figure, skinning.unreduced()), skinning.unreduced()
     vertices = None if figure.mesh is None else deform(figure, again, how)[0]
     losses.look(pose, vertices, joint_matrices(figure, again)[:, :3, 3])
     notes = [Diagnostic("X001.pose", path, values={"n": figure.skeleton.n_dofs})]
     notes += losses.notes(path)
-    return notes + not_held_note(path.suffix.lower(), _lost(figure.skeleton, pose, again))
+    lost = _lost(figure.skeleton, pose, again)
+    if stored.shape_space != record.shape_space:
+        lost.append(Phrase("part-pose-space", space=record.shape_space.title))
+    return notes + not_held_note(path.suffix.lower(), lost)
 
 
 def _lost(skeleton: Skeleton, pose: Pose, again: Pose) -> list[Phrase]:

@@ -3,7 +3,8 @@
 ::
 
     .json  {"viewer_pose": 1, "figure": name, "dofs": {"left_knee.x": radians, …},
-            "shape": […], "expression": […], "translation": [x, y, z], "scale": s,
+            "model": title, "gender": word, "shape": […], "expression": […],
+            "translation": [x, y, z], "scale": s,
             "own_numbers": […], "joint_names": […], "joint_turns": [[x, y, z, w], …],
             "joint_rotations": [[x, y, z, w], …], "joint_shifts": [[x, y, z], …],
             "joint_scales": [[x, y, z], …], "up": "y", "dof_layout": word}
@@ -283,6 +284,8 @@ def pose_text(record: PoseRecord) -> str:
 
 def _named(record: PoseRecord) -> dict[str, Any]:
     named: dict[str, Any] = {"dofs": dict(record.dofs)}
+    space = record.shape_space
+    named |= {key: text for key, text in (("model", space.model), ("gender", space.gender)) if text}
     for name, array in (
         ("shape", record.shape),
         ("expression", record.expression),

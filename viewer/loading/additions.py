@@ -59,8 +59,12 @@ def add_to_actor(contents: Contents, actor: Actor) -> tuple[Actor, list[Diagnost
     return actor if is_same else replace(actor, figure=trial.figure), notes
 
 
-def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]:
+def apply_pose(
+    path: Path, record: PoseRecord, actor: Actor, drop_excess: bool = True
+) -> list[Diagnostic]:
     """Apply a pose record from a file to an actor; return messages about inexact data.
+
+    ``drop_excess``: see ``apply_record``.
 
     Raises
     ------
@@ -74,7 +78,7 @@ def apply_pose(path: Path, record: PoseRecord, actor: Actor) -> list[Diagnostic]
             has_shape = record.shape is not None and record.shape.any()
             misfit = misfit if has_shape else None
             record = replace(record, shape=None, expression=None)
-        notes = apply_record(record, actor.figure, actor.pose, drop_excess=True)
+        notes = apply_record(record, actor.figure, actor.pose, drop_excess)
         notes += [] if misfit is None else [misfit]
         return [replace(note, path=path) for note in notes]
     except RigError as problem:

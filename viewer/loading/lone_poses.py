@@ -87,7 +87,16 @@ def _joints(record: PoseRecord) -> tuple[tuple[str, ...], Floats] | None:
     """Return the joints other than fingers and their rotation vectors, (K, 3); None if unknown."""
     known, parts = members_by_numbers(), record.parts
     if record.dofs or record.joint_rotations is not None:
-        return None
+        own, vector = record.joint_rotations, record.vector
+        # A pose of a model that this program has written: its numbers are the whole pose.
+        is_whole = own is not None and not own.shifts.any() and own.scales is None
+        names = known.get(0 if vector is None else vector.size)
+        is_whole &= own is not None and names == own.names and bool(record.shape_space.model)
+        return (
+            None
+            if names is None or vector is None or not is_whole
+            else (names, vector.reshape(-1, 3))
+        )
     if record.vector is not None:
         names = known.get(record.vector.size)
         return None if names is None or parts else (names, record.vector.reshape(-1, 3))

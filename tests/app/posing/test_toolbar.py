@@ -251,4 +251,4 @@ def test_pose_without_a_common_joint_is_refused(drive):
     hand.key("c", "ctrl")
     hand.state.choose_actor(1)
     hand.key("v", "ctrl")
-    assert hand.state.error == "first and second have no joint names in common"
+    assert hand.state.error == "clipboard: first and second have no joint names in common"

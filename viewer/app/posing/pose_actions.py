@@ -23,7 +23,7 @@ from viewer.formats import FORMATS, Source, file_stem
 from viewer.rig.figure import Figure
 from viewer.rig.motion.upright import upright_actor
 from viewer.rig.pose import Pose, pose_key
-from viewer.rig.posing.pose_record import PosePartError, PoseRecord, apply_record, record_of
+from viewer.rig.posing.pose_record import PoseRecord, record_of
 from viewer.rig.posing.pose_vector import write_vector
 from viewer.rig.retargeting.mirror import mirror_pose
 from viewer.rig.scene import Actor, figure_pose
@@ -49,7 +49,11 @@ _RANDOM = 10  # number of random coefficients: the first have the largest varian
 
 def _record(state: AppState) -> PoseRecord | None:
     actor = state.actor
-    return None if actor.pose is None else record_of(actor.figure, actor.pose)
+    return (
+        None
+        if actor.pose is None
+        else record_of(actor.figure, actor.pose, actor.shape_space.gender)
+    )
 
 
 def copy_pose(state: AppState) -> None:
@@ -79,6 +83,7 @@ def paste_pose(state: AppState) -> None:
     joint rotations.
     """
     from viewer.formats import pose
+    from viewer.loading.additions import apply_pose
 
     actor = state.actor
     if actor.pose is None:
@@ -91,10 +96,7 @@ def paste_pose(state: AppState) -> None:
         if not text.strip():
             raise source.fault("F002.pose-clipboard")
         record = pose.read(source)
-        try:
-            notes = apply_record(record, actor.figure, actor.pose)
-        except PosePartError as problem:
-            raise pose.pose_error(source.path, record, problem) from None
+        notes = apply_pose(source.path, record, actor, drop_excess=False)
     except ViewerError as problem:
         state.error = str(problem)
         return

@@ -288,6 +288,7 @@ PHRASES = {
     "part-up": "the up axis {up}",
     "part-pose-rotations": "rotations of joints that their DOFs cannot express",
     "part-pose-shape": "shape and expression",
+    "part-pose-space": "the body's model and gender ({space:text})",
     "part-pose-translations": "translations of joints",
     "part-pose-scales": "scales of joints",
     "part-pose-placement": "the figure's position",

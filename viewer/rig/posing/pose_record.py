@@ -121,7 +121,7 @@ def _part(part: str, name: str = "") -> Iterator[None]:
         raise PosePartError(problem, part, name) from None
 
 
-def record_of(figure: Figure, pose: Pose) -> PoseRecord:
+def record_of(figure: Figure, pose: Pose, gender: str = "") -> PoseRecord:
     """Return a complete pose both by DOF names and as the model's pose vector.
 
     Parameters
@@ -130,6 +130,8 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         Figure with a skeleton.
     pose : Pose
         Pose of that figure.
+    gender : str
+        Gender of the body, as stated by its file; that of the figure if empty.
     """
     skeleton = figure.require_skeleton()
     groups = figure.blend_shapes.groups if figure.blend_shapes else ()
@@ -144,7 +146,16 @@ def record_of(figure: Figure, pose: Pose) -> PoseRecord:
         translation=pose.figure_translation.copy(),
         scale=pose.figure_scale,
         joint_rotations=relative_rotations(figure, pose),
+        shape_space=_own_space(figure, gender),
     )
+
+
+def _own_space(figure: Figure, gender: str) -> ShapeSpace:
+    """Return the space of a figure's shapes; no model for shapes that do not come from one."""
+    shapes, own = figure.blend_shapes, figure.shape_space
+    # Shapes of models are numbered; those of the bundled body are named after their effects.
+    is_model = shapes is None or "stature" not in shapes.names
+    return ShapeSpace(own.model if is_model else "", gender or own.gender)
 
 
 def apply_record(
