@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from viewer.batching.items import Item, Result
-from viewer.batching.keys import item_key
 from viewer.batching.report import Report, ReportFile, read_results
+from viewer.batching.running import item_key
 from viewer.errors import OutputError, ViewerError
 
 ITEM = Item(3, ("d/a\udcff.npz",), "out/a.bvh", "a.npz")

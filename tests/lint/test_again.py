@@ -16,8 +16,7 @@ from lint.test_planted_files import LATE_KEYS
 import viewer
 from viewer.diagnostics import Diagnostic
 from viewer.lint import Finding, finding_text, lint_again, lint_files
-from viewer.lint._messages import of_diagnostic
-from viewer.lint._named import aimed_at
+from viewer.lint._opening import aimed_at, of_diagnostic
 from viewer.loading import bundled_files
 from viewer.rig.scene import Scene
 

@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 
 from viewer.errors import OutputError
-from viewer.media.video import VideoSink
-from viewer.media.video_file import VideoFile
+from viewer.media.video import VideoFile, VideoSink
 
 pytestmark = pytest.mark.slow
 

@@ -6,23 +6,21 @@ from dataclasses import replace
 
 import numpy as np
 
-from viewer.autorig.alignment.box_alignment import align_boxes
 from viewer.autorig.checks import check_lines, newly_outside, residual_of
 from viewer.autorig.rigged import Rigged
 from viewer.autorig.settings import Report
 from viewer.autorig.transfer.inverse_skinning import invert_skinning
 from viewer.autorig.weights.weight_transfer import nearest_weights
 from viewer.diagnostics import Diagnostic
+from viewer.errors import RigError
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.kinematics import skinning_matrices, world_matrices
-from viewer.rig.mesh import Mesh, vertex_normals
+from viewer.rig.mesh import Mesh, bounding_box, vertex_normals
 from viewer.rig.pose import Pose, placement_matrix
 from viewer.rig.skin import Skin
 from viewer.rig.skinning import deform
-
-__all__ = ["nearest"]
 
 
 def nearest(template: Figure, pose: Pose, target: Mesh, report: Report, name: str) -> Rigged:
@@ -101,3 +99,50 @@ def _figure(template: Figure, skin: Skin, target: Mesh, rest: Floats, name: str)
         pose_layout=template.pose_layout,
         facts=(("rig", f"transferred from {template.name} by nearest vertices"),),
     )
+
+
+_FLAT = 1e-9  # minimum thickness of a box that can be scaled, as a fraction of its longest side
+
+
+def align_boxes(positions: Floats, onto: Floats) -> Floats:
+    """Return the map that aligns the bounding boxes of two sets of points.
+
+    p' = (p - c) * e' / e + c', with box centres c and extents e, per axis. This is the rule of
+    Tex-An Mesh; an axis along which both boxes are flat keeps its scale.
+
+    Parameters
+    ----------
+    positions : (N, 3)
+        Points to move: the target mesh.
+    onto : (M, 3)
+        Points whose box is the target: the posed template.
+
+    Returns
+    -------
+    (4, 4)
+        Diagonal scale and shift.
+
+    Raises
+    ------
+    RigError
+        If only one of the boxes is flat along an axis.
+
+    >>> align_boxes(np.array([[0.0, 0, 0], [2, 1, 1]]), np.array([[1.0, 1, 1], [2, 2, 2]])).tolist()
+    [[0.5, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 1.0], [0.0, 0.0, 1.0, 1.0], [0.0, 0.0, 0.0, 1.0]]
+    """
+    box, other = bounding_box(positions), bounding_box(onto)
+    extents, wanted = box[1] - box[0], other[1] - other[0]
+    flat = extents <= _FLAT * extents.max(initial=0.0)
+    other_flat = wanted <= _FLAT * wanted.max(initial=0.0)
+    odd = np.flatnonzero(flat != other_flat)
+    if len(odd):
+        name = "xyz"[odd[0]]
+        raise RigError(
+            f"alignment of boxes: expected both meshes to extend along {name}, "
+            f"found {extents[odd[0]]:g} and {wanted[odd[0]]:g}"
+        )
+    factors = np.where(flat, 1.0, wanted / np.where(flat, 1.0, extents))
+    matrix = np.eye(4)
+    matrix[:3, :3] *= factors
+    matrix[:3, 3] = other.mean(axis=0) - factors * box.mean(axis=0)
+    return matrix

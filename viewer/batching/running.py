@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import glob
 import os
 import time
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from dataclasses import field, replace
+from hashlib import blake2b
 from pathlib import Path
 from typing import Literal, cast
 
 from viewer.batching.engines import Job, Limits, load_engine
 from viewer.batching.items import Item, Result
-from viewer.batching.keys import item_key
 from viewer.batching.report import Report, ReportFile, read_results
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
@@ -22,8 +23,6 @@ from viewer.media.unfinished import remove_leftovers
 from viewer.phrases import printable
 
 _KILLED = ("crashed", "timeout", "memory")  # the worker could not remove its temporary files
-
-__all__ = ["KeyedJob", "Settings", "run_batch", "shard_of"]
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Settings:
 
 
 @dataclass(frozen=True)
-class KeyedJob:
+class _KeyedJob:
     """A job that skips finished items.
 
     Attributes
@@ -153,7 +152,7 @@ def run_batch(
     earlier = _earlier(settings)
     keyed: Job = job
     if settings.report is not None:
-        keyed = KeyedJob(job, settings.identity, settings.shared, frozenset(earlier))
+        keyed = _KeyedJob(job, settings.identity, settings.shared, frozenset(earlier))
     report = Report(n_items=len(items), path=settings.report)
     if settings.existing == "resume":
         remove_leftovers(item.output for item in items if item.output)
@@ -229,3 +228,75 @@ def _has_content(path: Path) -> bool:
 def _is_there(result: Result) -> bool:
     """Return whether all files that an item wrote still exist."""
     return all(os.path.lexists(path) for path in result.outputs)
+
+
+_CHUNK = 1 << 20
+_SIZE = 16  # bytes of a key
+_remembered: dict[tuple[object, ...], bytes] = {}
+
+
+def item_key(item: Item, settings: str, shared: Iterable[str] = ()) -> str:
+    """Return the key of an item, which changes whenever its result may change.
+
+    Files that an input refers to, such as textures, are not included.
+
+    Parameters
+    ----------
+    item : Item
+        The item; the key includes the content of its files, not their location, and the output's
+        name.
+    settings : str
+        Everything else that affects the result: job, options, version of the program.
+    shared : iterable of str
+        Files that all items read; each is read once per process.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be read, or is a pipe or device.
+    """
+    total = blake2b(digest_size=_SIZE)
+    where = item.output or item.name
+    for text in (settings, where):
+        total.update(os.fsencode(text) + b"\0")
+    for path in item.files:
+        total.update(_digest(path))
+    for path in shared:
+        known = _stamp(path)
+        if known not in _remembered:
+            _remembered[known] = _digest(path)
+        total.update(_remembered[known])
+    return total.hexdigest()
+
+
+def _stamp(path: str) -> tuple[object, ...]:
+    """Return a path with the sizes and times of its files, which a folder itself does not have."""
+    inner = [os.path.join(folder, name) for folder, _, names in os.walk(path) for name in names]
+    files = [path, *sorted(filter(os.path.isfile, inner))]
+    states = [(file, os.stat(file)) for file in files]
+    return tuple((file, state.st_size, state.st_mtime_ns) for file, state in states)
+
+
+def _digest(path: str) -> bytes:
+    """Return the hash of a file, of a folder's files and their names, or of an archive member."""
+    total = blake2b(digest_size=_SIZE)
+    if os.path.isdir(path):
+        for folder, folders, files in os.walk(path):
+            folders.sort()
+            for name in sorted(files):
+                inner = os.path.join(folder, name)
+                total.update(os.fsencode(os.path.relpath(inner, path)) + b"\0")
+                # Pipes and devices may never end, and links may be broken.
+                total.update(_digest(inner) if os.path.isfile(inner) else b"-")
+        return total.digest()
+    member = ""
+    while not os.path.exists(path) and os.path.dirname(path) not in ("", path):
+        path, last = os.path.split(path)
+        member = f"{last}/{member}"
+    total.update(os.fsencode(member))
+    if os.path.exists(path) and not os.path.isfile(path):
+        raise OSError(errno.EINVAL, "not a file", path)
+    with open(path, "rb", buffering=0) as stream:
+        while chunk := stream.read(_CHUNK):
+            total.update(chunk)
+    return total.digest()

@@ -5,18 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.diagnostics import SEVERITIES, Collector
+from viewer.diagnostics import SEVERITIES, Collector, Diagnostic
 from viewer.diagnostics.merging import merged
+from viewer.diagnostics.wording import PLACES
 from viewer.errors import FormatError, ViewerError
 from viewer.formats import MAX_SIZE, Source
 from viewer.lint._finding import Finding
-from viewer.lint._messages import CHECKED, of_diagnostic, of_error, of_refusal
-from viewer.lint._named import aimed_at
 from viewer.lint._running import Progress
 from viewer.loading import Contents, MotionSettings, begin, read_source
 from viewer.phrases import printable
@@ -28,11 +27,8 @@ from viewer.rig.scene import Actor, Scene
 if TYPE_CHECKING:
     from viewer.loading.capturing import Builder
 
-__all__ = ["Opened", "Owners", "invalid_parts", "open_files", "with_files"]
-
 Owners = dict[str, int]
 """For each ``Finding.part``, the index of the opened actor that has the same part."""
-
 _LISTS = (
     "figures",
     "clips",
@@ -43,8 +39,6 @@ _LISTS = (
     "captures",
     "morphs",
 )
-
-
 _INSTEAD = {"normals": "positions"}
 
 
@@ -122,7 +116,7 @@ def _read(opened: Opened, path: Path, settings: MotionSettings, max_size: int) -
         named = read_source(source, contents, settings)
         contents.figures = [(path, _loaded(figure, refusals)) for path, figure in contents.figures]
     except ViewerError as problem:
-        refusals.append(of_refusal(problem, path))
+        refusals.append(_of_refusal(problem, path))
     opened.findings += map(of_diagnostic, merged(recorded.errors))
     opened.findings += refusals
     opened.findings += map(of_diagnostic, recorded.warnings)
@@ -140,7 +134,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         if figure.blend_shapes is not None:
             figure.blend_shapes.direction_values()
     except FormatError as problem:
-        refusals.append(of_error(problem))
+        refusals.append(_of_error(problem))
         figure = replace(figure, blend_shapes=None)
     valid = tuple(_readable(figure.animations, refusals))
     if len(valid) < len(figure.animations):
@@ -149,7 +143,7 @@ def _loaded(figure: Figure, refusals: list[Finding]) -> Figure:
         if figure.correctives is not None:
             figure.correctives.check_values()
     except FormatError as problem:
-        refusals.append(of_error(problem))
+        refusals.append(_of_error(problem))
         figure = replace(figure, correctives=None)
     return figure
 
@@ -160,7 +154,7 @@ def _readable(animations: Iterable[Animation], refusals: list[Finding]) -> Itera
         try:
             animation.clip()
         except FormatError as problem:
-            refusals.append(of_error(problem))
+            refusals.append(_of_error(problem))
         else:
             yield animation
 
@@ -183,7 +177,7 @@ def _assemble(opened: Opened, settings: MotionSettings | None, progress: Progres
         if problem is None:
             break
         culprit = _culprit(problem, contents)
-        opened.findings.append(of_error(problem, culprit))
+        opened.findings.append(_of_error(problem, culprit))
         if culprit is None:
             # The model is not among the files: motions that need it cannot be checked.
             contents = Contents(figures=contents.figures, clips=contents.clips)
@@ -283,7 +277,7 @@ def with_files(
 def _is_same(remark: Finding, other: Finding) -> bool:
     # Messages about islands without weights differ from those about single vertices.
     same = other.code == remark.code or (remark.code == "W004" and other.code == "W005")
-    is_checked = remark.code in CHECKED
+    is_checked = remark.code in _CHECKED
     return is_checked and same and (other.file is None or other.file == remark.file)
 
 
@@ -393,3 +387,72 @@ def _invalid(actor: Actor, opened: Opened) -> dict[str, Ints]:
                     known = lost.get(fault.part, fault.places)
                     lost[fault.part] = np.union1d(known, fault.places)
     return lost
+
+
+_CHECKED = frozenset(("W001", "W002", "W004", "B003", "M010", "C005"))
+"""Codes of warnings that the checks of the scene report too, with all locations."""
+
+
+def _of_error(problem: ViewerError, path: Path | None = None) -> Finding:
+    """Return an error as a finding; ``path`` is the file that failed, if the error has none."""
+    found = problem.diagnostic
+    if found is None:  # the figure's classes reported parts that do not match
+        found = Diagnostic("F002.misfit", path, values={"message": str(problem)}, is_refusal=True)
+    return of_diagnostic(found)
+
+
+def _of_refusal(problem: ViewerError, path: Path) -> Finding:
+    """Return the error that stopped parsing a file as a finding."""
+    finding = _of_error(problem, path)
+    return replace(finding, diagnostic=replace(finding.diagnostic, is_final=True))
+
+
+def of_diagnostic(found: Diagnostic) -> Finding:
+    """Return a reader's diagnostic as a finding."""
+    field = PLACES.get(found.part)
+    if field is None or found.places is None:
+        return Finding(found)
+    places: dict[str, Any] = {field: found.places}
+    return Finding(found, **places)
+
+
+def aimed_at(remark: Finding, actor: Actor, part: str) -> Finding | None:
+    """Return a reader's finding with its locations in an actor, or None if there are none.
+
+    Parameters
+    ----------
+    remark : Finding
+        Finding about the file from which the part was read.
+    actor : Actor
+        The actor with this part.
+    part : "mesh", "skeleton" or "clip"
+        Part of the actor.
+    """
+    if part == "mesh":
+        return _in_mesh(remark, actor)
+    if part == "clip":
+        return _in_clip(remark, actor)
+    return remark if len(remark.joints) else None
+
+
+def _in_mesh(remark: Finding, actor: Actor) -> Finding | None:
+    mesh, skin, found = actor.figure.mesh, actor.figure.skin, remark.diagnostic
+    if mesh is None:
+        return None
+    if len(remark.triangles) or len(remark.joints):
+        return remark if found.part != "bindings" or skin is not None else None
+    # If faulty data is unchanged, the vertex is found by its value.
+    vertices = remark.vertices if len(remark.vertices) else [found.values.get("vertex")]
+    known = [vertex for vertex in vertices if vertex is not None and vertex < mesh.n_vertices]
+    return replace(remark, vertices=np.array(known, dtype=np.int32)) if known else None
+
+
+def _in_clip(remark: Finding, actor: Actor) -> Finding | None:
+    """Return a finding about channels of a clip with the joints that they animate."""
+    found, skeleton = remark.diagnostic, actor.figure.skeleton
+    if found.part != "channels" or found.places is None or skeleton is None:
+        return None
+    channels = found.places[found.places < skeleton.n_dofs]
+    if len(channels) == 0:
+        return None
+    return replace(remark, joints=np.unique(skeleton.dof_joints[channels]))

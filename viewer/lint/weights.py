@@ -6,13 +6,16 @@ import numpy as np
 
 from viewer.diagnostics import Phrase
 from viewer.lint._finding import Finding, Subject
-from viewer.lint._poses import some_poses
 from viewer.lint.bindings import are_singular
 from viewer.rig.arrays import Bools, Floats
+from viewer.rig.captures.points import PointClip
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.topology import components, welded
 from viewer.rig.mesh import Mesh
-from viewer.rig.skeleton import joint_labels
+from viewer.rig.motion.evaluation import frames_of, pose_of
+from viewer.rig.pose import Pose
+from viewer.rig.scene import Actor, figure_pose
+from viewer.rig.skeleton import FIRST_ROTATION, clamp_dofs, joint_labels
 from viewer.rig.skin import (
     Skin,
     has_influence,
@@ -23,8 +26,6 @@ from viewer.rig.skin import (
     weight_sums,
 )
 from viewer.rig.skinning import Skinning, deform
-
-__all__ = ["check"]
 
 _NOTED = 1e-3  # minimum deviation of a sum from 1: files round to three digits
 _WRONG = 5e-3  # four influences with three digits, each with an error of half a digit, and a margin
@@ -225,7 +226,7 @@ def _posable(subject: Subject, skin: Skin) -> Bools:
 def _cut_errors(subject: Subject, limit: int) -> tuple[Floats, int]:
     """Return the largest displacement of each vertex by pruning its influences."""
     figure = subject.actor.figure
-    poses = some_poses(subject.actor)
+    poses = _some_poses(subject.actor)
     whole, cut = Skinning(normalize=True), Skinning(max_influences=limit)
     errors = np.zeros(0 if figure.mesh is None else figure.mesh.n_vertices)
     for pose in poses:
@@ -243,3 +244,36 @@ def _distinct(values: np.ndarray) -> np.ndarray:
     """Return each value once, in the given order."""
     _, first = np.unique(values, return_index=True)
     return values[np.sort(first)]
+
+
+_COUNT = 4  # number of poses in addition to the rest pose and the current pose
+_SWING = 0.6  # radians: roughly the largest rotation of most joints in a walk
+_SEED = 5  # fixed, so that results are reproducible
+
+
+def _some_poses(actor: Actor) -> list[Pose]:
+    """Return the rest pose, the current pose, and some poses of the clip, or else random ones.
+
+    Parameters
+    ----------
+    actor : Actor
+        Actor with a skeleton.
+    """
+    figure, clip = actor.figure, actor.clip
+    assert figure.skeleton is not None and actor.pose is not None  # checked by the callers
+    rest = figure_pose(figure)
+    poses = [rest, actor.pose]
+    if clip is not None and not isinstance(clip, PointClip):
+        times = np.linspace(clip.start, clip.end, _COUNT)
+        frames = frames_of(figure, clip, times, actor.pose, interpolate=True)
+        return poses + [
+            pose_of(figure, frames, int(frame)) for frame in np.flatnonzero(frames.present)
+        ]
+    rng = np.random.default_rng(_SEED)
+    is_rotation = figure.skeleton.dof_kinds >= FIRST_ROTATION
+    for _ in range(_COUNT):
+        pose = actor.pose.copy()
+        pose.dofs[is_rotation] += rng.uniform(-_SWING, _SWING, int(is_rotation.sum()))
+        pose.dofs[:] = clamp_dofs(figure.skeleton, pose.dofs)
+        poses.append(pose)
+    return poses

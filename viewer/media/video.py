@@ -8,17 +8,16 @@ point 1), so that players show the rendered colours.
 from __future__ import annotations
 
 import contextlib
+import io
 from fractions import Fraction
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
 from viewer.errors import OutputError, ViewerError
-from viewer.media.gif_palette import PaletteChooser, PaletteUser
 from viewer.media.saving import Replacement
-from viewer.media.video_file import VideoFile
 from viewer.media.video_kinds import MOST_GIF_RATE, VideoKind, video_kind
 from viewer.phrases import printable
 from viewer.rig.arrays import Bytes
@@ -27,9 +26,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     import av
+    from av.filter.graph import Graph
     from av.video.frame import VideoFrame
-
-__all__ = ["VideoSink"]
 
 _BT709, _LIMITED = 1, 1  # H.273's code points; FFmpeg's AVColorSpace and AVColorRange
 _QUALITY = 75.0
@@ -103,8 +101,8 @@ class VideoSink:
         self._container: av.container.OutputContainer | None = None
         self._stream: Any = None
         self.n_samples = _GIF_SAMPLES if self.encoder == "gif" else 0
-        self._chooser: PaletteChooser | None = None
-        self._palette: PaletteUser | None = None
+        self._chooser: _PaletteChooser | None = None
+        self._palette: _PaletteUser | None = None
 
     def _note(self, transparent: bool) -> None:
         name, rate = printable(self.path), float(self.rate)
@@ -127,7 +125,7 @@ class VideoSink:
     def look(self, pixels: Bytes) -> None:
         """Add a frame's colours to the palette; only for GIFs, before any frame is written."""
         if self._chooser is None:
-            self._chooser = PaletteChooser(self._av, self._coded)
+            self._chooser = _PaletteChooser(self._av, self._coded)
         self._chooser.look(self._picture(pixels))
 
     def write(self, frame: int, pixels: Bytes) -> None:
@@ -216,7 +214,7 @@ class VideoSink:
         if self._chooser is not None:
             context.time_base = Fraction(1, 100)
             palette = self._chooser.palette()
-            self._palette = PaletteUser(self._av, self._coded, 1 / self.rate, palette)
+            self._palette = _PaletteUser(self._av, self._coded, 1 / self.rate, palette)
         else:
             context.time_base = 1 / self.rate
             context.color_range, context.colorspace = _LIMITED, _BT709
@@ -314,3 +312,201 @@ def _encoder_options(encoder: str, quality: float) -> dict[str, str]:
 def _bit_rate(size: tuple[int, int], rate: float, quality: float) -> int:
     """Return bits per second for encoders without a quality setting: 0.02 to 0.6 per pixel."""
     return int(size[0] * size[1] * rate * 0.02 * 30.0 ** (quality / 100.0))
+
+
+# Output file of a video encoder, which stores write errors and hides them from FFmpeg.
+#
+# libavformat does not survive every failed write: if the header could not be written, the next
+# packet makes PyAV write it again, and ``avformat_init_output`` reads freed memory. So writes
+# always succeed for the library, and the owner of the file checks for an error after each step.
+
+
+class VideoFile:
+    """A seekable file object for PyAV that drops everything after the first error.
+
+    Parameters
+    ----------
+    path : Path
+        Existing file.
+
+    Attributes
+    ----------
+    name : str
+        Path of the file, an attribute that PyAV requires.
+    problem : OSError or None
+        First error.
+    closed : bool
+        Whether it is closed; PyAV then writes no trailer.
+
+    Raises
+    ------
+    OSError
+        If the file cannot be opened.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.name, self.problem, self.closed = str(path), None, False
+        self._path = path
+        self._file: io.RawIOBase = path.open("r+b", buffering=0)
+        self._place = self._size = 0
+
+    problem: OSError | None
+
+    def write(self, data: bytes) -> int:
+        """Write all bytes, or drop them after an error; success is reported either way."""
+        if self.problem is None and not self.closed:
+            try:
+                self._write_all(data)
+            except OSError as problem:
+                self.problem = problem
+        self._place += len(data)
+        self._size = max(self._size, self._place)
+        return len(data)
+
+    def _write_all(self, data: bytes) -> None:
+        self._file.seek(self._place)
+        rest = memoryview(data)
+        while rest:
+            # A nearly full disk accepts a part of the bytes, and only the next call fails.
+            rest = rest[self._file.write(rest) or 0 :]
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Change the position, as ``io.IOBase.seek``; takes effect at the next write."""
+        base = {io.SEEK_SET: 0, io.SEEK_CUR: self._place, io.SEEK_END: self._size}[whence]
+        self._place = base + offset
+        return self._place
+
+    def tell(self) -> int:
+        """Return the position of the next write."""
+        return self._place
+
+    def reopen(self, url: str, flags: int, options: dict[str, str]) -> BinaryIO:
+        """Open the same file for reading, which FFmpeg does to move MP4's index to the front."""
+        return self._path.open("rb")
+
+    def finish(self) -> None:
+        """Close the file.
+
+        Raises
+        ------
+        OSError
+            The first error, possibly from closing the file.
+        """
+        self.closed = True
+        try:
+            self._file.close()
+        except OSError as problem:
+            self.problem = self.problem or problem
+        if self.problem is not None:
+            raise self.problem
+
+    def drop(self) -> None:
+        """Close the file of a discarded video."""
+        self.closed = True
+        with contextlib.suppress(OSError):
+            self._file.close()
+
+
+# The 256-colour palette of a GIF, chosen from a few frames; pixels get an ordered dither.
+#
+# With one palette for the whole video, static regions are identical from frame to frame and are
+# not stored again, which makes the file five times smaller than with a palette per frame. The
+# dither is ordered (a fixed pattern) for the same reason.
+
+_HUNDREDTH = Fraction(1, 100)  # seconds, the time unit of GIF
+_PALETTE_SIDE = 16  # FFmpeg stores a palette as an image of 16 x 16
+
+
+class _PaletteChooser:
+    """Chooses colours by median cut over some frames (FFmpeg's ``palettegen``).
+
+    Parameters
+    ----------
+    library : module
+        PyAV.
+    size : (int, int)
+        Width and height.
+    """
+
+    def __init__(self, library: ModuleType, size: tuple[int, int]) -> None:
+        self._graph: Graph = library.filter.Graph()
+        source = self._graph.add_buffer(
+            width=size[0], height=size[1], format="rgba", time_base=_HUNDREDTH
+        )
+        # One colour stands for both "transparent" and "unchanged since the previous frame".
+        chooser = self._graph.add("palettegen", "stats_mode=full:reserve_transparent=1")
+        sink = self._graph.add("buffersink")
+        source.link_to(chooser)
+        chooser.link_to(sink)
+        self._graph.configure()
+        self.n_seen = 0
+
+    def look(self, picture: VideoFrame) -> None:
+        """Add a frame's colours to the statistics."""
+        picture.pts, picture.time_base = self.n_seen, _HUNDREDTH
+        self._graph.push(picture)
+        self.n_seen += 1
+
+    def palette(self) -> VideoFrame:
+        """Return the palette; called once, after at least one frame."""
+        self._graph.push(None)
+        palette: VideoFrame = self._graph.pull()  # type: ignore[assignment]  # a video frame: the graph has no audio
+        return palette
+
+
+class _PaletteUser:
+    """Assigns a colour of a palette to each pixel (FFmpeg's ``paletteuse``).
+
+    Parameters
+    ----------
+    library : module
+        PyAV.
+    size : (int, int)
+        Width and height.
+    time_base : Fraction
+        Duration of a frame in seconds.
+    palette : VideoFrame
+        Result of a ``_PaletteChooser``.
+    """
+
+    def __init__(
+        self,
+        library: ModuleType,
+        size: tuple[int, int],
+        time_base: Fraction,
+        palette: VideoFrame,
+    ) -> None:
+        self._av, self._graph, self._time_base = library, library.filter.Graph(), time_base
+        self._frames = self._graph.add_buffer(
+            width=size[0], height=size[1], format="rgba", time_base=time_base
+        )
+        colors = self._graph.add_buffer(
+            width=_PALETTE_SIDE,
+            height=_PALETTE_SIDE,
+            format=palette.format.name,
+            time_base=time_base,
+        )
+        user = self._graph.add("paletteuse", "dither=bayer:bayer_scale=4:alpha_threshold=128")
+        sink = self._graph.add("buffersink")
+        self._frames.link_to(user, 0, 0)
+        colors.link_to(user, 0, 1)
+        user.link_to(sink)
+        self._graph.configure()
+        palette.pts, palette.time_base = 0, time_base
+        colors.push(palette)
+        colors.push(None)
+
+    def taken(self, picture: VideoFrame | None) -> list[VideoFrame]:
+        """Return the frames that are complete after this one; None ends the video."""
+        if picture is not None:
+            picture.time_base = self._time_base
+        self._frames.push(picture)
+        ready: list[VideoFrame] = []
+        while True:
+            try:
+                done = self._graph.pull()
+            except (self._av.BlockingIOError, self._av.EOFError):
+                return ready
+            # In 1/100 s; times are rounded, not durations, so errors do not accumulate.
+            done.pts, done.time_base = round(100 * done.pts * done.time_base), _HUNDREDTH
+            ready.append(done)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from viewer.autorig.alignment.box_alignment import align_boxes
+from viewer.autorig.seed import align_boxes
 from viewer.errors import RigError
 from viewer.rig.geometry.transform import apply_transform
 

@@ -5,7 +5,7 @@ import pytest
 from autorig.rigged_shapes import arm
 from numpy.testing import assert_allclose
 
-from viewer.autorig.alignment.pose_step import AlignedTemplate, Pairs, solve_step
+from viewer.autorig.alignment.pose_fit import AlignedTemplate, Pairs, solve_step
 from viewer.autorig.alignment.proportions import limbs_of
 from viewer.rig.mesh import vertex_normals
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from viewer.autorig.correspondence.nearest import nearest_vertices
+from viewer.autorig.weights.weight_transfer import nearest_vertices
 from viewer.errors import RigError
 
 pytest.importorskip("scipy")

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
-from viewer.autorig.surface.winding import winding_numbers
+from viewer.autorig.transfer.joint_transfer import winding_numbers
 
 CORNERS = np.array([[x, y, z] for x in (0.0, 1) for y in (0.0, 1) for z in (0.0, 1)])
 # Corner k has x = k // 4, y = k // 2 % 2, z = k % 2; counter-clockwise from outside.

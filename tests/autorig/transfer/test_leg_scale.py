@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from viewer.autorig.transfer.leg_scale import leg_scale
+from viewer.autorig.transfer.rest_skeleton import leg_scale
 from viewer.rig.skeleton import ball_skeleton
 
 

@@ -3,7 +3,7 @@ import pytest
 
 from viewer.autorig.surface.laplacian import laplacian
 from viewer.autorig.surface.welding import weld
-from viewer.autorig.weights.inpainting import inpaint
+from viewer.autorig.weights.weight_transfer import inpaint
 from viewer.errors import RigError
 
 sparse = pytest.importorskip("scipy.sparse")
@@ -167,7 +167,7 @@ def test_inpainting_can_be_cancelled():
 def test_inpainting_solves_in_blocks_of_joints(monkeypatch):
     operator, areas, weights, unknown = problem(np.random.default_rng(8))
     whole, _ = run(operator, areas, weights, unknown)
-    monkeypatch.setattr("viewer.autorig.weights.inpainting._BLOCK", 1)
+    monkeypatch.setattr("viewer.autorig.weights.weight_transfer._BLOCK", 1)
     seen = []
     single, _ = run(operator, areas, weights, unknown, lambda *step: seen.append(step))
     np.testing.assert_allclose(single.toarray(), whole.toarray(), atol=1e-12)

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from viewer.autorig.weights.smoothing import smooth, within
+from viewer.autorig.weights.weight_transfer import smooth, within
 
 sparse = pytest.importorskip("scipy.sparse")
 

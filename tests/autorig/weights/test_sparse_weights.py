@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from viewer.autorig.weights.sparse_weights import put_rows, scaled_rows, skin_of, weight_matrix
+from viewer.autorig.weights.weight_transfer import put_rows, scaled_rows, skin_of, weight_matrix
 from viewer.errors import RigError
 from viewer.rig.skin import skin_from_lists
 

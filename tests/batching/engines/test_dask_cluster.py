@@ -31,7 +31,8 @@ from viewer.media.unfinished import temporary_prefix
 from viewer.version import VERSION
 
 pytest.importorskip("distributed")
-from viewer.batching.engines import _worker_checks, dask_cluster
+from viewer.batching.engines import dask_cluster
+from viewer.batching.engines import dask_cluster as _worker_checks
 
 pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]
 
@@ -250,7 +251,7 @@ def test_scheduler_without_workers_is_reported(monkeypatch) -> None:
 
 
 def test_address_without_a_scheduler_is_reported(monkeypatch) -> None:
-    from viewer.batching.engines import _clusters
+    from viewer.batching.engines import dask_cluster as _clusters
 
     monkeypatch.setattr(_clusters, "_CONNECT", 0.3)
     with pytest.raises(ViewerError, match=r"no scheduler answers at tcp://127\.0\.0\.1:1 "):

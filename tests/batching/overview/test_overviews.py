@@ -9,8 +9,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
+from viewer.batching import overview as sheet
 from viewer.batching.items import Item, Result
-from viewer.batching.overview import check_overview, save_overview, sheet
+from viewer.batching.overview import check_overview, save_overview
 from viewer.errors import UnsupportedFormatError, ViewerError
 from viewer.interrupts import Interrupted
 from viewer.media.image import decode_picture, save_image

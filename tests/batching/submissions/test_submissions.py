@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from viewer.batching.submissions import find_submissions, opened, unpacking
+from viewer.batching import submissions as unpacking
+from viewer.batching.submissions import find_submissions, opened
 from viewer.errors import FormatError
 
 ALIKE = ("*.skel", "*.skin")

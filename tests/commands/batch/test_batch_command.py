@@ -205,7 +205,7 @@ def test_shards_write_separate_tables(rigs):
 
 
 def test_additional_sheets_replace_no_file(rigs, capsys, monkeypatch):
-    from viewer.batching.overview import sheet
+    from viewer.batching import overview as sheet
 
     monkeypatch.setattr(sheet, "PER_SHEET", 2)
     Path("s-2.png").write_text("mine")

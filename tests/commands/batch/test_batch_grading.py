@@ -130,7 +130,7 @@ def test_plus_sign_separates_files_unless_it_is_part_of_a_name(course) -> None:
 
 
 def test_full_disk_is_not_reported_as_an_error_of_the_archive(course, capsys, monkeypatch):
-    from viewer.batching.submissions import unpacking
+    from viewer.batching import submissions as unpacking
 
     def fill(*_: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from viewer.autorig.surface.samples import triangle_normals
-from viewer.autorig.surface.winding import winding_numbers
 from viewer.data_classes import dataclass
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.blendshapes import JointRegressor
 from viewer.rig.geometry.closest_point import Surface
 from viewer.rig.skin import Skin, influence_counts
-
-__all__ = ["TransferredJoints", "boundary_weights", "outside", "surface_shifts", "transfer_joints"]
 
 _ENOUGH = 0.5  # minimum fraction of a joint's weights that are matched
 _SAME_WAY = 0.5  # minimum cosine of the angle between the surfaces, 60 degrees
@@ -20,7 +17,7 @@ _INSIDE = 0.5  # winding number that separates outside from inside
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class TransferredJoints:
+class _TransferredJoints:
     """Joint positions in the target's frame.
 
     Attributes
@@ -115,7 +112,7 @@ def boundary_weights(skin: Skin, parents: Ints) -> JointRegressor:
 
 def transfer_joints(
     joints: Floats, parents: Ints, regressor: JointRegressor, shifts: Floats, matched: Bools
-) -> TransferredJoints:
+) -> _TransferredJoints:
     """Move joints by the displacement of the surface around them.
 
     J'_j = J_j + sum_v k_jv d_v / sum_v k_jv over matched vertices v, with the vector d_v to the
@@ -154,7 +151,7 @@ def transfer_joints(
     for joint in np.flatnonzero(~transferred).tolist():
         # Parents come first, so the parent's shift is already final.
         moves[joint] = moves[parents[joint]] if parents[joint] >= 0 else 0.0
-    return TransferredJoints(joints + moves, transferred, whole > 0.0)
+    return _TransferredJoints(joints + moves, transferred, whole > 0.0)
 
 
 def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
@@ -171,3 +168,44 @@ def outside(positions: Floats, triangles: Ints, joints: Floats) -> Bools:
     """
     outer: Bools = np.abs(winding_numbers(positions, triangles, joints)) < _INSIDE
     return outer
+
+
+_BLOCK = 1 << 20  # point-triangle pairs per batch, about 200 bytes each
+
+
+def winding_numbers(positions: Floats, triangles: Ints, points: Floats) -> Floats:
+    """Return the solid angle of a mesh seen from points, over 4 pi.
+
+    A triangle a, b, c seen from the origin covers the angle W with tan(W / 2) = a . (b x c) /
+    (|a||b||c| + (a . b)|c| + (b . c)|a| + (c . a)|b|) (Van Oosterom and Strackee 1983). Holes
+    make the sum a fraction (Jacobson, Kavan, Sorkine-Hornung 2013), negative if the mesh is
+    inside out: compare the absolute value with one half to test for the inside.
+
+    Parameters
+    ----------
+    positions : (V, 3)
+        Any unit.
+    triangles : (T, 3)
+        Vertex indices, counter-clockwise from outside.
+    points : (N, 3)
+        Points to test, none of them on the surface.
+
+    Returns
+    -------
+    (N,)
+        Unitless.
+    """
+    total = np.zeros(len(points))
+    step = max(1, _BLOCK // max(1, len(points)))
+    for first in range(0, len(triangles), step):
+        corners = positions[triangles[first : first + step]]
+        a, b, c = (corners[None, :, k] - points[:, None] for k in range(3))
+        la, lb, lc = (np.linalg.norm(side, axis=2) for side in (a, b, c))
+        above = np.einsum("nta,nta->nt", a, np.cross(b, c))
+        below = la * lb * lc + _dot(a, b) * lc + _dot(b, c) * la + _dot(c, a) * lb
+        total += np.arctan2(above, below).sum(axis=1)
+    return total / (2.0 * np.pi)
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    return np.einsum("nta,nta->nt", a, b)

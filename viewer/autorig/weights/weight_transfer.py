@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import field, replace
 from typing import Any
 
@@ -9,10 +10,8 @@ import numpy as np
 
 from viewer.autorig.correspondence.inside_out import wound_backwards
 from viewer.autorig.correspondence.matching import Matches, MatchSettings, Template, match
-from viewer.autorig.correspondence.nearest import nearest_vertices
 from viewer.autorig.surface.laplacian import laplacian
-from viewer.autorig.surface.welding import Welded, weld
-from viewer.autorig.weights.inpainting import NEGLIGIBLE, Report, inpaint
+from viewer.autorig.surface.welding import Welded, edges, weld
 from viewer.autorig.weights.result import (
     RigidIslands,
     WeightTransfer,
@@ -21,17 +20,14 @@ from viewer.autorig.weights.result import (
     rigid_lines,
     template_lines,
 )
-from viewer.autorig.weights.smoothing import smooth, within
-from viewer.autorig.weights.sparse_weights import put_rows, skin_of, weight_matrix
 from viewer.data_classes import dataclass
 from viewer.diagnostics import Diagnostic
 from viewer.errors import RigError
+from viewer.rig._scipy import scipy_part
 from viewer.rig.arrays import Bools, Floats, Ints
 from viewer.rig.geometry.closest_point import SurfacePoints, interpolate
 from viewer.rig.mesh import bounding_box, box_size
-from viewer.rig.skin import Skin, skin_rows
-
-__all__ = ["WeightSettings", "nearest_weights", "transferred_weights"]
+from viewer.rig.skin import Skin, limit_influences, skin_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -250,3 +246,348 @@ def _in_vertices(
         rigid=rigid,
         lines=lines,
     )
+
+
+# Inpainting of missing weights, as smooth as the surface allows.
+#
+# Between known weights W_m, the unknown weights W_u minimise trace(W^T Q W), Q = L + L M^-1 L,
+# with the Laplacian L and vertex areas M (Abdrashitov et al. 2023)::
+#
+#     Q_uu W_u = -Q_um W_m
+#
+# Constants have zero energy, so rows still sum to 1. The second term makes transitions smooth,
+# but overshoots; negative weights are clipped and rows rescaled to a sum of 1.
+
+Report = Callable[[float, str], None]
+NEGLIGIBLE = 1e-6  # solved weight below which 0 is used, as solutions decay without reaching 0
+_BLOCK = 1 << 22  # number of unknowns per batch, 32 MB
+_TRUE = 1e-4  # maximum error of a solution that should be 1 everywhere
+_SHIFT = 1e-10  # fraction of the mean diagonal that is added to a matrix that cannot be factorised
+_STEPS = 2000  # maximum iterations of conjugate gradients
+_CONVERGED = 1e-9  # relative residual at which iterations end
+_Solve = Callable[[Floats], Floats]
+
+
+def inpaint(
+    laplacian: Any, areas: Floats, weights: Any, matched: Bools, unknown: Bools, report: Report
+) -> tuple[Any, str]:
+    """Solve for the weights of unmatched vertices.
+
+    Parameters
+    ----------
+    laplacian : sparse (W, W)
+        Positive semidefinite.
+    areas : (W,)
+        Areas of the vertices, positive.
+    weights : sparse (W, J) in rows
+        Weights; only those of matched vertices are read.
+    matched, unknown : (W,) bool
+        Known and unknown vertices; each island of unknown ones must touch a known one. Vertices
+        that are neither are ignored.
+    report : callable
+        Called with a fraction and the current step; may raise to cancel.
+
+    Returns
+    -------
+    weights : sparse (U, J) in rows
+        Weights of the unknown vertices, in order. No weight is negative; rows sum to 1.
+    method : str
+        Solver that succeeded: "direct" unless that failed.
+
+    Raises
+    ------
+    RigError
+        If no method solves the system, or SciPy is missing.
+    """
+    sparse = scipy_part("sparse")
+    wanted, given = np.nonzero(unknown)[0], np.nonzero(matched)[0]
+    if len(wanted) == 0:
+        return sparse.csr_array((0, weights.shape[1])), "direct"
+    rows = laplacian[wanted]
+    energy = sparse.csr_array(rows + rows @ sparse.diags_array(1.0 / areas) @ laplacian)
+    border, harmonic_border = energy[:, given], rows[:, given]
+    report(0.0, "factorising")
+    for method, matrix, known in (
+        ("direct", energy[:, wanted], border),
+        ("shifted", _shifted(energy[:, wanted]), border),
+        ("conjugate gradients", energy[:, wanted], border),
+        ("harmonic", rows[:, wanted], harmonic_border),
+        ("harmonic, conjugate gradients", rows[:, wanted], harmonic_border),
+    ):
+        solve = _iterative(matrix) if "conjugate" in method else _factorised(matrix)
+        if solve is not None and _is_true(solve, known):
+            return _solved(solve, known, weights[given], report), method
+    raise RigError(
+        "the weights of unmatched vertices could not be computed: the mesh is too irregular"
+    )
+
+
+def _solved(solve: _Solve, border: Any, weights: Any, report: Report) -> Any:
+    """Return the clipped and rescaled solution for all joints that influence adjacent vertices."""
+    sparse = scipy_part("sparse")
+    used = np.unique(border.indices)  # matched vertices within two edges of an unknown vertex
+    right = sparse.csc_array(-border[:, used] @ weights[used])
+    joints = np.nonzero(np.diff(right.indptr))[0]
+    step = max(1, _BLOCK // right.shape[0])
+    parts = []
+    for start in range(0, len(joints), step):
+        report(start / len(joints), "inpainting weights")
+        values = solve(right[:, joints[start : start + step]].toarray())
+        values[values < NEGLIGIBLE] = 0.0
+        parts.append(sparse.csc_array(values))
+    found = sparse.csr_array(sparse.hstack(parts))
+    sums = np.asarray(found.sum(axis=1)).ravel()
+    scaled = sparse.csr_array(sparse.diags_array(1.0 / sums) @ found)
+    shape = (right.shape[0], weights.shape[1])
+    return sparse.csr_array((scaled.data, joints[scaled.indices], scaled.indptr), shape=shape)
+
+
+def _is_true(solve: _Solve, border: Any) -> bool:
+    """Return whether known weights of 1 everywhere yield 1 everywhere, as they should."""
+    ones = solve(-np.asarray(border.sum(axis=1)).reshape(-1, 1))
+    return bool(np.isfinite(ones).all() and np.abs(ones - 1.0).max() <= _TRUE)
+
+
+def _shifted(matrix: Any) -> Any:
+    sparse = scipy_part("sparse")
+    shift = _SHIFT * float(matrix.diagonal().mean())
+    return matrix + sparse.diags_array(np.full(matrix.shape[0], shift))
+
+
+def _factorised(matrix: Any) -> _Solve | None:
+    """Return a solver by sparse factorisation, or None if that fails."""
+    linear = scipy_part("sparse.linalg")
+    try:
+        # Symmetric and positive: no pivoting, and an ordering that preserves the symmetry.
+        factors = linear.splu(
+            matrix.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+    except (RuntimeError, MemoryError):  # the matrix is singular or too large
+        return None
+    return lambda right: factors.solve(right)
+
+
+def _iterative(matrix: Any) -> _Solve:
+    """Return a solver by conjugate gradients for all columns, with diagonal preconditioner."""
+    diagonal = matrix.diagonal()
+    scale = np.divide(1.0, diagonal, out=np.ones_like(diagonal), where=diagonal > 0.0)[:, None]
+
+    def solve(right: Floats) -> Floats:
+        x, residual = np.zeros_like(right), right.copy()
+        ahead = direction = scale * residual
+        size = np.einsum("nk,nk->k", residual, ahead)
+        enough = _CONVERGED**2 * size
+        for _ in range(_STEPS):
+            if (size <= enough).all():
+                break
+            image = matrix @ direction
+            length = _ratio(size, np.einsum("nk,nk->k", direction, image))
+            x += length * direction
+            residual -= length * image
+            ahead = scale * residual
+            last, size = size, np.einsum("nk,nk->k", residual, ahead)
+            direction = ahead + _ratio(size, last) * direction
+        return x
+
+    return solve
+
+
+def _ratio(a: Floats, b: Floats) -> Floats:
+    """Return a / b, 0 if b is not positive: columns already solved are unchanged."""
+    return np.divide(a, b, out=np.zeros_like(a), where=b > 0.0)
+
+
+_ROUNDS = 10
+_FRACTION = 0.2  # blend factor of the neighbours' mean in each iteration
+
+# Each iteration spreads weights by one edge; weights below this are dropped at the end.
+_NEGLIGIBLE = 1e-6
+
+
+def smooth(weights: Any, triangles: Ints, active: Bools, rounds: int = _ROUNDS) -> Any:
+    """Blend weights with the mean of their neighbours: w <- 0.8 w + 0.2 mean(w of neighbours).
+
+    Parameters
+    ----------
+    weights : sparse (W, J) in rows
+        Rows that sum to 1 keep that sum.
+    triangles : (F, 3)
+        Vertex indices; their edges define neighbours.
+    active : (W,) bool
+        Vertices that change; the others are only read.
+    rounds : int
+        Number of iterations.
+
+    Returns
+    -------
+    sparse (W, J) in rows
+        New weights below 1e-6 are dropped, and rows rescaled to their previous sum.
+    """
+    sparse = scipy_part("sparse")
+    links = edges(triangles)
+    both = np.concatenate([links, links[:, ::-1]])
+    both = both[active[both[:, 0]]]
+    count = weights.shape[0]
+    degrees = np.bincount(both[:, 0], minlength=count)
+    mixed = degrees > 0  # the weights of vertices without neighbours are unchanged
+    mean = sparse.csr_array(
+        (_FRACTION / degrees[both[:, 0]], (both[:, 0], both[:, 1])), shape=(count, count)
+    )
+    step = sparse.csr_array(mean + sparse.diags_array(np.where(mixed, 1.0 - _FRACTION, 1.0)))
+    result = weights
+    for _ in range(rounds):
+        result = step @ result
+    changed = np.repeat(mixed, np.diff(result.indptr))
+    result.data[changed & (np.abs(result.data) < _NEGLIGIBLE)] = 0.0
+    result.eliminate_zeros()
+    before = np.asarray(weights.sum(axis=1)).ravel()
+    after = np.asarray(result.sum(axis=1)).ravel()
+    factors = np.divide(before, after, out=np.ones_like(after), where=after > 0.0)
+    return sparse.csr_array(sparse.diags_array(factors) @ result)
+
+
+def within(positions: Floats, triangles: Ints, sources: Bools, reach: float) -> Bools:
+    """Return the vertices connected to a source by a path of edges no longer than ``reach``.
+
+    Parameters
+    ----------
+    positions : (W, 3)
+        Any unit.
+    triangles : (F, 3)
+        Vertex indices.
+    sources : (W,) bool
+        Vertices at which the paths start.
+    reach : float
+        Maximum length in the unit of ``positions``.
+
+    Returns
+    -------
+    (W,) bool
+        Reached vertices, including the sources.
+    """
+    sparse, graph = scipy_part("sparse"), scipy_part("sparse.csgraph")
+    if not sources.any():
+        return sources.copy()
+    links = edges(triangles)
+    lengths = np.linalg.norm(positions[links[:, 0]] - positions[links[:, 1]], axis=1)
+    count = len(positions)
+    matrix = sparse.csr_array((lengths, (links[:, 0], links[:, 1])), shape=(count, count))
+    distances = graph.dijkstra(
+        matrix, directed=False, indices=np.nonzero(sources)[0], limit=reach, min_only=True
+    )
+    return np.isfinite(distances)
+
+
+_NO_SUM = 1e-12  # minimum sum of weights that can be normalised
+
+
+def weight_matrix(skin: Skin, triangles: Ints) -> Any:
+    """Return a skin's weights as a sparse (V, J) matrix whose rows sum to 1.
+
+    Parameters
+    ----------
+    skin : Skin
+        Stored weights need not sum to 1; repeated weights for a joint are added, negative ones set
+        to 0.
+    triangles : (T, 3)
+        Triangles of the same mesh. Vertices without triangles may have no weights.
+
+    Raises
+    ------
+    RigError
+        If the skin has fewer vertices than the triangles refer to, or the weights of a triangle
+        corner sum to 0.
+    """
+    if triangles.max(initial=-1) >= skin.n_vertices:
+        raise RigError(
+            f"template: expected weights for {int(triangles.max()) + 1} vertices, "
+            f"found {skin.n_vertices}"
+        )
+    matrix = _matrix(skin)
+    sums = np.asarray(matrix.sum(axis=1)).ravel()
+    empty = np.unique(triangles[sums[triangles] <= _NO_SUM])
+    if len(empty):
+        raise RigError(
+            f"template: expected weights for every vertex, found none for {len(empty)} "
+            f"of {len(sums)}, the first is vertex {empty[0]}"
+        )
+    return scaled_rows(matrix, np.divide(1.0, sums, out=np.zeros_like(sums), where=sums > _NO_SUM))
+
+
+def skin_of(rows: Any, inverse_bind: Floats, max_influences: int | None = None) -> Skin:
+    """Return a sparse (V, J) matrix of weights as a skin.
+
+    Parameters
+    ----------
+    rows : sparse (V, J) in rows
+        Rows that sum to 1.
+    inverse_bind : (J, 4, 4)
+        Bind-space-to-joint matrices.
+    max_influences : int, optional
+        Number of strongest influences kept per vertex, rescaled to a sum of 1; all if omitted.
+    """
+    rows.sort_indices()
+    skin = Skin(rows.indptr, rows.indices, rows.data, inverse_bind)
+    return skin if max_influences is None else limit_influences(skin, max_influences)
+
+
+def scaled_rows(matrix: Any, factors: Floats) -> Any:
+    """Return a sparse (V, J) matrix with its rows multiplied by (V,); 0 leaves an empty row."""
+    sparse = scipy_part("sparse")
+    scaled = sparse.csr_array(sparse.diags_array(factors) @ matrix)
+    scaled.eliminate_zeros()
+    return scaled
+
+
+def put_rows(rows: Any, where: Any, values: Any) -> Any:
+    """Return sparse rows; the rows at the unique indices ``where`` are replaced by ``values``."""
+    sparse = scipy_part("sparse")
+    kept = np.ones(rows.shape[0])
+    kept[where] = 0.0
+    every = np.arange(len(where))
+    lift = sparse.csr_array(
+        (np.ones(len(where)), (where, every)), shape=(rows.shape[0], len(where))
+    )
+    return sparse.csr_array(scaled_rows(rows, kept) + lift @ values)
+
+
+def _matrix(skin: Skin) -> Any:
+    sparse = scipy_part("sparse")
+    shape = (skin.n_vertices, skin.n_joints)
+    matrix = sparse.csr_array((skin.weights, skin.joints, skin.starts), shape=shape, copy=True)
+    matrix.sum_duplicates()
+    matrix.data = np.maximum(matrix.data, 0.0)
+    matrix.eliminate_zeros()
+    return matrix
+
+
+def nearest_vertices(template: Floats, points: Floats) -> tuple[Ints, Floats]:
+    """Return the nearest vertex of the template for each point.
+
+    Parameters
+    ----------
+    template : (V, 3)
+        Positions of its vertices, in the points' space.
+    points : (N, 3)
+        Positions of the target's vertices.
+
+    Returns
+    -------
+    vertices : (N,) int32
+        ``skin_rows(skin, vertices)`` returns the target's skin.
+    distances : (N,)
+        Distance to each of these vertices.
+
+    Raises
+    ------
+    RigError
+        If the template has no vertex, or SciPy is missing.
+    """
+    if len(template) == 0:
+        raise RigError("expected a template with vertices, found none")
+    tree = scipy_part("spatial").cKDTree(template)
+    distances, vertices = tree.query(points, workers=-1)
+    return np.asarray(vertices, dtype=np.int32), np.asarray(distances, dtype=np.float64)

@@ -12,14 +12,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from dask_jobqueue.slurm import SLURMJob
+from distributed import Status
+
 from viewer.batching.engines._cluster_text import ClusterName
 from viewer.errors import ViewerError
 from viewer.phrases import counted, listed, printable
 
 if TYPE_CHECKING:
     from dask_jobqueue import SLURMCluster
-
-__all__ = ["SlurmJobs", "slurm_cluster"]
 
 _MEMORY = 4 << 30  # bytes per worker that a job requests by default
 _GPU_OPTIONS = ("gpus", "gres", "gpus-per-node", "gpus-per-task")
@@ -59,7 +60,6 @@ def slurm_cluster(
         with _handlers_kept():  # the import replaces the handler of Ctrl-C
             from dask_jobqueue import SLURMCluster
 
-            from viewer.batching.engines._slurm_job import Job
     except ImportError:
         raise ViewerError(
             "--cluster slurm needs dask-jobqueue: pip install dask-jobqueue"
@@ -225,3 +225,29 @@ def _handlers_kept() -> Iterator[None]:
         for number, handler in zip(numbers, before, strict=True):
             if signal.getsignal(number) is not handler:
                 signal.signal(number, handler)
+
+
+class Job(SLURMJob):  # type: ignore[misc]  # the package has no types
+    """A job that runs workers.
+
+    ``refusal``: the reason why it was not submitted; empty if it was.
+    """
+
+    refusal = ""
+
+    async def start(self) -> None:
+        """Submit the job."""
+        try:
+            await super().start()
+        except (RuntimeError, OSError, ValueError) as problem:
+            lines = str(problem).splitlines()
+            # Dask's message also has the command, its exit code and its empty output.
+            said = [line for line in lines if line.startswith("sbatch: ")] or lines
+            self.refusal = printable("; ".join(filter(None, said)), 500)
+            # Dask waits for this status; closing the job then does nothing, as it has no number.
+            self.status = Status.running
+
+    async def close(self) -> None:
+        """Cancel the job."""
+        await super().close()
+        self.status = Status.closed

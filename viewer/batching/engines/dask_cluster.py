@@ -7,23 +7,28 @@ reported.
 
 from __future__ import annotations
 
+import contextlib
 import itertools
+import logging
 import operator
 import os
 import time
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import CancelledError
+from contextlib import ExitStack, contextmanager
 from dataclasses import astuple, field, replace
 from queue import Empty, SimpleQueue
-from typing import TYPE_CHECKING
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from viewer.batching.engines import Job, Limits
-from viewer.batching.engines._cluster_text import parse_cluster
-from viewer.batching.engines._remote import ENDED, Call, run_items
+from viewer.batching.engines._cluster_text import ClusterName, parse_cluster
+from viewer.batching.engines._process_limits import signals_blocked
+from viewer.batching.engines._remote import ENDED, Call, NoFolder, OtherVersion, Reply, run_items
+from viewer.batching.engines._slurm import SlurmJobs, slurm_cluster
 from viewer.batching.engines._task_size import TaskSize
-from viewer.batching.engines._worker_checks import WorkerChecks
 from viewer.batching.items import Item, Result
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
@@ -33,10 +38,6 @@ from viewer.version import VERSION
 
 if TYPE_CHECKING:
     from distributed import Client, Future, KilledWorker
-
-    from viewer.batching.engines._clusters import Check
-
-__all__ = ["run"]
 
 _TICK = 0.2  # seconds between checks for whether the batch is stopping
 _PER_WORKER = 3  # tasks assigned to each worker: one runs while the next ones are transferred
@@ -60,9 +61,8 @@ def run(items: Iterable[Item], job: Job, limits: Limits) -> Iterator[Result]:
         raise ViewerError(
             "--cluster needs Dask: pip install dask distributed, or use --workers without --cluster"
         ) from None
-    from viewer.batching.engines._clusters import connected
 
-    with connected(parse_cluster(limits.cluster or "local"), limits) as (client, check):
+    with _connected(parse_cluster(limits.cluster or "local"), limits) as (client, check):
         flight = _Flight(client, check, iter(items), job, limits)
         try:
             while True:
@@ -318,3 +318,154 @@ def _number(key: str) -> int:
 
 def _lost() -> ViewerError:
     return ViewerError("--cluster: the scheduler disconnected; use --resume to continue")
+
+
+_CONNECT = 10.0  # time limit for connecting to a scheduler, seconds
+_ONE_THREAD = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS")
+
+# The batch itself counts retries and tracks which items a worker had started.
+_CONFIG = {
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.scheduler.worker-saturation": 1.0,
+    "distributed.worker.memory.target": False,
+    "distributed.worker.memory.spill": False,
+    "distributed.worker.memory.pause": False,
+    # Without Dask's MALLOC_TRIM_THRESHOLD_: it returns freed memory, so new arrays cause page
+    # faults.
+    "distributed.nanny.pre-spawn-environ": dict.fromkeys(_ONE_THREAD, 1),
+    # These poll the workers many times a second, which takes at least a tenth of the time of short
+    # items.
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.system-monitor.interval": "10s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.scheduler.active-memory-manager.start": False,
+}
+Check = Callable[[Iterable[str]], None]
+"""Called with the names of the connected workers; replaces workers that have ended."""
+
+
+@contextmanager
+def _connected(name: ClusterName, limits: Limits) -> Iterator[tuple[Client, Check]]:
+    """Connect to a cluster; shut it down at the end if it was started here.
+
+    Raises
+    ------
+    ViewerError
+        If no scheduler answers, or the cluster can't be started.
+    """
+    import dask
+    from distributed import Client
+    from distributed.utils import silence_logging_cmgr
+
+    check: Check = _nothing_to_replace
+    with ExitStack() as stack:
+        # Lost connections become messages; Dask would also print tracebacks.
+        stack.enter_context(silence_logging_cmgr(logging.CRITICAL))
+        target: Any = name.address
+        if name.kind != "address":
+            # Workers inherit blocked signals: Ctrl-C reaches all processes of a terminal, but the
+            # batch decides which items are finished.
+            folder = stack.enter_context(TemporaryDirectory(prefix="viewer-dask-"))
+            with signals_blocked(), dask.config.set(_CONFIG):
+                if name.kind == "local":
+                    target = _local_cluster(limits, folder)
+                else:
+                    target = slurm_cluster(name, limits.memory, _CONFIG)
+            stack.enter_context(target)
+            if name.kind == "slurm":
+                check = SlurmJobs(target, limits.workers, limits.note).check
+        try:
+            with signals_blocked():
+                client = Client(target, timeout=_CONNECT, set_as_default=False)
+        except (OSError, ValueError) as problem:
+            raise ViewerError(
+                f"--cluster: no scheduler answers at {printable(target, 100)} "
+                f"({printable(problem, 200)})"
+            ) from None
+        yield stack.enter_context(client), check
+
+
+def _nothing_to_replace(workers: Iterable[str]) -> None:
+    """Do nothing: Dask restarts the workers of this machine, and others belong to the user."""
+
+
+def _local_cluster(limits: Limits, folder: str) -> Any:
+    from distributed import LocalCluster
+
+    try:
+        return LocalCluster(
+            n_workers=limits.workers,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=None,
+            dashboard_address="127.0.0.1:0",
+            local_directory=folder,
+            silence_logs=logging.CRITICAL,
+        )
+    except RuntimeError as problem:
+        raise ViewerError(
+            f"--cluster local: the workers do not start ({printable(problem, 200)}); a script that "
+            'calls viewer.batch needs the line if __name__ == "__main__": before its own work'
+        ) from None
+
+
+class WorkerChecks:
+    """Checks of the replies of workers.
+
+    Parameters
+    ----------
+    note : callable
+        Called with messages for the user.
+    """
+
+    def __init__(self, note: Callable[[str], None]) -> None:
+        self._note = note
+        # Workers and the folders in which an output of theirs has been found; "" for a worker that
+        # wrote one elsewhere, of which one note is enough.
+        self._found: set[tuple[str, str]] = set()
+
+    def accepted(self, reply: Reply | OtherVersion | NoFolder) -> Reply:
+        """Return the reply of a suitable worker.
+
+        Raises
+        ------
+        ViewerError
+            If the worker has another version, or cannot read the files of the batch.
+        """
+        if isinstance(reply, OtherVersion):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} has viewer {printable(reply.version, 40)}, "
+                f"expected {VERSION}: install the same version on all workers"
+            )
+        if isinstance(reply, NoFolder):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} cannot enter {printable(os.getcwd(), 300)} "
+                f"({printable(reply.reason, 100)}): start the batch in a folder that all workers "
+                "share"
+            )
+        if reply.missing and os.path.lexists(reply.missing):
+            raise ViewerError(
+                f"--cluster: the worker {reply.worker} cannot find "
+                f"{printable(os.path.abspath(reply.missing), 300)}: workers need access to the "
+                "inputs under the same paths"
+            )
+        for one in reply.results:
+            for path in one.outputs:
+                self._check_output(reply.worker, path)
+        return reply
+
+    def _check_output(self, worker: str, path: str) -> None:
+        """Note that the first output of a worker in a folder does not exist on this machine."""
+        folder = os.path.dirname(path) or "."
+        if not self._found.isdisjoint({(worker, folder), (worker, "")}):
+            return
+        with contextlib.suppress(OSError):
+            # This updates the cache of a network file system.
+            os.listdir(folder)
+        is_found = os.path.lexists(path)
+        self._found.add((worker, folder if is_found else ""))
+        if not is_found:
+            self._note(
+                f"the worker {worker} wrote {printable(path, 300)}, which does not exist on this "
+                "machine: write outputs to a folder that all workers share"
+            )

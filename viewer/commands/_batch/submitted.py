@@ -16,8 +16,7 @@ from viewer.batching.engines import Job
 from viewer.batching.execution import attempt
 from viewer.batching.inputs import is_recording
 from viewer.batching.items import Item, Result
-from viewer.batching.submissions import Submission, is_archive, opened
-from viewer.batching.submissions.choosing import patterns_of
+from viewer.batching.submissions import Submission, is_archive, opened, patterns_of
 from viewer.batching.tables import comparisons
 from viewer.commands._diff.inputs import input_files
 from viewer.data_classes import dataclass
