@@ -14,7 +14,7 @@ from viewer.app.files.state import Files
 from viewer.app.headless import HeadlessApp
 from viewer.diagnostics.template import in_window
 from viewer.rendering.camera import facing_camera, fit
-from viewer.rendering.gpu.graphics import thread_graphics
+from viewer.rendering.gpu.context import thread_graphics
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.inspection.front import guess_front
 from viewer.rig.scene import Scene, scene_box, scene_points

@@ -10,9 +10,9 @@ from measure import interleaved, median_ratio, report
 
 import viewer
 from viewer.loading import bundled_body
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor, Scene, scene_box
 from viewer.rig.skinning import Skinning

@@ -10,10 +10,10 @@ from rendering.drawn_figures import arm, bent, skeleton, square
 from rendering.front_view import PIXELS, grid_figure
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.annotations import Keypoints, ReducedMesh
 from viewer.rig.captures.points import PointLayout
 from viewer.rig.figure import Figure

@@ -9,8 +9,7 @@ from typing import Any
 
 from viewer.app.display_loss import stop_watching, watch_display
 from viewer.errors import RenderError, ViewerError
-from viewer.rendering.gpu.context import explain
-from viewer.rendering.gpu.offer import offer_of, offer_text
+from viewer.rendering.gpu.context import explain, offer_of, offer_text
 
 __all__ = ["NoDisplay", "find_display", "import_glfw", "window_error"]
 

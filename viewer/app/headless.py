@@ -14,7 +14,7 @@ from viewer.app.frame import Frame
 from viewer.app.preferences.state import Appearance
 from viewer.app.theme import add_system_fonts, apply_theme, lacks_letters
 from viewer.diagnostics.template import in_window
-from viewer.rendering.gpu.graphics import Graphics
+from viewer.rendering.gpu.context import Graphics
 from viewer.rendering.gpu.target import Target
 from viewer.rig.arrays import Bytes
 

@@ -242,7 +242,7 @@ def draw_scene(
 
     The default quality is lowered if drawing it in software would take long.
     """
-    from viewer.rendering.gpu.graphics import thread_graphics
+    from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.quality_limits import limit_passes, time_note
 
@@ -274,7 +274,7 @@ def _draw_panels(
     from viewer.app.core.state import AppState
     from viewer.app.headless import HeadlessApp
     from viewer.diagnostics.template import in_window
-    from viewer.rendering.gpu.graphics import thread_graphics
+    from viewer.rendering.gpu.context import thread_graphics
 
     if min(size) < 200:
         raise ViewerError(f"--panels needs at least 200 x 200 pixels, found {size[0]} x {size[1]}")

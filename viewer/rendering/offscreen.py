@@ -10,8 +10,7 @@ from functools import partial
 
 from viewer.interrupts import deferred
 from viewer.rendering.camera import Camera, facing_camera, fit
-from viewer.rendering.gpu.context import is_software, unreadable_devices
-from viewer.rendering.gpu.graphics import Graphics
+from viewer.rendering.gpu.context import Graphics, is_software, unreadable_devices
 from viewer.rendering.gpu.target import Target, check_size
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.renderer import Renderer

@@ -15,6 +15,7 @@ The window and the command line both use it::
 
 from __future__ import annotations
 
+import ctypes
 import math
 import time
 from collections import deque
@@ -24,13 +25,13 @@ from dataclasses import field, replace
 from functools import partial
 from typing import Protocol
 
+import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.camera import Camera, follow_view
 from viewer.rendering.gpu.target import Target, picture_rows, straight
 from viewer.rendering.gpu.upload import checked
-from viewer.rendering.gpu.waiting import Waiter
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.annotation import Annotation
 from viewer.rendering.renderer import Renderer
@@ -39,71 +40,8 @@ from viewer.rig.motion.follow import followed_point
 from viewer.rig.motion.instances import pose_actors
 from viewer.rig.scene import Scene, scene_box
 
-__all__ = ["Follow", "Progress", "Recording", "Sink", "copied", "pose_scene", "record"]
-
 _WAITING = 2  # number of frames that may wait for a worker, limited to save memory
 _PATIENCE = 0.05  # seconds between steps while the sink finishes
-
-
-class Sink(Protocol):
-    """Receiver of frames; ``viewer.media`` has sinks for images, contact sheets and videos.
-
-    Attributes
-    ----------
-    workers : int
-        Number of threads that may call ``write`` at the same time; 1 for sinks that need the
-        frames in order.
-    n_samples : int
-        Number of frames, spread over the recording, to pass to ``look`` before the first
-        ``write``.
-    """
-
-    @property
-    def workers(self) -> int:
-        """Number of threads that may call ``write`` at the same time."""
-
-    @property
-    def n_samples(self) -> int:
-        """Number of frames to pass to ``look``."""
-
-    def look(self, pixels: Bytes) -> None:
-        """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
-
-    def write(self, frame: int, pixels: Bytes) -> None:
-        """Write one frame; called in a worker thread.
-
-        Parameters
-        ----------
-        frame : int
-            Index of the frame, from 0.
-        pixels : (H, W, 4) uint8
-            sRGB and straight alpha, first row at the top; read-only.
-        """
-
-    def close(self) -> None:
-        """Finish the output and move it to its final name; called once, after the last frame."""
-
-    def abort(self) -> None:
-        """Remove unfinished output; does nothing after a successful ``close``."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Follow:
-    """The actor or joint that the camera follows at a constant distance and angle.
-
-    Attributes
-    ----------
-    actor : int
-        Index in the scene.
-    joint : int
-        Index of a joint or captured point; -1 for their centre.
-    origin : (3,)
-        Position of the joint when the camera was framed, scene space.
-    """
-
-    actor: int
-    joint: int
-    origin: Floats
 
 
 @dataclass(slots=True, eq=False)
@@ -163,6 +101,67 @@ class Recording:
         return len(self.times)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Follow:
+    """The actor or joint that the camera follows at a constant distance and angle.
+
+    Attributes
+    ----------
+    actor : int
+        Index in the scene.
+    joint : int
+        Index of a joint or captured point; -1 for their centre.
+    origin : (3,)
+        Position of the joint when the camera was framed, scene space.
+    """
+
+    actor: int
+    joint: int
+    origin: Floats
+
+
+class Sink(Protocol):
+    """Receiver of frames; ``viewer.media`` has sinks for images, contact sheets and videos.
+
+    Attributes
+    ----------
+    workers : int
+        Number of threads that may call ``write`` at the same time; 1 for sinks that need the
+        frames in order.
+    n_samples : int
+        Number of frames, spread over the recording, to pass to ``look`` before the first
+        ``write``.
+    """
+
+    @property
+    def workers(self) -> int:
+        """Number of threads that may call ``write`` at the same time."""
+
+    @property
+    def n_samples(self) -> int:
+        """Number of frames to pass to ``look``."""
+
+    def look(self, pixels: Bytes) -> None:
+        """Inspect a sample frame before any frame is written, to choose the palette of a GIF."""
+
+    def write(self, frame: int, pixels: Bytes) -> None:
+        """Write one frame; called in a worker thread.
+
+        Parameters
+        ----------
+        frame : int
+            Index of the frame, from 0.
+        pixels : (H, W, 4) uint8
+            sRGB and straight alpha, first row at the top; read-only.
+        """
+
+    def close(self) -> None:
+        """Finish the output and move it to its final name; called once, after the last frame."""
+
+    def abort(self) -> None:
+        """Remove unfinished output; does nothing after a successful ``close``."""
+
+
 @dataclass(frozen=True, slots=True)
 class Progress:
     """Progress of a recording.
@@ -185,18 +184,6 @@ class Progress:
     def left(self) -> float:
         """Estimated remaining time, seconds; 0 before the first frame."""
         return self.seconds * (self.total - self.done) / self.done if self.done else 0.0
-
-
-def copied(scene: Scene) -> Scene:
-    """Return a scene with copied actors, so that posing them leaves the original unchanged."""
-    return replace(scene, actors=[actor.copy() for actor in scene.actors])
-
-
-def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:
-    """Pose a copy of the recording's scene at a time."""
-    if recording.moves:
-        scene.time = seconds
-        pose_actors(scene.actors, seconds, recording.interpolate)
 
 
 def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Progress]:
@@ -269,6 +256,18 @@ def record(recording: Recording, renderer: Renderer, sink: Sink) -> Generator[Pr
         queue.stop()
         if drawer is not None:
             drawer.release()
+
+
+def copied(scene: Scene) -> Scene:
+    """Return a scene with copied actors, so that posing them leaves the original unchanged."""
+    return replace(scene, actors=[actor.copy() for actor in scene.actors])
+
+
+def pose_scene(scene: Scene, recording: Recording, seconds: float) -> None:
+    """Pose a copy of the recording's scene at a time."""
+    if recording.moves:
+        scene.time = seconds
+        pose_actors(scene.actors, seconds, recording.interpolate)
 
 
 class _Queue:
@@ -369,3 +368,51 @@ class _Cameras:
         elif recording.shifts is not None:
             camera.target = camera.target + recording.shifts[frame]
         return camera
+
+
+# Waiting for the driver without holding Python's lock, so that other threads can run.
+#
+class Waiter:
+    """Submission of work to the driver, and waiting without holding Python's lock.
+
+    moderngl holds the global interpreter lock during every call. Reading an image that is still
+    being drawn blocks until the drawing is finished, and meanwhile no other thread can run Python:
+    an encoder thread that needs the lock five times per frame would be delayed by five frames.
+    ``ctypes`` releases the lock during a call, so two OpenGL functions are called through it.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use; it must be current whenever a method is called.
+
+    Attributes
+    ----------
+    is_free : bool
+        Whether other threads can run during the wait. False with versions of moderngl that do not
+        expose the functions' addresses; recording still works then, but more slowly.
+    """
+
+    def __init__(self, context: moderngl.Context) -> None:
+        flush, finish = _gl_function(context, "glFlush"), _gl_function(context, "glFinish")
+        self.is_free = finish is not None
+        self._flush: Callable[[], None] = flush or _nothing
+        self._finish: Callable[[], None] = finish or context.finish
+
+    def begin(self) -> None:
+        """Submit all queued work to the driver without waiting."""
+        self._flush()
+
+    def end(self) -> None:
+        """Wait until the driver has finished all queued work."""
+        self._finish()
+
+
+def _gl_function(context: moderngl.Context, name: str) -> Callable[[], None] | None:
+    """Return an OpenGL function without arguments; None if its address is unknown."""
+    loader = getattr(getattr(context.mglo, "_context", None), "load_opengl_function", None)
+    address = loader(name) if loader is not None else 0
+    return ctypes.CFUNCTYPE(None)(address) if address else None
+
+
+def _nothing() -> None:
+    pass

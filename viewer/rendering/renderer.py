@@ -17,6 +17,7 @@ from viewer.rendering.camera_views import (
 )
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_writes
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.lighting import Lighting
@@ -30,7 +31,6 @@ from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_layer
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
 from viewer.rendering.shown import (

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import find_quantity, joint_text, missing_part
 from viewer.rig.scene import Actor

@@ -10,9 +10,9 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import instance_groups
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

@@ -68,7 +68,7 @@ def test_refused_scene_leaves_no_objects_and_keeps_the_old_scene(
         with offscreen.context:
             before = gl_objects()
             monkeypatch.setattr(upload, "check_errors", fail_once)
-            monkeypatch.setattr("viewer.rendering.passes.skin_pass.checked", upload.checked)
+            monkeypatch.setattr("viewer.rendering.gpu.posed_mesh.checked", upload.checked)
             try:
                 offscreen.renderer.prepare(scene(count))
                 is_done = True

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 
 import viewer
-from viewer.rendering.gpu.graphics import Graphics, thread_graphics
+from viewer.rendering.gpu.context import Graphics, thread_graphics
 from viewer.rendering.offscreen import Offscreen, default_camera
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.scene import scene_box

@@ -2,7 +2,7 @@
 
 import pytest
 
-from viewer.rendering.gpu.offer import Offer, offer_text
+from viewer.rendering.gpu.context import OpenGLOffer, offer_text
 
 MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
 
@@ -30,7 +30,7 @@ MESA = "llvmpipe (LLVM 15.0.6, 256 bits)"
 def test_required_and_available_versions_are_reported(
     version, language, environment, needed, offered
 ):
-    text = offer_text(Offer(version, language, MESA), environment)
+    text = offer_text(OpenGLOffer(version, language, MESA), environment)
     before, after = text.split("; ")
     assert needed in before and offered in after and f"renderer {MESA}" in after
     assert all(f"{name}={value} is set" in after for name, value in environment.items())
@@ -38,5 +38,5 @@ def test_required_and_available_versions_are_reported(
 
 def test_no_message_states_that_a_newer_version_is_too_old():
     for version in ("3.3", "4.5", "4.6 (Core Profile)"):
-        text = offer_text(Offer(version, "4.60", MESA), {"MESA_GLSL_VERSION_OVERRIDE": "140"})
+        text = offer_text(OpenGLOffer(version, "4.60", MESA), {"MESA_GLSL_VERSION_OVERRIDE": "140"})
         assert "OpenGL 3.3 is needed" not in text and "GLSL 1.40" in text

@@ -10,9 +10,9 @@ from viewer.errors import RenderError
 from viewer.rendering.gpu import upload
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
-from viewer.rendering.passes.skin_pass import PosedMesh
 
 
 class Item:

@@ -11,10 +11,10 @@ import viewer
 from viewer.rendering.camera import Camera
 from viewer.rendering.gpu.instance_buffers import InstanceBuffers
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass, SkeletonBuffers
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.vectors import unit

@@ -10,9 +10,9 @@ from rendering.drawn_figures import random_pose
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.rest_buffers import WAYS
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import figure_pose
 from viewer.rig.skinning import Skinning

@@ -10,8 +10,8 @@ from rendering.drawn_figures import random_figure, random_pose
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.pose import rest_pose

@@ -9,8 +9,8 @@ from rendering.drawn_figures import random_pose, skeleton
 
 import viewer
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.scene import figure_pose

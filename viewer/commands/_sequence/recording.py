@@ -205,7 +205,7 @@ def draw_sequence(
     from viewer.commands._sequence.shots import shots_of
     from viewer.rendering.camera_views import with_cameras
     from viewer.rendering.framing import fit_turntable, frame_motion, framed_poses, seen_aspect
-    from viewer.rendering.gpu.graphics import thread_graphics
+    from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.gpu.target import check_size
     from viewer.rendering.offscreen import Offscreen
     from viewer.rendering.recorder import record

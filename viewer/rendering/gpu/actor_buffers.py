@@ -10,9 +10,9 @@ import moderngl
 
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.joint_pass import SkeletonBuffers
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.figure import Figure
 from viewer.rig.scene import Actor
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import skinning_options_key
 from viewer.rendering.gpu.program import set_uniforms
-from viewer.rendering.gpu.rest_buffers import RestBuffers
-from viewer.rendering.gpu.summed_offsets import SummedOffsets
+from viewer.rendering.gpu.rest_buffers import RestBuffers, SummedOffsets
 from viewer.rendering.gpu.upload import (
     as_uniform,
     float32,
@@ -31,7 +31,6 @@ from viewer.rendering.gpu.upload import (
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
-from viewer.rendering.passes.skin_pass import skinning_options_key
 from viewer.rendering.view import View
 from viewer.rig.arrays import Bools, Floats
 from viewer.rig.figure import Figure

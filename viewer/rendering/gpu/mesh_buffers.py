@@ -1,4 +1,7 @@
-"""A figure's mesh and skin on the GPU, uploaded on first use and never changed."""
+"""A figure's mesh and skin on the GPU, uploaded on first use and never changed.
+
+A vertex has a range of influences in a list of (joint, weight) pairs, the strongest pair first.
+"""
 
 from __future__ import annotations
 
@@ -18,18 +21,16 @@ from viewer.rendering.gpu.index_sets import (
     triangle_order,
 )
 from viewer.rendering.gpu.ownership import Owner
-from viewer.rendering.gpu.skin_buffers import SkinBuffers
 from viewer.rendering.gpu.surfaces import drawn_sets, needs_materials, upload_surfaces
-from viewer.rendering.gpu.upload import buffer, float32, offset_texture
+from viewer.rendering.gpu.upload import buffer, float32, offset_texture, pair_texture
 from viewer.rig.arrays import Floats, Ints
 from viewer.rig.blendshapes import active_rows
 from viewer.rig.bodies.sparse_offsets import SparseOffsets
 from viewer.rig.figure import Figure
 from viewer.rig.geometry.shell import Shell, shell_of
-from viewer.rig.mesh import Mesh, bounding_box, visible_vertices
+from viewer.rig.mesh import bounding_box, visible_vertices
+from viewer.rig.skin import Skin, has_influence, strongest_first, weight_sums
 from viewer.rig.skinning import Skinning, skin_used
-
-__all__ = ["MeshBuffers"]
 
 _MOST_VISIBLE = 64  # maximum number of combinations of hidden parts whose runs are cached
 
@@ -81,30 +82,31 @@ class MeshBuffers:
         self._offsets: moderngl.Texture | None = None
         self._product: np.ndarray | None = None
         self._shell: tuple[Shell | None] | None = None
-        with self._owner.guard():
-            self._upload(mesh, uv_indices, notes)
-
-    def _upload(self, mesh: Mesh, uv_indices: Ints, notes: list[str]) -> None:
         keep = self._owner.keep
-        self.positions = self.upload(mesh.positions - self.center)
-        self.normals = self.upload(mesh.normals)
-        self.uvs: moderngl.Buffer | None = None
-        if mesh.uvs is not None and len(mesh.uvs):
-            self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
-        sets = drawn_sets(mesh, notes)
-        self.other_uvs: moderngl.Buffer | None = None
-        if self.uvs is not None and len(sets) > 1:
-            rows = np.zeros((len(uv_indices), 4), "f4")
-            for slot, number in enumerate(sets[1:]):
-                rows[:, 2 * slot : 2 * slot + 2] = mesh.other_uvs[number - 1][uv_indices]
-            self.other_uvs = keep(buffer(self.context, rows, "f4"))
-        self.tints = None if mesh.colors is None else self.upload(mesh.colors)
-        self.has_materials = needs_materials(mesh)
-        self.surfaces = upload_surfaces(
-            self.context, mesh.materials, sets if self.uvs is not None else (), notes, self._owner
-        )
-        self.index_set(False, ())
-        self.skin(Skinning())
+        with self._owner.guard():
+            self.positions = self.upload(mesh.positions - self.center)
+            self.normals = self.upload(mesh.normals)
+            self.uvs: moderngl.Buffer | None = None
+            if mesh.uvs is not None and len(mesh.uvs):
+                self.uvs = keep(buffer(self.context, mesh.uvs[uv_indices], "f4"))
+            sets = drawn_sets(mesh, notes)
+            self.other_uvs: moderngl.Buffer | None = None
+            if self.uvs is not None and len(sets) > 1:
+                rows = np.zeros((len(uv_indices), 4), "f4")
+                for slot, number in enumerate(sets[1:]):
+                    rows[:, 2 * slot : 2 * slot + 2] = mesh.other_uvs[number - 1][uv_indices]
+                self.other_uvs = keep(buffer(self.context, rows, "f4"))
+            self.tints = None if mesh.colors is None else self.upload(mesh.colors)
+            self.has_materials = needs_materials(mesh)
+            self.surfaces = upload_surfaces(
+                self.context,
+                mesh.materials,
+                sets if self.uvs is not None else (),
+                notes,
+                self._owner,
+            )
+            self.index_set(False, ())
+            self.skin(Skinning())
 
     def upload(self, rows: Floats) -> moderngl.Buffer:
         """Return a buffer with a row per split vertex, copied from rows (V, 3) per vertex."""
@@ -247,4 +249,59 @@ class MeshBuffers:
 
     def release(self) -> None:
         """Free every buffer and texture."""
+        self._owner.release()
+
+
+class SkinBuffers:
+    """Influences of a mesh's split vertices.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use; ``release`` frees all buffers.
+    skin : Skin or None
+        None for vertices without influences.
+    sources : (R,)
+        Vertex of the skin for each split vertex.
+
+    Attributes
+    ----------
+    bindings : moderngl.Buffer
+        One row per split vertex, see ``include/skinning.glsl``.
+    fractions : moderngl.Buffer
+        The skin's fraction of DQS at each split vertex.
+    joint_fractions : (J,)
+        Each joint's fraction of the sum of all weights, for the mean motion of the figure.
+    """
+
+    def __init__(self, context: moderngl.Context, skin: Skin | None, sources: Ints) -> None:
+        self._owner = Owner()
+        keep = self._owner.keep
+        with self._owner.guard():
+            if skin is None:
+                self.joint_fractions: Floats = np.zeros(0)
+                ranges, excess = np.zeros((len(sources), 2), "u4"), np.zeros(len(sources))
+                self.pairs = keep(pair_texture(context, [], []))
+            else:
+                skin = strongest_first(skin)
+                counts = np.where(has_influence(skin), np.diff(skin.starts), 0)
+                ranges = np.stack([skin.starts[:-1], counts], axis=1)[sources]
+                self.pairs = keep(pair_texture(context, skin.joints, skin.weights))
+                sums = np.bincount(skin.joints, np.abs(skin.weights), minlength=skin.n_joints)
+                self.joint_fractions = sums / (sums.sum() or 1.0)
+                # In float64: float32 sums deviate from 1, which displaces vertices far from the
+                # origin.
+                excess = (weight_sums(skin) - 1.0)[sources]
+            # One packed attribute: each attribute costs software drivers as much as a matrix
+            # product.
+            bindings = np.empty((len(sources), 4), dtype="u4")
+            bindings[:, :2], bindings[:, 2] = ranges, sources
+            bindings[:, 3] = excess.astype("f4").view("u4")
+            self.bindings = keep(buffer(context, bindings, "u4"))
+            stated = None if skin is None else skin.dqs_fractions
+            fractions = np.zeros(len(sources)) if stated is None else stated[sources]
+            self.fractions = keep(buffer(context, fractions, "f4"))
+
+    def release(self) -> None:
+        """Free everything."""
         self._owner.release()

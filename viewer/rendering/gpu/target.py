@@ -1,4 +1,7 @@
-"""Render targets: a multisampled framebuffer, resolved to a single-sample framebuffer."""
+"""Render targets: a multisampled framebuffer, resolved to a single-sample framebuffer.
+
+The passes of an image in final quality are summed in floating point and averaged.
+"""
 
 from __future__ import annotations
 
@@ -10,51 +13,12 @@ import numpy as np
 from viewer.diagnostics.template import rendered
 from viewer.errors import RenderError, ViewerError
 from viewer.rendering.gpu.context import check_errors
+from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.upload import checked
 from viewer.rig.arrays import Bytes
 
-__all__ = ["Target", "check_size", "picture_rows", "straight", "target_bytes"]
-
-
 _OPAQUE = 0xFF000000  # smallest value of an opaque pixel as a little-endian number
-
-
-def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
-    """Raise for an image size that the driver cannot draw; ``what`` begins the message.
-
-    Raises
-    ------
-    ViewerError
-        If the size is not supported; the message gives the limit.
-    """
-    limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
-    if not all(1 <= side <= limit for side in size):
-        raise ViewerError(
-            f"{what}: expected 1 to {limit} pixels per side, found {size[0]} x {size[1]}"
-        )
-
-
-def target_bytes(size: tuple[int, int], samples: int) -> int:
-    """Return the memory in bytes that OpenGL needs to draw an image.
-
-    Colour and depth of every sample, 4 bytes each, plus the resolved image; without
-    multisampling, the image and its depth.
-
-    Parameters
-    ----------
-    size : (int, int)
-        Width and height in pixels.
-    samples : int
-        Samples per pixel; 0 without multisampling.
-
-    >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
-    (36000, 8000)
-    """
-    picture = 4 * size[0] * size[1]
-    return picture * (2 * samples + 1) if samples else 2 * picture
-
-
-def _gigabytes(count: int) -> str:
-    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"
 
 
 class Target:
@@ -158,6 +122,104 @@ class Target:
             item.release()
 
 
+class Accumulation:
+    """Sum of several passes of one image, in floating point, and their average.
+
+    Colours are premultiplied by alpha, so averaging pixels averages their coverage.
+
+    Parameters
+    ----------
+    context : moderngl.Context
+        The context in use.
+    programs : Programs
+        Provides the program.
+    size : (int, int)
+        Width and height in pixels.
+
+    Attributes
+    ----------
+    count : int
+        Images added since the last ``clear``.
+    """
+
+    def __init__(self, context: moderngl.Context, programs: Programs, size: tuple[int, int]):
+        self.context, self.size, self.count = context, size, 0
+        self._owner = Owner()
+        keep = self._owner.keep
+        what = f"the sum of images of {size[0]} x {size[1]} pixels"
+        with self._owner.guard():
+            self._sum = keep(checked(context, context.texture(size, 4, dtype="f4"), what))
+            self._framebuffer = keep(context.framebuffer([self._sum]))
+            program = programs.drawing("fullscreen", fragment="average")
+            self._array = keep(context.vertex_array(program, []))
+
+    def clear(self) -> None:
+        """Begin a new sum."""
+        self._framebuffer.clear()
+        self.count = 0
+
+    def add(self, target: Target) -> None:
+        """Add the image of a target."""
+        texture = target.resolve()
+        self._framebuffer.use()
+        self.context.viewport = (0, 0, *self.size)
+        self.context.enable_only(moderngl.BLEND)
+        self.context.blend_func = moderngl.ONE, moderngl.ONE
+        self._draw(texture, 1.0)
+        self.count += 1
+
+    def show(self, target: Target) -> None:
+        """Replace the image of a target by the average; its depths are preserved."""
+        target.framebuffer.use()
+        self.context.viewport = (0, 0, *self.size)
+        self.context.enable_only(moderngl.NOTHING)
+        self._draw(self._sum, 1.0 / max(self.count, 1))
+
+    def _draw(self, texture: moderngl.Texture, factor: float) -> None:
+        set_uniforms(self._array.program, {"u_texture": 0, "u_factor": factor})
+        texture.use(0)
+        self._array.render(moderngl.TRIANGLES, vertices=3)
+
+    def release(self) -> None:
+        """Free the sum."""
+        self._owner.release()
+
+
+def check_size(context: moderngl.Context, size: tuple[int, int], what: str = "image size") -> None:
+    """Raise for an image size that the driver cannot draw; ``what`` begins the message.
+
+    Raises
+    ------
+    ViewerError
+        If the size is not supported; the message gives the limit.
+    """
+    limit = min(*context.info["GL_MAX_VIEWPORT_DIMS"], context.info["GL_MAX_RENDERBUFFER_SIZE"])
+    if not all(1 <= side <= limit for side in size):
+        raise ViewerError(
+            f"{what}: expected 1 to {limit} pixels per side, found {size[0]} x {size[1]}"
+        )
+
+
+def target_bytes(size: tuple[int, int], samples: int) -> int:
+    """Return the memory in bytes that OpenGL needs to draw an image.
+
+    Colour and depth of every sample, 4 bytes each, plus the resolved image; without
+    multisampling, the image and its depth.
+
+    Parameters
+    ----------
+    size : (int, int)
+        Width and height in pixels.
+    samples : int
+        Samples per pixel; 0 without multisampling.
+
+    >>> target_bytes((100, 10), 4), target_bytes((100, 10), 0)
+    (36000, 8000)
+    """
+    picture = 4 * size[0] * size[1]
+    return picture * (2 * samples + 1) if samples else 2 * picture
+
+
 def picture_rows(data: bytes, size: tuple[int, int]) -> Bytes:
     """Return pixels from OpenGL as a view: (H, W, 4) uint8, first row at the top.
 
@@ -182,3 +244,7 @@ def straight(pixels: Bytes) -> Bytes:
         colors = pixels[partial, :3].astype(np.float64) * 255.0 / alpha[partial, None]
         pixels[partial, :3] = np.minimum(np.rint(colors), 255.0)
     return pixels
+
+
+def _gigabytes(count: int) -> str:
+    return f"{count / 1e9:.1f} GB" if count >= 1e8 else f"{count / 1e6:.3g} MB"

@@ -9,8 +9,8 @@ import numpy as np
 
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.draw_state import opacities, without_depth_writes
-from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs, set_uniforms
+from viewer.rendering.gpu.vertex_arrays import InstanceRows
 from viewer.rendering.options import Color
 from viewer.rendering.view import View, set_model
 from viewer.rig.arrays import Floats

@@ -13,8 +13,8 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.index_sets import IndexSet, MeshRun
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rig.arrays import Floats, Ints
 
 __all__ = ["SortedTriangles"]

@@ -10,11 +10,11 @@ import moderngl
 from viewer.data_classes import dataclass
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Owner
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_layer
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure

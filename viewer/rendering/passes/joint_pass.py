@@ -24,7 +24,7 @@ from viewer.rig.skeleton import Skeleton, shown_joints
 from viewer.rig.skinning import deform
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.bone_buffers import BoneBuffers
+    from viewer.rendering.gpu.bones import BoneBuffers
     from viewer.rendering.gpu.box_buffers import BoxBuffers
 
 __all__ = ["JointPass", "SkeletonBuffers", "draw_boxes", "draw_joints", "joint_program"]
@@ -63,7 +63,7 @@ class SkeletonBuffers:
     def bones(self, style: str) -> BoneBuffers:
         """Return the shapes of a style other than boxes, created on first use."""
         if style not in self._bones:
-            from viewer.rendering.gpu.bone_buffers import BoneBuffers
+            from viewer.rendering.gpu.bones import BoneBuffers
 
             skeleton = self.figure.require_skeleton()
             self._bones[style] = BoneBuffers(self.context, skeleton, style, self._size)

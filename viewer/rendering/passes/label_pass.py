@@ -8,9 +8,9 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.gpu.draw_state import without_depth_test
-from viewer.rendering.gpu.instance_rows import InstanceRows
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.upload import checked
+from viewer.rendering.gpu.vertex_arrays import InstanceRows
 from viewer.rendering.overlay.lettering import Lettering, shelves
 from viewer.rig.arrays import Floats, Ints
 

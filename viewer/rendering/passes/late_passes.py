@@ -10,6 +10,7 @@ import moderngl
 
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.program import Programs
+from viewer.rendering.gpu.target import Accumulation
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.joint_pass import JointPass
 from viewer.rendering.passes.mesh_pass import MeshPass, shading_of
@@ -17,7 +18,6 @@ from viewer.rendering.view import View
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:
-    from viewer.rendering.gpu.accumulation import Accumulation
     from viewer.rendering.gpu.mesh_buffers import MeshBuffers
     from viewer.rendering.gpu.studio import Matcaps, Studio
     from viewer.rendering.passes.annotation_pass import AnnotationPass
@@ -190,8 +190,6 @@ class LatePasses:
 
     def accumulation(self, size: tuple[int, int]) -> Accumulation:
         """Return the accumulation buffer for images of this size."""
-        from viewer.rendering.gpu.accumulation import Accumulation
-
         if self._sum is None or self._sum.size != size:
             if self._sum is not None:
                 self._sum.release()

@@ -11,6 +11,7 @@ from viewer.rendering.gpu.back_faces import Region
 from viewer.rendering.gpu.index_sets import IndexSet
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
 from viewer.rendering.gpu.ownership import Kept
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.studio import STUDIO_SAMPLERS
 from viewer.rendering.gpu.surfaces import SAMPLERS
@@ -19,7 +20,6 @@ from viewer.rendering.options import Color, DisplayOptions
 from viewer.rendering.passes.hull_pass import draw_hulls, outlined_runs
 from viewer.rendering.passes.runs import Prepare, draw_runs, draw_shapes
 from viewer.rendering.passes.see_through import surface_opacity
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.view import View, set_lights, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from viewer.rendering.gpu.waiting import Waiter
+from viewer.rendering.recorder import Waiter
 
 SLOW = """
 #version 330

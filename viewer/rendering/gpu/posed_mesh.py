@@ -1,10 +1,13 @@
-"""Skinning by a vertex shader with transform feedback, run once per changed pose.
+"""Posed vertices of an actor, skinned by a vertex shader with transform feedback.
 
-All other passes draw its output, the posed buffer, as a static mesh, so shading, wireframe, normals
-and picking need no second skinning. Tests read the buffer back.
+The shader runs once per changed pose. All passes draw its output, the posed buffer, as a static
+mesh, so shading, wireframe, normals and picking need no second skinning. Tests read the buffer
+back.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import moderngl
 import numpy as np
@@ -12,12 +15,12 @@ from numpy.typing import NDArray
 
 from viewer.rendering.gpu.back_faces import BackFaces
 from viewer.rendering.gpu.index_sets import IndexSet
-from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.rest_buffers import RestBuffers
 from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
-from viewer.rendering.gpu.skin_buffers import SkinBuffers
+from viewer.rendering.gpu.surfaces import Surface
 from viewer.rendering.gpu.upload import (
     checked,
     matrix_texture,
@@ -26,17 +29,13 @@ from viewer.rendering.gpu.upload import (
     write_rigid,
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
-from viewer.rendering.material_looks import MaterialLooks
 from viewer.rendering.options import DisplayOptions
 from viewer.rig.arrays import Floats
-from viewer.rig.figure import Figure
 from viewer.rig.kinematics import is_rigid, posed_skeleton
 from viewer.rig.pose import Pose
 from viewer.rig.shape import shaped
 from viewer.rig.skin import bind_positions
 from viewer.rig.skinning import METHODS, Skinning
-
-__all__ = ["PosedMesh", "skinning_options_key"]
 
 _BYTES_PER_VERTEX = 24  # a position and a normal, of three float32 each
 _PALETTE_UNIT, _PAIRS_UNIT, _RIGID_UNIT, _LIST_UNIT, _OFFSETS_UNIT = range(5)
@@ -88,7 +87,7 @@ class PosedMesh:
             self._rest = self._owner.keep(RestBuffers(context, mesh, way))
         self._rigid: moderngl.Texture | None = None
         self.back_faces = BackFaces(mesh)
-        self._looks = MaterialLooks(mesh)
+        self._looks = _MaterialLooks(mesh)
         self.scalars = self._owner.keep(ScalarBuffer(context, mesh))
         self._arrays = self._owner.keep(VertexArrays(context))
         self._key: tuple[object, ...] | None = None
@@ -131,10 +130,39 @@ class PosedMesh:
         """Upload the data of a pose without skinning: the CPU part of ``update``."""
         figure = shaped(self.mesh.figure, pose.shape_weights)
         self._rest.update(figure, pose, how)
-        self._write_palette(figure, pose, how, self.mesh.skin(how))
+        skeleton, skin = figure.skeleton, figure.skin
+        assert skeleton is not None and skin is not None  # checked by the caller
+        fractions = self.mesh.skin(how).joint_fractions
+        palette = posed_skeleton(skeleton, pose).palette(skin).copy()
+        self._is_affine = not is_rigid(palette)
+        if self._is_affine:
+            signs = np.sign(np.linalg.det(palette[:, :3, :3]))
+            self._is_mirrored = bool(fractions @ signs < 0.0)
+        # T(-center') M T(center), so that the shader's inputs and outputs are small.
+        palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
+        if fractions.any():
+            self.center = fractions @ palette[:, :3, 3]
+        palette[:, :3, 3] -= self.center
+        method = METHODS[how.method]
+        if method.uses_matrices:
+            write_matrices(self._palette, palette)
+        if method.uses_quaternions:
+            from viewer.rig.skinning.dqs import split_palette
+
+            if self._rigid is None:
+                self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
+            centers = bind_positions(skin) - self.mesh.center
+            write_rigid(self._rigid, *split_palette(palette, centers))
 
     def _run(self, skin: SkinBuffers, how: Skinning, attached: bool) -> None:
-        array = self._array(how.method, skin, attached)
+        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
+        affine = attached and self._is_affine
+        program = self.programs.feedback("skin", how.method, ("v_position", "v_normal"), affine)
+        array = self._arrays.get(
+            program,
+            lambda: self._rest.attributes(program, skin, attached),
+            key=(id(skin), attached and id(self._rest.positions)),
+        )
         values = {
             "u_attached": attached,
             "u_rest_shift": tuple(self.mesh.center - self.center),
@@ -148,48 +176,13 @@ class PosedMesh:
             "u_offset_list": _LIST_UNIT,
             "u_offsets": _OFFSETS_UNIT,
         }
-        set_uniforms(array.program, values)
+        set_uniforms(program, values)
         self._palette.use(_PALETTE_UNIT)
         skin.pairs.use(_PAIRS_UNIT)
         if self._rigid is not None:
             self._rigid.use(_RIGID_UNIT)
         self._rest.use(_LIST_UNIT, _OFFSETS_UNIT)
         array.transform(self.posed, mode=moderngl.POINTS, vertices=self.mesh.n_vertices)
-
-    def _write_palette(
-        self, figure: Figure, pose: Pose, how: Skinning, buffers: SkinBuffers
-    ) -> None:
-        """Upload T(-center') M T(center), so that the shader's inputs and outputs are small."""
-        skeleton, skin = figure.skeleton, figure.skin
-        assert skeleton is not None and skin is not None  # checked by the caller
-        palette = posed_skeleton(skeleton, pose).palette(skin).copy()
-        self._is_affine = not is_rigid(palette)
-        if self._is_affine:
-            signs = np.sign(np.linalg.det(palette[:, :3, :3]))
-            self._is_mirrored = bool(buffers.joint_fractions @ signs < 0.0)
-        palette[:, :3, 3] += palette[:, :3, :3] @ self.mesh.center
-        if buffers.joint_fractions.any():
-            self.center = buffers.joint_fractions @ palette[:, :3, 3]
-        palette[:, :3, 3] -= self.center
-        method = METHODS[how.method]
-        if method.uses_matrices:
-            write_matrices(self._palette, palette)
-        if method.uses_quaternions:
-            from viewer.rig.skinning.dqs import split_palette
-
-            if self._rigid is None:
-                self._rigid = self._owner.keep(rigid_texture(self.context, self._n_joints))
-            centers = bind_positions(skin) - self.mesh.center
-            write_rigid(self._rigid, *split_palette(palette, centers))
-
-    def _array(self, method: str, skin: SkinBuffers, attached: bool) -> moderngl.VertexArray:
-        # Rigid joints, by far the most common, use a cheaper program without scale and shear.
-        affine = attached and self._is_affine
-        program = self.programs.feedback("skin", method, ("v_position", "v_normal"), affine)
-        key = (id(skin), attached and id(self._rest.positions))
-        return self._arrays.get(
-            program, lambda: self._rest.attributes(program, skin, attached), key=key
-        )
 
     def is_mirrored_by(self, placement: Floats) -> bool:
         """Return whether a placement, (4, 4), or most of the skinning reflects the mesh.
@@ -214,6 +207,51 @@ class PosedMesh:
     def release(self) -> None:
         """Free the buffers of this actor."""
         self._owner.release()
+
+
+class _MaterialLooks:
+    """The surfaces of one actor that differ from its figure's surfaces.
+
+    Parameters
+    ----------
+    mesh : MeshBuffers
+        Mesh of the figure.
+    """
+
+    def __init__(self, mesh: MeshBuffers) -> None:
+        self._mesh = mesh
+        self._key = b""
+        self._changed: dict[int, Surface] = {}
+
+    def update(self, pose: Pose | None) -> None:
+        """Compute the surfaces of a pose; None for the figure's surfaces."""
+        shapes = self._mesh.figure.blend_shapes
+        binds = None if shapes is None else shapes.material_binds
+        if shapes is None or binds is None:
+            return
+        key = b"" if pose is None else pose.shape_weights.tobytes()
+        if key == self._key:
+            return
+        self._key, self._changed = key, {}
+        if pose is None:
+            return
+        surfaces = self._mesh.surfaces
+        materials = self._mesh.figure.require_mesh().materials
+        changed = binds.changed(materials, shapes.shown(pose.shape_weights))
+        self._changed = {
+            id(surfaces[index]): surfaces[index].changed(material)
+            for index, material in changed.items()
+        }
+
+    def of(self, indices: IndexSet) -> IndexSet:
+        """Return triangles with the surfaces of the last pose."""
+        if not self._changed:
+            return indices
+        runs = (
+            replace(run, surface=self._changed.get(id(run.surface), run.surface))
+            for run in indices.runs
+        )
+        return replace(indices, runs=tuple(runs))
 
 
 def skinning_options_key(how: Skinning) -> tuple[object, ...]:

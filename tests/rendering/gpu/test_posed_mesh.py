@@ -12,10 +12,10 @@ from rendering.drawn_figures import arm, random_figure, random_pose, square
 import viewer
 from viewer.rendering.camera import Camera, orbit
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
+from viewer.rendering.gpu.posed_mesh import PosedMesh
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.passes.skin_pass import PosedMesh
 from viewer.rendering.renderer import Renderer
 from viewer.rig.figure import Figure
 from viewer.rig.kinematics import skinning_matrices, world_matrices
