@@ -41,7 +41,7 @@ IMPORTED = (
     "viewer.media.video",
     "viewer.rendering.offscreen",
     "viewer.rendering.passes.late_passes",
-    "viewer.rendering.quality_limits",
+    "viewer.rendering.sampling",
     "viewer.rendering.recorder",
 )
 

@@ -9,7 +9,7 @@ from PIL import Image
 
 import viewer
 from viewer.cli import run
-from viewer.rendering.overlay.frusta import frustum_corners
+from viewer.rendering.pinhole import frustum_corners
 
 pytestmark = pytest.mark.slow
 

@@ -6,9 +6,16 @@ import numpy as np
 import pytest
 
 import viewer
-from viewer.rendering.colormap import colormap, diverging_map, oklab
-from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
-from viewer.rendering.part_colors import part_colors
+from viewer.rendering.colors import (
+    NOTHING,
+    colormap,
+    count_palette,
+    diverging_map,
+    joint_palette,
+    oklab,
+    part_colors,
+    part_palette,
+)
 from viewer.rig.srgb import decode_srgb, encode_srgb
 
 # Vienot, Brettel and Mollon 1999 for linear sRGB; the palettes were designed with Machado 2009.

@@ -10,10 +10,10 @@ from rendering.drawn_figures import scene_of, square
 from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
+from viewer.rendering.colors import part_colors
 from viewer.rendering.gpu.index_sets import kept_triangles
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.part_colors import part_colors
 from viewer.rendering.passes.mesh_pass import SKIN_COLOR
 from viewer.rig.annotations import BodyParts, ReducedMesh
 from viewer.rig.scene import scene_box

@@ -11,13 +11,11 @@ from rendering.drawn_figures import arm, bent, scene_of, skeleton, square
 from rendering.front_view import alone, drawn, front_view, grid_figure, pixel
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.colormap import colormap
+from viewer.rendering.colors import NOTHING, colormap, count_palette, joint_palette
 from viewer.rendering.gpu.mesh_buffers import MeshBuffers
-from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.palettes import NOTHING, count_palette, joint_palette
-from viewer.rendering.scalar_quantities import name_for
+from viewer.rendering.scalar_quantities import ScalarBuffer, name_for
 from viewer.rig import scalars
 from viewer.rig.annotations import BodyParts
 from viewer.rig.blendshapes import Correctives
@@ -139,7 +137,7 @@ def test_values_are_recomputed_only_after_a_change(buffers, monkeypatch):
         calls.append(parts[0])
         return original(*parts)
 
-    monkeypatch.setattr("viewer.rendering.gpu.scalar_buffer.compute", counted)
+    monkeypatch.setattr("viewer.rendering.scalar_quantities.compute", counted)
     pose, how = posed(buffers.mesh.figure), Skinning()
     for change in (
         lambda: None,

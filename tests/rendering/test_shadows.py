@@ -18,11 +18,11 @@ from rendering.drawn_figures import (
 from rendering.golden_motion import SHOTS
 from rendering.plain_pictures import N, front, lights, plain
 
-from viewer.rendering.bounds import spheres_of
+from viewer.rendering.casters import spheres_of
 from viewer.rendering.gpu.target import Target
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes import instance_pass
-from viewer.rendering.quality_limits import limit_passes, time_note
+from viewer.rendering.sampling import limit_passes, time_note
 from viewer.rig.figure import Figure
 from viewer.rig.mesh import Mesh
 from viewer.rig.pose import rest_pose

@@ -15,14 +15,7 @@ from viewer.errors import ViewerError
 from viewer.phrases import listed, printable
 from viewer.rendering.camera import Camera, camera_from_view, facing_camera, fit, front_azimuth
 from viewer.rendering.gpu.program import SHADING_CHOICES
-from viewer.rendering.options import (
-    BACKGROUNDS,
-    BONES,
-    MATCAPS,
-    QUALITIES,
-    SHOWN,
-    DisplayOptions,
-)
+from viewer.rendering.options import BACKGROUNDS, BONES, MATCAPS, QUALITIES, SHOWN, DisplayOptions
 from viewer.rendering.passes.background_pass import parse_color
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import FRONTS, Front, front_axes, guess_front
@@ -331,7 +324,7 @@ def camera_notes(arguments: argparse.Namespace, scene: Scene, options: DisplayOp
     drawn = scene.views if options.cameras else [view for view in [seen] if view is not None]
     notes: list[str] = []
     if drawn:
-        from viewer.rendering.camera_notes import image_notes, lens_notes
+        from viewer.rendering.camera_views import image_notes, lens_notes
 
         notes = [note for view in drawn for note in image_notes(scene, view)]
         notes += [] if seen is None else lens_notes(scene, seen)

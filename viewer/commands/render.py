@@ -244,7 +244,7 @@ def draw_scene(
     """
     from viewer.rendering.gpu.context import thread_graphics
     from viewer.rendering.offscreen import Offscreen
-    from viewer.rendering.quality_limits import limit_passes, time_note
+    from viewer.rendering.sampling import limit_passes, time_note
 
     def report_time(seconds: float, count: int) -> None:
         print_warnings(time_note(seconds, count), "note")

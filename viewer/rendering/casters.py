@@ -1,4 +1,4 @@
-"""The solid parts of a scene, drawn from any point of view without their materials."""
+"""The solid parts of a scene, drawn from any point of view without materials, and their bounds."""
 
 from __future__ import annotations
 
@@ -9,26 +9,26 @@ import moderngl
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.bounds import spheres_of
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.index_sets import MeshRun
 from viewer.rendering.gpu.program import Programs, set_uniforms
-from viewer.rendering.joint_spheres import stretch
+from viewer.rendering.joint_spheres import box_spheres, skin_spheres, stretch
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.late_passes import LatePasses
 from viewer.rendering.passes.mesh_pass import MeshPass
-from viewer.rendering.shown import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.view import View
+from viewer.rendering.visibility import Meshes, has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rig.arrays import Floats
 from viewer.rig.figure import Figure
+from viewer.rig.kinematics import posed_skeleton
 from viewer.rig.memo import Memo
 from viewer.rig.mesh import bounding_box, box_size
 from viewer.rig.scene import Actor
+from viewer.rig.shape import shaped, shaped_skeleton
 
-__all__ = ["Casters"]
-
+_BONE = 0.05  # largest half-width of a bone, relative to the skeleton's size
 _sizes: Memo[Figure, float] = Memo()
 
 
@@ -110,3 +110,59 @@ class Casters:
 def _mesh_size(figure: Figure) -> float:
     """Return the size of a figure's mesh at rest, figure units."""
     return box_size(bounding_box(figure.require_mesh().positions))
+
+
+def spheres_of(actor: Actor, options: DisplayOptions) -> Floats:
+    """Return spheres around the drawn parts of an actor, computed from its joints alone.
+
+    Parameters
+    ----------
+    actor : Actor
+        An actor that is drawn.
+    options : DisplayOptions
+        Display options.
+
+    Returns
+    -------
+    (N, 4)
+        Centre and radius, scene space.
+    """
+    parts = []
+    if shows_mesh(actor.figure, options):
+        parts.append(_mesh_spheres(actor, options))
+    if shows_skeleton(actor, options):
+        parts.append(_joint_spheres(actor))
+    placement = placement_of(actor, options)
+    found = np.concatenate(parts or [np.zeros((0, 4))])
+    if actor.points is not None:
+        seen = actor.points[:, 3] > 0.0
+        places = np.pad(actor.points[seen, :3], ((0, 0), (0, 1)))
+        found = np.concatenate([found, places])
+    centers = found[:, :3] @ placement[:3, :3].T + placement[:3, 3]
+    return np.column_stack([centers, found[:, 3] * stretch(placement[None])])
+
+
+def _mesh_spheres(actor: Actor, options: DisplayOptions) -> Floats:
+    figure, pose = actor.figure, actor.pose
+    if options.show == "binding" or pose is None or not figure.is_attached:
+        return box_spheres(bounding_box(figure.require_mesh().positions))
+    return skin_spheres(shaped(figure, pose.shape_weights), pose)
+
+
+def _joint_spheres(actor: Actor) -> Floats:
+    """Return spheres around an actor's bones and joint boxes, figure space."""
+    pose = actor.require_pose()
+    skeleton = shaped_skeleton(actor.figure, pose.shape_weights)
+    world = posed_skeleton(skeleton, pose).world
+    places = world[:, :3, 3]
+    size, mesh = box_size(bounding_box(places)), actor.figure.mesh
+    if size == 0.0 and mesh is not None:  # used if all joints coincide
+        size = box_size(bounding_box(mesh.positions))
+    thick = np.full(len(places), _BONE * (size or 1.0))
+    bones = np.column_stack([places, thick])
+    if skeleton.boxes is None:
+        return bones
+    middles, halves = skeleton.boxes.mean(axis=1), 0.5 * np.ptp(skeleton.boxes, axis=1)
+    centers = np.einsum("jik,jk->ji", world[:, :3, :3], middles) + world[:, :3, 3]
+    boxes = np.column_stack([centers, np.linalg.norm(halves, axis=1) * stretch(world)])
+    return np.concatenate([bones, boxes])

@@ -10,11 +10,10 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from viewer.rendering.effects import Effects, Shadow
 from viewer.rendering.gpu.program import Programs
 from viewer.rendering.passes.ground_pass import ground_axes
 from viewer.rendering.sampling import Sample, n_passes, tilted
-from viewer.rendering.view import View, key_direction
+from viewer.rendering.view import Effects, Shadow, View, key_direction
 from viewer.rig.arrays import Floats
 from viewer.rig.mesh import bounding_box, box_size
 

@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import field
+from typing import TYPE_CHECKING
 
 from viewer.data_classes import dataclass
 from viewer.rig.skinning import Skinning
 
-__all__ = [
-    "BACKGROUNDS",
-    "BONES",
-    "COLORMAPS",
-    "MATCAPS",
-    "OPACITIES",
-    "QUALITIES",
-    "SHOWN",
-    "Color",
-    "DisplayOptions",
-    "Light",
-    "Lights",
-]
+if TYPE_CHECKING:
+    from viewer.rig.skeleton import Skeleton
 
 Color = tuple[float, float, float]
 
@@ -60,7 +50,6 @@ OPACITIES = {"boxes": 0.35, "octahedra": 0.8, "sticks": 0.8, "axes": 0.9}
 
 BACKGROUNDS = ("gradient", "white", "environment", "transparent")
 """Names of backgrounds; colours are given as ``#rrggbb``."""
-
 
 QUALITIES = {
     "draft": "Draft",
@@ -251,3 +240,17 @@ class DisplayOptions:
     def has_shadows(self) -> bool:
         """Whether shadows are drawn."""
         return self.shadows and self.quality != "draft"
+
+
+def bone_style(skeleton: Skeleton, options: DisplayOptions) -> str:
+    """Return the style of a drawn skeleton, a key of ``BONES`` other than ``"auto"``."""
+    if options.bones != "auto":
+        return options.bones
+    return "octahedra" if skeleton.boxes is None or skeleton.boxes_from_bones else "boxes"
+
+
+def skeleton_opacity(skeleton: Skeleton, options: DisplayOptions) -> float:
+    """Return the opacity of a skeleton that is drawn over a skin, 0 to 1."""
+    if options.skeleton_opacity is not None:
+        return options.skeleton_opacity
+    return OPACITIES[bone_style(skeleton, options)]

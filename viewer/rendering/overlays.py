@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from viewer.data_classes import dataclass
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.late_passes import LatePasses
-from viewer.rendering.shown import has_joint_marks
 from viewer.rendering.view import View
+from viewer.rendering.visibility import has_joint_marks
 from viewer.rig.scene import Scene
 
 if TYPE_CHECKING:

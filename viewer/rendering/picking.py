@@ -21,7 +21,8 @@ from viewer.rendering.passes.instance_pass import draw_instance_shapes
 from viewer.rendering.passes.joint_pass import draw_boxes, draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
-from viewer.rendering.shown import (
+from viewer.rendering.view import View, in_front, set_model
+from viewer.rendering.visibility import (
     has_joint_marks,
     has_markers,
     has_points,
@@ -31,7 +32,6 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
-from viewer.rendering.view import View, in_front, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import apply_transform
 from viewer.rig.scene import Actor, Scene

@@ -1,19 +1,23 @@
-"""OpenGL matrices of calibrated cameras."""
+"""Geometry of calibrated cameras: OpenGL matrices, lens distortion, frusta."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from viewer.errors import RigError
 from viewer.rig.arrays import Floats
-from viewer.rig.captures.camera_view import CameraView
 from viewer.rig.mesh import box_size
 
-__all__ = ["distortion_error", "picture_size", "pinhole_projection", "pinhole_view"]
+if TYPE_CHECKING:
+    from viewer.rig.captures.camera_view import CameraView
 
 _FLIP = np.diag([1.0, -1.0, -1.0])  # OpenCV looks along z with y down, OpenGL along -z with y up
 _UNBOUNDED = 1e9  # value that replaces an infinite distortion
 _THINNEST = 1e-6  # minimum depth in front of and behind the scene, relative to its distance
+_DEPTH = 0.2  # distance of the image planes of frusta, relative to the size of the scene
 _NEAREST = 5e-3  # minimum near plane, relative to the distance of the scene's centre
 
 
@@ -135,3 +139,34 @@ def distortion_error(view: CameraView) -> float:
     dy = y * (radial - 1.0) + p1 * (r2 + 2.0 * y * y) + 2.0 * p2 * x * y
     moved = k[:2, :2] @ np.stack([dx, dy])
     return float(np.linalg.norm(moved, axis=0).max())
+
+
+def frustum_depth(box: Floats) -> float:
+    """Return the distance of image planes from their cameras for a scene, scene units."""
+    return _DEPTH * (box_size(box) or 1.0)
+
+
+def frustum_corners(camera: CameraView, depth: float) -> Floats:
+    """Return the corners of a camera's image at a depth: (4, 3), scene space.
+
+    Clockwise from the upper left; these are the corners of the outermost pixels, with
+    X = R^T (d K^-1 u - T), without lens distortion.
+    """
+    width, height = picture_size(camera)
+    k = camera.intrinsic / camera.intrinsic[2, 2]
+    left, top, right, bottom = -0.5, -0.5, width - 0.5, height - 0.5
+    pixels = [[left, top, 1.0], [right, top, 1.0], [right, bottom, 1.0], [left, bottom, 1.0]]
+    rays = np.linalg.solve(k, np.transpose(pixels)).T
+    return (depth * rays - camera.translation) @ camera.rotation
+
+
+def camera_centers(cameras: Sequence[CameraView]) -> Floats:
+    """Return the positions of cameras, -R^T T: (N, 3), scene space."""
+    return np.array([-camera.rotation.T @ camera.translation for camera in cameras]).reshape(-1, 3)
+
+
+def frusta_points(cameras: Sequence[CameraView], box: Floats) -> Floats:
+    """Return the corners and tips of all frusta: (N, 3); ``box`` is the scene's box."""
+    depth = frustum_depth(box)
+    corners = [frustum_corners(camera, depth) for camera in cameras]
+    return np.concatenate([camera_centers(cameras), *corners])

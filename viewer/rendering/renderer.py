@@ -9,12 +9,7 @@ from typing import TYPE_CHECKING
 import moderngl
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.camera_views import (
-    draw_image_behind,
-    draw_image_planes,
-    frusta_of,
-    reach_of,
-)
+from viewer.rendering.camera_views import draw_image_behind, draw_image_planes, frusta_of, reach_of
 from viewer.rendering.gpu.actor_buffers import ActorBuffers
 from viewer.rendering.gpu.draw_state import without_depth_writes
 from viewer.rendering.gpu.posed_mesh import PosedMesh
@@ -33,7 +28,9 @@ from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_layer
 from viewer.rendering.sampling import jittered, n_passes, sample
 from viewer.rendering.scalar_quantities import ScalarQuantities
-from viewer.rendering.shown import (
+from viewer.rendering.translucent import draw_translucent
+from viewer.rendering.view import View, view_of
+from viewer.rendering.visibility import (
     Meshes,
     far_first,
     has_markers,
@@ -45,8 +42,6 @@ from viewer.rendering.shown import (
     update_meshes,
     update_skeletons,
 )
-from viewer.rendering.translucent import draw_translucent
-from viewer.rendering.view import View, view_of
 from viewer.rig.arrays import Floats
 from viewer.rig.scene import Actor, Scene
 
@@ -308,7 +303,8 @@ class Renderer:
             index, joint = selected
             whose = scene.actors[index] if 0 <= index < len(scene.actors) else None
             figures = [actor.figure for actor in scene.actors if actor.figure.mesh is not None]
-            self.scalars.update(meshes.singles, options, (whose, joint), figures)
+            values = [(actor, mesh.scalars) for actor, mesh in meshes.singles]
+            self.scalars.update(values, options, (whose, joint), figures)
         update_skeletons(self.buffers, scene.actors, options)
         for actor in scene.actors:
             if has_points(actor, options):

@@ -7,9 +7,16 @@ from collections.abc import Sequence
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.colormap import colormap, diverging_map, named_map
+from viewer.rendering.colors import (
+    NOTHING,
+    colormap,
+    count_palette,
+    diverging_map,
+    joint_palette,
+    named_map,
+    part_palette,
+)
 from viewer.rendering.options import DisplayOptions
-from viewer.rendering.palettes import NOTHING, count_palette, joint_palette, part_palette
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure
 from viewer.rig.scalars import categories, find_quantity, shown_unit, split_name

@@ -5,8 +5,8 @@ from __future__ import annotations
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.see_through import draw_nearest
-from viewer.rendering.shown import Meshes, placement_of
 from viewer.rendering.view import View
+from viewer.rendering.visibility import Meshes, placement_of
 
 __all__ = ["draw_translucent"]
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_array_equal
 
 from viewer.app.preferences.state import Appearance
 from viewer.app.weights.actions import no_view
-from viewer.rendering.colormap import colormap
+from viewer.rendering.colors import colormap
 from viewer.rig.annotations import VertexField
 from viewer.rig.scalars import SCALARS, compute, missing_part
 from viewer.rig.skinning import Skinning

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from rendering.drawn_figures import skeleton
 
+from viewer.rendering.colors import NOTHING
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Entry, Shown, legend_of, round_ticks
-from viewer.rendering.palettes import NOTHING
 from viewer.rendering.scalar_look import look_of, shown_ends
 from viewer.rig.annotations import BodyParts, VertexField
 from viewer.rig.figure import Figure

@@ -9,7 +9,7 @@ import pytest
 from test_legend import legend, strip
 
 from viewer.rendering.camera import Camera, fit
-from viewer.rendering.colormap import colormap
+from viewer.rendering.colors import colormap
 from viewer.rendering.offscreen import Offscreen
 from viewer.rendering.options import DisplayOptions
 from viewer.rendering.overlay.legend import Entry, Legend

@@ -11,7 +11,7 @@ from viewer.app.posing.posed_joint import posed_joint
 from viewer.app.view.flight import fly_from
 from viewer.errors import ViewerError
 from viewer.rendering.camera import look_from
-from viewer.rendering.camera_notes import image_notes, lens_notes
+from viewer.rendering.camera_views import image_notes, lens_notes
 from viewer.rig.arrays import Floats
 from viewer.rig.inspection.front import Front
 from viewer.rig.mesh import bounding_box, box_size

@@ -13,7 +13,7 @@ from viewer.app.weights.state import Weights, wants_vertex
 from viewer.data_classes import dataclass
 from viewer.errors import ViewerError
 from viewer.rendering.renderer import Renderer
-from viewer.rendering.shown import has_joint_marks, shows_skeleton
+from viewer.rendering.visibility import has_joint_marks, shows_skeleton
 from viewer.rig.skeleton import joint_label
 
 __all__ = ["Hovered", "draw_hovered_name", "hover_actor", "hover_joint", "joint_near"]

@@ -7,7 +7,7 @@ from viewer.app.view.hovering import Hovered
 from viewer.app.weights.state import Weights
 from viewer.data_classes import dataclass
 from viewer.rendering.outlined import Outlined
-from viewer.rendering.shown import shows_skeleton
+from viewer.rendering.visibility import shows_skeleton
 from viewer.rig.geometry.transform import apply_transform
 
 __all__ = ["Outlines", "outlined_parts", "toggle_outlines"]

@@ -10,9 +10,9 @@ from viewer.app.weights.actions import explained, unpin
 from viewer.app.weights.state import Weights
 from viewer.errors import ViewerError
 from viewer.phrases import printable
+from viewer.rendering.colors import joint_palette
 from viewer.rendering.overlay.annotation import LABEL_COLOR, Annotation, Labels
 from viewer.rendering.overlay.segments import Segments, SegmentStyle, dots, joined
-from viewer.rendering.palettes import joint_palette
 from viewer.rendering.projection import picture_scale, project
 from viewer.rendering.view import view_of
 from viewer.rig.arrays import Bytes, Floats

@@ -213,7 +213,7 @@ class MeshBuffers:
         """A colour for every split vertex, by its body part; None if the figure has no parts."""
         parts = self.figure.body_parts
         if self._colors is None and parts is not None:
-            from viewer.rendering.part_colors import part_colors
+            from viewer.rendering.colors import part_colors
 
             self._colors = self.upload(part_colors(len(parts.names))[parts.of_vertex])
         return self._colors

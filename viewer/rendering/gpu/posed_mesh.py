@@ -19,7 +19,6 @@ from viewer.rendering.gpu.mesh_buffers import MeshBuffers, SkinBuffers
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.rest_buffers import RestBuffers
-from viewer.rendering.gpu.scalar_buffer import ScalarBuffer
 from viewer.rendering.gpu.surfaces import Surface
 from viewer.rendering.gpu.upload import (
     checked,
@@ -30,6 +29,7 @@ from viewer.rendering.gpu.upload import (
 )
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.options import DisplayOptions
+from viewer.rendering.scalar_quantities import ScalarBuffer
 from viewer.rig.arrays import Floats
 from viewer.rig.kinematics import is_rigid, posed_skeleton
 from viewer.rig.pose import Pose

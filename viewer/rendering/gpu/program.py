@@ -103,7 +103,7 @@ class Programs:
         materials : bool
             Whether surfaces have more than a base colour texture, see ``include/surface.glsl``.
         effects : tuple of str
-            Macros of the fragment shader, see ``viewer.rendering.effects``.
+            Macros of the fragment shader, see ``viewer.rendering.view.Effects``.
 
         Raises
         ------

@@ -9,7 +9,7 @@ from dataclasses import field
 import numpy as np
 
 from viewer.data_classes import dataclass
-from viewer.rendering.palettes import NOTHING
+from viewer.rendering.colors import NOTHING
 from viewer.rendering.scalar_look import TYPICAL, ScalarLook
 from viewer.rig.arrays import Bytes, Floats
 from viewer.rig.figure import Figure

@@ -8,8 +8,7 @@ import numpy as np
 from viewer.rendering.gpu.draw_state import without_depth_test
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
-from viewer.rendering.overlay.frusta import frustum_corners
-from viewer.rendering.pinhole import picture_size
+from viewer.rendering.pinhole import frustum_corners, picture_size
 from viewer.rendering.view import View
 from viewer.rig.arrays import Floats
 from viewer.rig.captures.camera_images import CameraImage

@@ -5,13 +5,12 @@ from __future__ import annotations
 import moderngl
 import numpy as np
 
-from viewer.rendering.effects import SHADOW_UNIT, Shadow
 from viewer.rendering.gpu.draw_state import behind, without_depth_writes
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
 from viewer.rendering.gpu.vertex_arrays import VertexArrays
 from viewer.rendering.passes.contact_pass import Contact
-from viewer.rendering.view import View, set_model
+from viewer.rendering.view import SHADOW_UNIT, Shadow, View, set_model
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.vectors import unit
 

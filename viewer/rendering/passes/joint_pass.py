@@ -10,7 +10,7 @@ import numpy as np
 
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import buffer
-from viewer.rendering.options import Color, DisplayOptions
+from viewer.rendering.options import Color, DisplayOptions, bone_style, skeleton_opacity
 from viewer.rendering.passes.see_through import draw_nearest
 from viewer.rendering.view import View, in_front, set_lights, set_model
 from viewer.rig.arrays import Floats
@@ -50,14 +50,10 @@ class SkeletonBuffers:
 
     def style(self, options: DisplayOptions) -> str:
         """Return the style of the drawn skeleton; see ``bone_style``."""
-        from viewer.rendering.passes.bone_style import bone_style
-
         return bone_style(self.figure.require_skeleton(), options)
 
     def opacity(self, options: DisplayOptions) -> float:
         """Return the opacity of the skeleton over a skin."""
-        from viewer.rendering.passes.bone_style import skeleton_opacity
-
         return skeleton_opacity(self.figure.require_skeleton(), options)
 
     def bones(self, style: str) -> BoneBuffers:

@@ -8,11 +8,10 @@ from dataclasses import replace
 import moderngl
 import numpy as np
 
-from viewer.rendering.effects import Occlusion
 from viewer.rendering.gpu.ownership import Owner
 from viewer.rendering.gpu.program import Programs, set_uniforms
 from viewer.rendering.gpu.upload import checked
-from viewer.rendering.view import View
+from viewer.rendering.view import Occlusion, View
 
 __all__ = ["OcclusionPass"]
 

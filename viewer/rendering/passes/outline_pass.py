@@ -21,8 +21,8 @@ from viewer.rendering.passes.joint_pass import draw_joints, joint_program
 from viewer.rendering.passes.mesh_pass import MeshPass
 from viewer.rendering.passes.point_pass import PointPass
 from viewer.rendering.projection import picture_scale
-from viewer.rendering.shown import has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rendering.view import View
+from viewer.rendering.visibility import has_points, placement_of, shows_mesh, shows_skeleton
 from viewer.rig.scene import Actor, Scene
 
 __all__ = ["OutlinePass", "OutlineTools"]

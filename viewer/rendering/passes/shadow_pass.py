@@ -9,9 +9,8 @@ import moderngl
 import numpy as np
 
 from viewer.rendering.camera import Camera
-from viewer.rendering.effects import FILTER_RADIUS, Shadow
 from viewer.rendering.gpu.ownership import Owner
-from viewer.rendering.view import View
+from viewer.rendering.view import FILTER_RADIUS, Shadow, View
 from viewer.rig.arrays import Floats
 from viewer.rig.geometry.transform import translation_matrix
 

@@ -1,4 +1,4 @@
-"""Selection of the drawn parts of a scene, and update of their meshes and instances."""
+"""Visibility: which parts of a scene are drawn, and the update of their buffers before that."""
 
 from __future__ import annotations
 
@@ -22,20 +22,6 @@ from viewer.rig.shape import shaped_skeleton
 
 if TYPE_CHECKING:
     from viewer.rendering.gpu.instance_buffers import InstanceBuffers
-
-__all__ = [
-    "Meshes",
-    "far_first",
-    "has_joint_marks",
-    "has_markers",
-    "has_points",
-    "placement_of",
-    "prepare_meshes",
-    "shows_mesh",
-    "shows_skeleton",
-    "update_meshes",
-    "update_skeletons",
-]
 
 
 @dataclass(frozen=True, slots=True)

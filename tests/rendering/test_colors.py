@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from viewer.rendering.colormap import colormap, named_map
+from viewer.rendering.colors import colormap, named_map
 from viewer.rendering.options import COLORMAPS
 
 # Matrices from sRGB to CIE XYZ (IEC 61966-2-1), and from XYZ to the lightness of OKLab (Ottosson
